@@ -1,0 +1,1 @@
+"""Finding the numbers: base parameters, estimators, exciting motion."""

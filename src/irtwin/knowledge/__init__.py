@@ -1,0 +1,1 @@
+"""The knowledge graph: store, mapping, reasoning, rules, queries."""

@@ -1,0 +1,1 @@
+"""The bridge: physics as data providers of the knowledge graph."""

@@ -1,0 +1,83 @@
+"""What a robot is: its joints, links, limits and data sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A moving joint. Lengths and angles in m or rad by `kind`; None where nobody said.
+
+    `rotor_inertia` (kg m^2), `torque_constant` (N m/A) are reflected to the joint; `winding_resistance` in ohm.
+    """
+
+    name: str
+    kind: str  # "revolute", "continuous" or "prismatic"
+    lower: float = -np.inf
+    upper: float = np.inf
+    velocity: float = np.inf
+    effort: float = np.inf
+    acceleration: float | None = None
+    gear_ratio: float | None = None
+    rotor_inertia: float | None = None
+    torque_constant: float | None = None
+    winding_resistance: float | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the joint's position: "rad" or "m"."""
+        return "m" if self.kind == "prismatic" else "rad"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A visual shape of a link: "box" (x, y, z), "cylinder" (radius, length), "sphere" (radius), in m.
+
+    `placement` is the (4, 4) transform from the shape's frame to the link's; `colour` is RGBA in 0..1.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    placement: np.ndarray
+    colour: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body, nominal inertia as the URDF gives it: mass in kg; its visual shapes."""
+
+    name: str
+    mass: float
+    shapes: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A serial (or branched) robot of n moving joints, in the order of `q`."""
+
+    name: str
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+    urdf: str = field(repr=False)  # checked text, no mesh is ever opened from it
+    manufacturer: str | None = None
+    type: str | None = None
+    weight: float | None = None  # kg
+
+    @cached_property
+    def model(self) -> pin.Model:
+        """The Pinocchio model, nq = nv = n, built from `urdf`."""
+        return pin.buildModelFromXML(self.urdf)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names in the order of `q`."""
+        return tuple(joint.name for joint in self.joints)
+
+    def index(self, joint: str) -> int:
+        """Return the column of `q` that belongs to the joint's name."""
+        return self.joint_names.index(joint)

@@ -1,0 +1,1 @@
+"""Logs as read, and motions conditioned for identification."""

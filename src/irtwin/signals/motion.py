@@ -1,0 +1,53 @@
+"""A motion: one run's signals, conditioned and evenly sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a robot of n joints did over N even samples. Absent measurements are None.
+
+    time: (N,) s; q, dq, ddq: (N, n) rad, rad/s, rad/s^2; torque: (N, n) N m on the joint side;
+    current: (N, n) A; temperature: (N, n) degC; power: (N,) W; payload_com: (3,) m in the flange frame.
+    """
+
+    run: str
+    time: np.ndarray
+    q: np.ndarray
+    dq: np.ndarray
+    ddq: np.ndarray
+    torque: np.ndarray | None = None
+    current: np.ndarray | None = None
+    temperature: np.ndarray | None = None
+    power: np.ndarray | None = None
+    payload_mass: float = 0.0  # kg
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, Hz."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+    def part(self, start: int, stop: int) -> Motion:
+        """Return samples start..stop (exclusive) as a motion of the same run."""
+
+        def cut(signal: np.ndarray | None) -> np.ndarray | None:
+            return None if signal is None else signal[start:stop]
+
+        return Motion(
+            run=self.run,
+            time=self.time[start:stop],
+            q=self.q[start:stop],
+            dq=self.dq[start:stop],
+            ddq=self.ddq[start:stop],
+            torque=cut(self.torque),
+            current=cut(self.current),
+            temperature=cut(self.temperature),
+            power=cut(self.power),
+            payload_mass=self.payload_mass,
+            payload_com=self.payload_com,
+        )

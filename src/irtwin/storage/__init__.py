@@ -1,0 +1,1 @@
+"""The relational database and the series beside it."""

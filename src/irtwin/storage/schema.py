@@ -1,0 +1,260 @@
+"""The relational schema: what is stored of robots, runs, twins and what providers made of them.
+
+Every column that leaves for the graph says its unit in its name. Rows that a provider made carry its activity,
+so that they can be dropped and made again.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import ForeignKey
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+
+class Base(DeclarativeBase):
+    """The registry of tables."""
+
+
+class Robot(Base):
+    """An industrial robot; `robot_id` is the end of its IRI."""
+
+    __tablename__ = "robot"
+
+    robot_id: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    type: Mapped[str | None]
+    manufacturer: Mapped[str | None]
+    weight_kg: Mapped[float | None]
+    controlled_axes: Mapped[int]
+    arm_movement_type: Mapped[str | None]
+    rated_payload_kg: Mapped[float | None]
+    ambient_temperature_degc: Mapped[float | None]
+    power_measured_at: Mapped[str]
+    simulated: Mapped[bool]
+    urdf: Mapped[str]
+    urdf_sha256: Mapped[str]
+    notes: Mapped[str]  # JSON: what the data set says beside the contract
+
+
+class Joint(Base):
+    """A moving joint of a robot, with its limits and data sheet."""
+
+    __tablename__ = "joint"
+
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)
+    position: Mapped[int]  # 1 for the joint next to the base
+    kind: Mapped[str]
+    lower_limit_rad: Mapped[float | None]
+    upper_limit_rad: Mapped[float | None]
+    speed_limit_rad_s: Mapped[float | None]
+    torque_limit_nm: Mapped[float | None]
+    gear_ratio: Mapped[float | None]
+    rotor_inertia_kg_m2: Mapped[float | None]
+    torque_constant_nm_a: Mapped[float | None]
+    winding_resistance_ohm: Mapped[float | None]
+
+
+class Run(Base):
+    """One recorded motion; `run_id` is `robot_id.name`."""
+
+    __tablename__ = "run"
+
+    run_id: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
+    name: Mapped[str]
+    role: Mapped[str]
+    payload_kg: Mapped[float]
+    payload_com_x_m: Mapped[float]
+    payload_com_y_m: Mapped[float]
+    payload_com_z_m: Mapped[float]
+    repeat_of: Mapped[str | None] = mapped_column(ForeignKey("run.run_id"))
+    start_time: Mapped[datetime]  # the log's `started`, else when it was taken in
+    start_time_from: Mapped[str]  # "log" or "ingest"
+    run_time_s: Mapped[float]
+    sample_count: Mapped[int]
+    sample_rate_hz: Mapped[float]
+    file: Mapped[str]
+    sha256: Mapped[str]
+
+
+class Series(Base):
+    """A Parquet file of a run's samples: as measured, or as a twin models them."""
+
+    __tablename__ = "series"
+
+    series_id: Mapped[str] = mapped_column(primary_key=True)  # sha256 of the Parquet file
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    kind: Mapped[str]  # "measured" or "modelled"
+    path: Mapped[str]  # inside the workspace
+    row_count: Mapped[int]
+    columns: Mapped[str]  # comma separated
+    activity_id: Mapped[str | None] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class Activity(Base):
+    """One execution of a provider on one individual."""
+
+    __tablename__ = "activity"
+
+    activity_id: Mapped[str] = mapped_column(primary_key=True)
+    provider: Mapped[str]  # end of the provider's IRI
+    subject: Mapped[str]  # IRI of the individual it worked on
+    started: Mapped[datetime]
+    ended: Mapped[datetime]
+    software: Mapped[str]  # "irtwin 0.1.0"
+
+
+class ActivityUse(Base):
+    """An entity that an activity read: a run's series or a twin, by IRI."""
+
+    __tablename__ = "activity_use"
+
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), primary_key=True)
+    entity: Mapped[str] = mapped_column(primary_key=True)
+
+
+class RunState(Base):
+    """How a run passed, and the robot's state at its last sample."""
+
+    __tablename__ = "run_state"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    current_state: Mapped[str]  # "moving" or "standstill"
+    idle_share: Mapped[float]  # of the run's time, 0 to 1
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class JointState(Base):
+    """A joint at the last sample of a run."""
+
+    __tablename__ = "joint_state"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    joint_position_rad: Mapped[float]
+    joint_speed_rad_s: Mapped[float]
+    joint_acc_rad_s2: Mapped[float]
+    joint_torque_nm: Mapped[float | None]
+    joint_temperature_degc: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class Twin(Base):
+    """An identified twin of a robot; `twin_id` is `robot_id.` and a hash of what made it."""
+
+    __tablename__ = "twin"
+
+    twin_id: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
+    created: Mapped[datetime]
+    file: Mapped[str]
+    sha256: Mapped[str]
+    cutoff_hz: Mapped[float | None]  # of the zero-phase filter
+    condition_number: Mapped[float | None]  # of the scaled base regressor
+    base_parameter_count: Mapped[int | None]
+    split: Mapped[str]  # in words: which data were fitted, which held out
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class TwinEffect(Base):
+    """An effect that a twin is made of."""
+
+    __tablename__ = "twin_effect"
+
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
+    effect: Mapped[str] = mapped_column(primary_key=True)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class TwinRun(Base):
+    """The part that a run took in a twin: "fit", "held_out", or "both" where it was cut in time."""
+
+    __tablename__ = "twin_run"
+
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    part: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class Parameter(Base):
+    """An identified parameter with its 95 % interval."""
+
+    __tablename__ = "parameter"
+
+    parameter_id: Mapped[str] = mapped_column(primary_key=True)  # twin_id.effect.joint or link.name
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
+    robot_id: Mapped[str]
+    effect: Mapped[str]
+    joint: Mapped[str | None]
+    name: Mapped[str]
+    value: Mapped[float]
+    unit: Mapped[str]  # symbol: "N m s/rad"
+    lower: Mapped[float | None]
+    upper: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class TorqueFit(Base):
+    """How well a twin's torque follows the measured one, per run, joint and part."""
+
+    __tablename__ = "torque_fit"
+
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)
+    part: Mapped[str] = mapped_column(primary_key=True)  # "fit" or "held_out"
+    robot_id: Mapped[str]
+    rmse_nm: Mapped[float]
+    r_squared: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class RunEnergy(Base):
+    """Energy and power of a run: as measured and as its twin models them."""
+
+    __tablename__ = "run_energy"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
+    part: Mapped[str]  # "fit", "held_out" or "both": the run's part in the twin
+    energy_consumption_j: Mapped[float]  # measured where it was, else modelled
+    run_power_w: Mapped[float]  # its mean
+    peak_power_w: Mapped[float]
+    measured_energy_j: Mapped[float | None]
+    modelled_energy_j: Mapped[float]
+    energy_error_percent: Mapped[float | None]  # the seed's (15)
+    power_rmse_w: Mapped[float | None]
+    standby_energy_j: Mapped[float]
+    standby_share: Mapped[float | None]  # of the modelled energy, 0 to 1
+    returned_energy_j: Mapped[float]  # mechanical energy that the joints gave back while they braked, positive
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class EnergyShare(Base):
+    """The ledger: energy of one effect, in one joint where it has one, over a run."""
+
+    __tablename__ = "energy_share"
+
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    effect: Mapped[str] = mapped_column(primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)  # "" for an effect of the whole robot
+    robot_id: Mapped[str]
+    energy_j: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class JointEnergy(Base):
+    """The ledger summed over effects: what one joint took over a run."""
+
+    __tablename__ = "joint_energy"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    energy_j: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
