@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
+from irtwin.robot.model import build_model
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -71,7 +73,7 @@ class Robot:
     @cached_property
     def model(self) -> pin.Model:
         """The Pinocchio model, nq = nv = n, built from `urdf`."""
-        return pin.buildModelFromXML(self.urdf)
+        return build_model(self.urdf)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

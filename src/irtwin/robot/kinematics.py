@@ -1,0 +1,43 @@
+"""Forward kinematics: where the links of a robot are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.robot.description import Robot
+
+
+def link_placements(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the (4, 4) placement of each link in the base frame (m) at the joint positions `q`: (n,) rad."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.asarray(q, dtype=float))
+    return {link.name: np.asarray(data.oMf[frame].homogeneous) for link, frame in _frames(robot)}
+
+
+def flange(robot: Robot) -> str:
+    """Return the name of the last link: the one farthest down the tree, the first of several."""
+    model = robot.model
+
+    def depth(frame: int) -> int:
+        steps = 0
+        while frame > 0:
+            frame, steps = model.frames[frame].parentFrame, steps + 1
+        return steps
+
+    return max(_frames(robot), key=lambda entry: depth(entry[1]))[0].name
+
+
+def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Return the flange's position in the base frame, (N, 3) m, along the joint positions `q`: (N, n) rad."""
+    model, data = robot.model, robot.model.createData()
+    frame = model.getFrameId(flange(robot), pin.FrameType.BODY)
+    positions = np.empty((len(q), 3))
+    for row, sample in enumerate(np.asarray(q, dtype=float)):
+        pin.forwardKinematics(model, data, sample)
+        positions[row] = pin.updateFramePlacement(model, data, frame).translation
+    return positions
+
+
+def _frames(robot: Robot) -> list[tuple]:  # type: ignore[type-arg]
+    return [(link, robot.model.getFrameId(link.name, pin.FrameType.BODY)) for link in robot.links]
