@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from irtwin.robot.description import Robot
+from irtwin.robot.description import Link, Robot
 
 
 def link_placements(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
@@ -39,5 +39,5 @@ def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:
     return positions
 
 
-def _frames(robot: Robot) -> list[tuple]:  # type: ignore[type-arg]
+def _frames(robot: Robot) -> list[tuple[Link, int]]:
     return [(link, robot.model.getFrameId(link.name, pin.FrameType.BODY)) for link in robot.links]

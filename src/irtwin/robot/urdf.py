@@ -26,9 +26,7 @@ def read_urdf(path: Path) -> Robot:
     """
     try:
         if path.stat().st_size > _LARGEST:
-            raise InputError(
-                f"{path}: larger than {_LARGEST // 1_000_000} MB; a URDF is a few hundred kB at most"
-            )
+            raise InputError(f"{path}: larger than {_LARGEST // 1_000_000} MB; a URDF is a few hundred kB at most")
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name the robot's URDF file") from error
@@ -61,19 +59,13 @@ def _parse(text: str, source: str) -> Element:
         root: Element = SafeXml.fromstring(text.encode("utf-8"), forbid_dtd=True)
     except ParseError as error:
         line, column = error.position
-        raise InputError(
-            f"{source}, line {line}, column {column + 1}: not well-formed XML ({error.msg})"
-        ) from error
+        raise InputError(f"{source}, line {line}, column {column + 1}: not well-formed XML ({error.msg})") from error
     except DefusedXmlException as error:
         raise InputError(f"{source}: a DTD or an entity stands in it; take out the <!DOCTYPE ...>") from error
     except (LookupError, ValueError) as error:
-        raise InputError(
-            f"{source}: not readable as XML ({_first_line(error)}); save the URDF as UTF-8"
-        ) from error
+        raise InputError(f"{source}: not readable as XML ({_first_line(error)}); save the URDF as UTF-8") from error
     if root.tag != "robot":
-        raise InputError(
-            f"{source}: the outermost element is <{root.tag}>, not <robot>; expand xacro files first"
-        )
+        raise InputError(f"{source}: the outermost element is <{root.tag}>, not <robot>; expand xacro files first")
     return root
 
 
@@ -118,9 +110,7 @@ def _shape(visual: Element, materials: dict[str | None, Element], where: str) ->
         material = materials.get(material.get("name"))
     colour = None if material is None else material.find("color")
     rgba = _GREY if colour is None else _numbers(colour.get("rgba"), 4, where)
-    return Shape(
-        kind.tag, size, _placement(visual.find("origin"), where), (rgba[0], rgba[1], rgba[2], rgba[3])
-    )
+    return Shape(kind.tag, size, _placement(visual.find("origin"), where), (rgba[0], rgba[1], rgba[2], rgba[3]))
 
 
 def _placement(origin: Element | None, where: str) -> np.ndarray:
@@ -150,9 +140,7 @@ def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joi
         if kind == "fixed":
             continue
         if kind not in _MOVING:
-            raise InputError(
-                f'{where}: type "{kind}" cannot be modelled; use revolute, continuous, prismatic or fixed'
-            )
+            raise InputError(f'{where}: type "{kind}" cannot be modelled; use revolute, continuous, prismatic or fixed')
         if element.find("mimic") is not None:
             raise InputError(f"{where}: mimics another joint, which is not supported; make it fixed")
         joints[name] = _joint(element, name, kind, where)
@@ -176,9 +164,7 @@ def _joint(element: Element, name: str, kind: str, where: str) -> Joint:
     if lower > upper:
         raise InputError(f"{where}: its lower limit {lower} lies above its upper limit {upper}")
     # 0 is how many files say "not known"
-    return Joint(
-        name, kind, lower, upper, value("velocity", 0.0) or math.inf, value("effort", 0.0) or math.inf
-    )
+    return Joint(name, kind, lower, upper, value("velocity", 0.0) or math.inf, value("effort", 0.0) or math.inf)
 
 
 def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
@@ -190,11 +176,7 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
         parents[child] = parent
     roots = [link for link in links if link not in parents]
     if len(roots) != 1:
-        what = (
-            "no link is the base (the joints form a loop)"
-            if not roots
-            else f"several bases: {', '.join(roots)}"
-        )
+        what = "no link is the base (the joints form a loop)" if not roots else f"several bases: {', '.join(roots)}"
         raise InputError(f"{source}: {what}; all links must hang on one base")
     for link in links:
         steps, at = 0, link
