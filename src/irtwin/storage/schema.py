@@ -6,14 +6,41 @@ so that they can be dropped and made again.
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import UTC, datetime
+from typing import Any, ClassVar
 
-from sqlalchemy import ForeignKey
+from sqlalchemy import DateTime, Dialect, ForeignKey
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.types import TypeDecorator
+
+
+class Moment(TypeDecorator[datetime]):
+    """A time kept as UTC in a column without time zone, so that every database gives it back alike.
+
+    A time without zone is taken to be UTC.
+    """
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Return the moment in UTC, its zone taken off."""
+        return None if value is None else in_utc(value).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Return the moment with its zone."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+def in_utc(moment: datetime) -> datetime:
+    """Return the moment in UTC; one without zone is taken to be UTC."""
+    return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
 
 
 class Base(DeclarativeBase):
     """The registry of tables."""
+
+    type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: Moment}
 
 
 class Robot(Base):
@@ -34,6 +61,7 @@ class Robot(Base):
     simulated: Mapped[bool]
     urdf: Mapped[str]
     urdf_sha256: Mapped[str]
+    twin_effects: Mapped[str | None]  # comma separated: what the data set says that its twin models
     notes: Mapped[str]  # JSON: what the data set says beside the contract
 
 
@@ -69,7 +97,10 @@ class Run(Base):
     payload_com_x_m: Mapped[float]
     payload_com_y_m: Mapped[float]
     payload_com_z_m: Mapped[float]
-    repeat_of: Mapped[str | None] = mapped_column(ForeignKey("run.run_id"))
+    repeat_of: Mapped[str | None] = mapped_column(
+        # Deferred: a run may stand before the one that it repeats.
+        ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
+    )
     start_time: Mapped[datetime]  # the log's `started`, else when it was taken in
     start_time_from: Mapped[str]  # "log" or "ingest"
     run_time_s: Mapped[float]
@@ -99,6 +130,7 @@ class Activity(Base):
     __tablename__ = "activity"
 
     activity_id: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))  # the robot that it was about
     provider: Mapped[str]  # end of the provider's IRI
     subject: Mapped[str]  # IRI of the individual it worked on
     started: Mapped[datetime]

@@ -1,0 +1,254 @@
+"""The workspace: a database of what is known of robots, with the series and twins that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import pyarrow as pa
+from sqlalchemy import URL, Table, delete, exists, insert, inspect, select
+from sqlalchemy.orm import Session
+
+from irtwin.errors import InputError
+from irtwin.storage import engine, files
+from irtwin.storage.schema import Activity, ActivityUse, Base, Joint, Robot, Run, Series, Twin, in_utc
+from irtwin.storage.series import FOLDER, inside, read_series, write_series
+
+Outcome = Literal["new", "unchanged", "replaced"]
+TWINS = "twins"
+
+
+class Workspace:
+    """A folder with `irtwin.db` (or a database elsewhere, by URL), `series/`, `twins/`, `graph/` and `reports/`.
+
+    Every change is one transaction: files are written first, under the database's lock, rows that name
+    them are committed last, and files that no row names are removed afterwards.
+    """
+
+    def __init__(self, folder: Path, url: str | None = None) -> None:
+        """Open a workspace, or make one. Raises InputError where the database cannot be opened."""
+        self.folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot make the workspace: {error.strerror}; choose another folder") from None
+        self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / "irtwin.db")))
+        engine.use_write_ahead_log(self.engine)
+        self._make_tables()
+
+    @classmethod
+    def existing(cls, folder: Path, url: str | None = None) -> Self:
+        """Open a workspace that must be there already. Raises InputError where it is not."""
+        if url is None and not (folder / "irtwin.db").is_file():
+            raise InputError(f"{folder}: no workspace here; run `irtwin run DATASET --workspace {folder}` first")
+        return cls(folder, url)
+
+    @property
+    def graph_folder(self) -> Path:
+        """Where the graph's store lies."""
+        return self.folder / "graph"
+
+    def report_path(self, robot_id: str) -> Path:
+        """Where a robot's report lies."""
+        return self.folder / "reports" / f"{robot_id}.html"
+
+    @contextmanager
+    def reading(self) -> Iterator[Session]:
+        """Give a session to read with; nothing done in it is kept."""
+        with Session(self.engine) as session:
+            yield session
+
+    def ingest(
+        self, robot: Robot, joints: Sequence[Joint], runs: Sequence[Run], series: Mapping[str, pa.Table]
+    ) -> Outcome:
+        """Take in a robot's data set, all of it or nothing.
+
+        `series` holds the measured samples of each run, by `run_id`. The data set that is there already
+        changes nothing; another one of the same robot replaces it, and all that was derived from it is dropped.
+        """
+        missing = {run.run_id for run in runs} ^ set(series)
+        if missing:
+            raise ValueError(f"runs and series differ: {sorted(missing)}")
+        rows = [robot, *joints, *runs]
+        with self._writing() as session:
+            known = bool(session.scalar(select(exists().where(Robot.robot_id == robot.robot_id))))
+            if known and self._holds(session, robot.robot_id, rows):
+                return "unchanged"
+            if known:
+                self._drop_robot(session, robot.robot_id)
+            _insert(session, [*rows, *self._store(series, "measured", None)])
+        self.remove_orphans()
+        return "replaced" if known else "new"
+
+    def replace_activity(
+        self,
+        activity: Activity,
+        used: Iterable[str],
+        rows: Sequence[Base],
+        series: Mapping[str, pa.Table] | None = None,
+        documents: Mapping[str, bytes] | None = None,
+    ) -> None:
+        """Keep what a provider made, in place of what it made of the same subject before.
+
+        used: IRIs of what the activity read; rows: of the tables with an `activity_id`, which is set here;
+        series: modelled samples by `run_id`; documents: files by their path in the workspace (`twins/ID.json`).
+        What was derived from the replaced rows (the energy of an earlier twin) is dropped too.
+        """
+        for row in rows:
+            row.activity_id = activity.activity_id  # type: ignore[attr-defined]
+        uses = [ActivityUse(activity_id=activity.activity_id, entity=entity) for entity in sorted(set(used))]
+        with self._writing() as session:
+            same = select(Activity.activity_id).where(
+                Activity.provider == activity.provider, Activity.subject == activity.subject
+            )
+            _drop_activities(session, _with_dependents(session, set(session.scalars(same))))
+            for path, content in (documents or {}).items():
+                files.write(inside(self.folder, path), content)
+            modelled = self._store(series or {}, "modelled", activity.activity_id)
+            _insert(session, [activity, *uses, *rows, *modelled])
+        self.remove_orphans()
+
+    def drop_robot(self, robot_id: str) -> None:
+        """Forget a robot and everything derived from it."""
+        with self._writing() as session:
+            self._drop_robot(session, robot_id)
+        self.remove_orphans()
+
+    def read_series(self, run_id: str, kind: str = "measured", columns: Sequence[str] | None = None) -> pa.Table:
+        """Read a run's samples, or some columns of them. Raises InputError where there are none."""
+        with self.reading() as session:
+            found = session.execute(
+                select(Series.path, Series.series_id).where(Series.run_id == run_id, Series.kind == kind)
+            ).first()
+        if found is None:
+            raise InputError(f"{self.folder}: run {run_id} has no {kind} series; ingest its data set first")
+        return read_series(self.folder, found.path, found.series_id, columns)
+
+    def remove_orphans(self) -> None:
+        """Remove files that no row names, which a crash or a replaced data set leaves behind."""
+        with self._writing() as session:
+            named = {*session.scalars(select(Series.path)), *session.scalars(select(Twin.file))}
+            for file in [*self._files(FOLDER), *self._files(TWINS)]:
+                if file.relative_to(self.folder).as_posix() not in named:
+                    file.unlink()
+
+    def close(self) -> None:
+        """Give the database's connections back."""
+        self.engine.dispose()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @contextmanager
+    def _writing(self) -> Iterator[Session]:
+        with engine.writing(self.engine) as session:
+            yield session
+
+    def _files(self, name: str) -> list[Path]:
+        folder = self.folder / name
+        return [file for file in folder.iterdir() if file.is_file()] if folder.is_dir() else []
+
+    def _store(self, series: Mapping[str, pa.Table], kind: str, activity_id: str | None) -> list[Series]:
+        rows = []
+        for run_id, table in series.items():
+            stored = write_series(self.folder, table)
+            rows.append(
+                Series(
+                    series_id=stored.series_id,
+                    run_id=run_id,
+                    kind=kind,
+                    path=stored.path,
+                    row_count=stored.row_count,
+                    columns=",".join(stored.columns),
+                    activity_id=activity_id,
+                )
+            )
+        return rows
+
+    def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
+        """Whether exactly these source rows are stored already, with their series."""
+        stored: list[Base] = []
+        for kind in (Robot, Joint, Run):
+            stored += session.scalars(select(kind).where(kind.robot_id == robot_id))
+        paths = select(Series.path).join(Run).where(Run.robot_id == robot_id, Series.kind == "measured")
+        whole = all(inside(self.folder, path).is_file() for path in session.scalars(paths))
+        return whole and {_facts(row) for row in stored} == {_facts(row) for row in rows}
+
+    def _drop_robot(self, session: Session, robot_id: str) -> None:
+        made = select(Activity.activity_id).where(Activity.robot_id == robot_id)
+        _drop_activities(session, set(session.scalars(made)))
+        session.execute(delete(Series).where(Series.run_id.in_(select(Run.run_id).where(Run.robot_id == robot_id))))
+        for kind in (Run, Joint, Robot):
+            session.execute(delete(kind).where(kind.robot_id == robot_id))
+
+    def _make_tables(self) -> None:
+        tables = Base.metadata.sorted_tables
+        if not inspect(self.engine).has_table(tables[-1].name):  # readers need not wait for the lock
+            with self._writing() as session:
+                Base.metadata.create_all(session.connection())
+        inspector = inspect(self.engine)
+        for table in tables:
+            if {column["name"] for column in inspector.get_columns(table.name)} != set(table.columns.keys()):
+                raise InputError(
+                    f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
+                    "choose a new workspace and ingest again"
+                )
+
+
+def _values(row: Base) -> dict[str, Any]:
+    return {column.name: getattr(row, column.name) for column in row.__table__.columns}
+
+
+def _facts(row: Base) -> tuple[object, ...]:
+    """A row's values, to compare; the time of taking in is no fact of the data set."""
+    values = _values(row)
+    if isinstance(row, Run):
+        values["start_time"] = in_utc(row.start_time) if row.start_time_from == "log" else None
+    return (row.__tablename__, *values.values())
+
+
+def _insert(session: Session, rows: Iterable[Base]) -> None:
+    """Insert rows, those first that others refer to."""
+    by_table: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        by_table.setdefault(row.__tablename__, []).append(_values(row))
+    for table in Base.metadata.sorted_tables:
+        if table.name in by_table:
+            session.execute(insert(table), by_table[table.name])
+
+
+def _made_tables() -> list[Table]:
+    return [table for table in Base.metadata.sorted_tables if "activity_id" in table.columns]
+
+
+def _with_dependents(session: Session, activities: set[str]) -> set[str]:
+    """Add the activities whose rows refer to rows of these activities, and theirs in turn."""
+    found = set(activities)
+    new = found
+    while new:
+        dependents: set[str] = set()
+        for table in _made_tables():
+            for key in table.foreign_keys:
+                parent = key.column.table
+                if parent.name != Activity.__tablename__ and "activity_id" in parent.columns:
+                    dependents |= set(
+                        session.scalars(
+                            select(table.columns["activity_id"])
+                            .join(parent, key.parent == key.column)
+                            .where(parent.columns["activity_id"].in_(new))
+                            .distinct()
+                        )
+                    )
+        new = dependents - found
+        found = found | new
+    return found
+
+
+def _drop_activities(session: Session, activities: set[str]) -> None:
+    for table in reversed(_made_tables()):
+        session.execute(delete(table).where(table.columns["activity_id"].in_(activities)))

@@ -1,0 +1,124 @@
+"""How a database is opened, and how its writers take turns."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy.engine import URL
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
+from sqlalchemy.orm import Session
+
+from irtwin.errors import InputError
+
+BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
+_WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
+
+
+def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
+    """Open a database that any SQLAlchemy URL names.
+
+    Raises InputError, which never shows the password, where the URL, its driver or the server fails;
+    with `must_exist`, also where an SQLite file is not there (SQLite would make an empty one).
+    """
+    address = _address(url)
+    if must_exist and address.get_backend_name() == "sqlite" and not Path(address.database or "").is_file():
+        raise InputError(f"{address.database}: no such SQLite database; give the path of one")
+    try:
+        engine = create_engine(address)
+    except (ModuleNotFoundError, NoSuchModuleError) as error:
+        raise InputError(
+            f"{shown(address)}: no driver for this database ({error}); for PostgreSQL install irtwin[postgresql]"
+        ) from None
+    if engine.dialect.name == "sqlite":
+        event.listen(engine, "connect", _prepare_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+    try:
+        engine.connect().close()
+    except DBAPIError as error:
+        raise InputError(f"{shown(address)}: cannot open the database: {_reason(error)}") from None
+    return engine
+
+
+def shown(url: URL) -> str:
+    """Return a URL as messages may show it."""
+    return url.render_as_string(hide_password=True)
+
+
+@contextmanager
+def writing(engine: Engine) -> Iterator[Session]:
+    """Give a session that is the only writer, in one transaction, committed at the end.
+
+    Raises InputError where another writer holds the database for longer than BUSY_TIMEOUT.
+    """
+    with engine.connect().execution_options(writes=True) as connection:
+        try:
+            transaction = connection.begin()
+        except OperationalError as error:
+            if not _locked(error):
+                raise
+            raise InputError(
+                f"{shown(engine.url)}: another process has been writing for {BUSY_TIMEOUT:g} s; try again later"
+            ) from None
+        with transaction:
+            if engine.dialect.name == "postgresql":
+                connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _WRITER_LOCK})
+            with Session(connection) as session:
+                yield session
+                session.flush()
+
+
+def use_write_ahead_log(engine: Engine) -> None:
+    """Let an SQLite database's readers go on while one writes; kept in the file, other databases do so anyway."""
+    if engine.dialect.name != "sqlite":
+        return
+    deadline = time.monotonic() + BUSY_TIMEOUT
+    while True:
+        with engine.connect() as connection:
+            driver = connection.connection.driver_connection
+            assert isinstance(driver, sqlite3.Connection)
+            try:
+                driver.execute("PRAGMA journal_mode = WAL")
+                return
+            except sqlite3.OperationalError as error:
+                # SQLite does not wait here by itself while another process makes the same change.
+                if "locked" not in str(error) or time.monotonic() > deadline:
+                    raise
+        time.sleep(0.05)
+
+
+def _address(url: str | URL) -> URL:
+    try:
+        address = make_url(url)
+    except ArgumentError:
+        raise InputError(
+            "the database URL cannot be read; write it like sqlite:///irtwin.db or postgresql://user@host/name"
+        ) from None
+    if address.drivername in ("postgresql", "postgres"):
+        address = address.set(drivername="postgresql+psycopg")
+    return address
+
+
+def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
+    connection.isolation_level = None  # transactions begin where _begin_sqlite says
+    connection.execute(f"PRAGMA busy_timeout = {int(BUSY_TIMEOUT * 1000)}")
+    connection.execute("PRAGMA foreign_keys = ON")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    # A writer that begins as a reader could find, too late, that another one wrote meanwhile.
+    writes = connection.get_execution_options().get("writes", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _locked(error: OperationalError) -> bool:
+    return isinstance(error.orig, sqlite3.OperationalError) and "locked" in str(error.orig)
+
+
+def _reason(error: DBAPIError) -> str:
+    return " ".join(str(error.orig).split())
