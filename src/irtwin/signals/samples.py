@@ -100,6 +100,8 @@ def _read_csv(path: Path, repair: bool) -> tuple[pa.Table, int, list[str]]:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     if not text:
         raise InputError(f"{path}: is empty; a run has a line of column names and a line for each sample")
+    if b"\n" not in text:
+        raise InputError(f"{path}: has no sample below its first line; an empty run cannot be used")
     wrong: list[tuple[int, str]] = []
 
     def note(row: pa.csv.InvalidRow) -> str:
