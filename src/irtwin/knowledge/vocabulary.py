@@ -1,0 +1,68 @@
+"""The names that the graph is written in: namespaces, named graphs, and IRIs of individuals.
+
+What the terms mean stands in `ontology/`; a test holds every term that the code uses against it.
+"""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+ONTOLOGY = "https://w3id.org/irtwin"
+IRT = f"{ONTOLOGY}#"
+EFFECT = f"{ONTOLOGY}/effect/"
+PROVIDER = f"{ONTOLOGY}/provider/"
+ID = f"{ONTOLOGY}/id/"
+
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+OWL = "http://www.w3.org/2002/07/owl#"
+XSD = "http://www.w3.org/2001/XMLSchema#"
+PROV = "http://www.w3.org/ns/prov#"
+SKOS = "http://www.w3.org/2004/02/skos/core#"
+QUDT = "http://qudt.org/schema/qudt/"
+UNIT = "http://qudt.org/vocab/unit/"
+SH = "http://www.w3.org/ns/shacl#"
+
+PREFIXES = {
+    "irt": IRT,
+    "effect": EFFECT,
+    "provider": PROVIDER,
+    "id": ID,
+    "rdf": RDF,
+    "rdfs": RDFS,
+    "owl": OWL,
+    "xsd": XSD,
+    "prov": PROV,
+    "skos": SKOS,
+    "qudt": QUDT,
+    "unit": UNIT,
+}
+
+GRAPH = f"{ONTOLOGY}/graph/"
+GRAPH_ONTOLOGY = f"{GRAPH}ontology"
+GRAPH_SOURCE = f"{GRAPH}source/"  # one for each mapping file
+GRAPH_ACTIVITY = f"{GRAPH}activity/"  # one for each execution of a provider
+GRAPH_INFERRED = f"{GRAPH}inferred/"
+GRAPH_OWL_RL = f"{GRAPH_INFERRED}owl_rl"
+GRAPH_SWRL = f"{GRAPH_INFERRED}swrl"
+GRAPH_SHACL = f"{GRAPH_INFERRED}shacl"
+
+
+def term(name: str) -> str:
+    """Return the IRI of a class or property of the model: `term("Industrial_Robot")`."""
+    return IRT + name
+
+
+def individual(kind: str, *parts: str) -> str:
+    """Return the IRI of an individual: `individual("joint", "UR10", "elbow")` ends in `id/joint/UR10/elbow`."""
+    return ID + "/".join(quote(part, safe="") for part in (kind, *parts))
+
+
+def shorten(iri: str) -> str:
+    """Return the IRI with its prefix, `irt:Run_Time`, or as it is where no prefix fits."""
+    prefix, namespace = max(
+        ((name, space) for name, space in PREFIXES.items() if iri.startswith(space)),
+        key=lambda pair: len(pair[1]),
+        default=("", ""),
+    )
+    return f"{prefix}:{iri[len(namespace) :]}" if prefix else iri
