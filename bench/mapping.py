@@ -1,0 +1,60 @@
+"""How long the mapping takes: 100,000 rows to 400,000 quads in the store, and how much memory it holds.
+
+python bench/mapping.py [ROWS]
+"""
+
+from __future__ import annotations
+
+import resource
+import sqlite3
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from pyoxigraph import Store
+
+from irtwin.knowledge.mapping import map_database
+from irtwin.storage.engine import open_engine
+
+MAPPING = """
+@prefix rr: <http://www.w3.org/ns/r2rml#> .
+@prefix ex: <http://example.com/> .
+<#Reading> rr:logicalTable [ rr:tableName "reading" ] ;
+    rr:subjectMap [ rr:template "http://example.com/reading/{robot}/{number}" ; rr:class ex:Reading ;
+        rr:graphMap [ rr:template "http://example.com/graph/{robot}" ] ] ;
+    rr:predicateObjectMap [ rr:predicate ex:of ; rr:objectMap [ rr:template "http://example.com/robot/{robot}" ] ] ;
+    rr:predicateObjectMap [ rr:predicate ex:power ; rr:objectMap [ rr:column "power" ] ] ;
+    rr:predicateObjectMap [ rr:predicate ex:state ; rr:objectMap [ rr:column "state" ] ] .
+"""
+
+
+def make_database(path: Path, rows: int) -> None:
+    with sqlite3.connect(path) as connection:
+        connection.execute("CREATE TABLE reading (number INTEGER, robot VARCHAR, power FLOAT, state VARCHAR)")
+        connection.executemany(
+            "INSERT INTO reading VALUES (?, ?, ?, ?)",
+            ((row, f"robot {row % 100}", row * 0.37, "moving" if row % 3 else "idle") for row in range(rows)),
+        )
+
+
+def main(rows: int) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        database, mapping = Path(folder, "readings.db"), Path(folder, "readings.r2rml.ttl")
+        make_database(database, rows)
+        mapping.write_text(MAPPING)
+        engine = open_engine(f"sqlite:///{database}")
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        started = time.perf_counter()
+        count = sum(1 for _ in map_database(engine, [mapping]))
+        mapped = time.perf_counter() - started
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+        print(f"{rows} rows -> {count} quads: {mapped:.2f} s, memory grew by {grown:.1f} MB")
+        for name, store in (("memory", Store()), ("disk", Store(str(Path(folder, "graph"))))):
+            started = time.perf_counter()
+            store.bulk_extend(map_database(engine, [mapping]))
+            print(f"into a store in {name}: {time.perf_counter() - started:.2f} s, {len(store)} quads")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100_000)

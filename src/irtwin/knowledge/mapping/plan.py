@@ -1,0 +1,163 @@
+"""From triples maps to statements: one query each, and what its rows become."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from pyoxigraph import DefaultGraph, NamedNode
+from sqlalchemy import Connection
+
+from irtwin.knowledge.mapping.document import (
+    RR,
+    Document,
+    Join,
+    LogicalTable,
+    PredicateObjectMap,
+    TermMap,
+    TermType,
+    TriplesMap,
+)
+from irtwin.knowledge.mapping.identifiers import Identifier
+from irtwin.knowledge.mapping.source import Source, describe
+from irtwin.knowledge.mapping.terms import Column, Row, TermMaker, term_maker
+
+GraphName = NamedNode | DefaultGraph
+GraphMaker = Callable[[Row], Sequence[GraphName]]
+
+_RDF_TYPE = NamedNode("http://www.w3.org/1999/02/22-rdf-syntax-ns#type")
+_DEFAULT_GRAPH = NamedNode(str(RR.defaultGraph))
+
+
+@dataclass(frozen=True)
+class Property:
+    """Predicates and objects to combine; in the subject's graphs where `graphs` is None."""
+
+    predicates: tuple[TermMaker, ...]
+    objects: tuple[TermMaker, ...]
+    graphs: GraphMaker | None
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A query, and the makers of the terms that each of its rows becomes."""
+
+    where: str
+    sql: str
+    subject: TermMaker
+    graphs: GraphMaker
+    properties: tuple[Property, ...]
+
+
+def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[Statement]:
+    """Yield a document's statements. Raises InputError where its tables or columns are not there."""
+    sources: dict[LogicalTable, Source] = {}
+
+    def source(table: LogicalTable) -> Source:
+        if table not in sources:
+            sources[table] = describe(connection, table)
+        return sources[table]
+
+    def select(**sides: LogicalTable) -> _Select:
+        return _Select(connection, {side: source(table) for side, table in sides.items()}, base_iri)
+
+    maps = document.triples_maps
+    for triples_map in maps.values():
+        yield _plain(select(child=triples_map.table), triples_map, document)
+        for item in triples_map.properties:
+            for join in item.objects:
+                if isinstance(join, Join) and join.conditions:
+                    sides = select(child=triples_map.table, parent=maps[join.parent].table)
+                    yield _joined(sides, triples_map, item, join, maps[join.parent].subject)
+
+
+class _Select:
+    """A query under construction: it gathers the columns that term maps need, each once."""
+
+    def __init__(self, connection: Connection, sources: dict[str, Source], base_iri: str) -> None:
+        self.sources = sources
+        self.base_iri = base_iri
+        self.quote = connection.dialect.identifier_preparer.quote_identifier
+        self.chosen: dict[str, int] = {}
+        self.conditions: list[str] = []
+
+    def maker(self, term_map: TermMap, side: str = "child") -> TermMaker:
+        columns = {item: self.column(item, term_map.where, side) for item in term_map.columns}
+        return term_maker(term_map, columns, self.base_iri)
+
+    def makers(self, term_maps: Iterable[TermMap]) -> tuple[TermMaker, ...]:
+        return tuple(self.maker(term_map) for term_map in term_maps)
+
+    def graphs(self, term_maps: Sequence[TermMap]) -> GraphMaker:
+        """Return the maker of the graphs that the maps name: none where a column is NULL."""
+        if not term_maps:
+            return lambda row: (DefaultGraph(),)
+        makers = self.makers(term_maps)
+        constant = all(term_map.constant is not None for term_map in term_maps)
+
+        def make(row: Row) -> Sequence[GraphName]:
+            names = {maker(row) for maker in makers} - {None}
+            return [DefaultGraph() if name == _DEFAULT_GRAPH else name for name in names]  # type: ignore[misc]
+
+        if not constant:
+            return make
+        fixed = make(())
+        return lambda row: fixed
+
+    def column(self, identifier: Identifier, where: str, side: str) -> Column:
+        source = self.sources[side]
+        name = source.column(identifier, where)
+        index = self.chosen.setdefault(f"{side}.{self.quote(name)}", len(self.chosen))
+        return Column(index, source.columns[name])
+
+    def join(self, join: Join) -> None:
+        for child, parent in join.conditions:
+            sides = (("child", child), ("parent", parent))
+            names = [f"{side}.{self.quote(self.sources[side].column(item, join.where))}" for side, item in sides]
+            self.conditions.append(" = ".join(names))
+
+    @property
+    def sql(self) -> str:
+        tables = ", ".join(f"{source.sql} {side}" for side, source in self.sources.items())
+        condition = f" WHERE {' AND '.join(self.conditions)}" if self.conditions else ""
+        return f"SELECT {', '.join(self.chosen) or '1'} FROM {tables}{condition}"
+
+
+def _plain(select: _Select, triples_map: TriplesMap, document: Document) -> Statement:
+    """The statement of a logical table alone: classes, and all objects that need no join."""
+    rdf_type = select.maker(_constant(_RDF_TYPE))
+    properties = [Property((rdf_type,), (select.maker(_constant(name)),), None) for name in triples_map.classes]
+    for item in triples_map.properties:
+        objects = [
+            document.triples_maps[value.parent].subject if isinstance(value, Join) else value
+            for value in item.objects
+            if not (isinstance(value, Join) and value.conditions)
+        ]
+        if objects:
+            properties.append(_property(select, triples_map, item, select.makers(objects)))
+    return _statement(select, triples_map, properties)
+
+
+def _joined(
+    select: _Select, triples_map: TriplesMap, item: PredicateObjectMap, join: Join, parent: TermMap
+) -> Statement:
+    """The statement of one join: the parent's subjects as objects."""
+    select.join(join)
+    found = _property(select, triples_map, item, (select.maker(parent, "parent"),))
+    return _statement(select, triples_map, [found])
+
+
+def _property(
+    select: _Select, triples_map: TriplesMap, item: PredicateObjectMap, objects: tuple[TermMaker, ...]
+) -> Property:
+    graphs = select.graphs([*triples_map.graphs, *item.graphs]) if item.graphs else None
+    return Property(select.makers(item.predicates), objects, graphs)
+
+
+def _statement(select: _Select, triples_map: TriplesMap, properties: Sequence[Property]) -> Statement:
+    subject, graphs = select.maker(triples_map.subject), select.graphs(triples_map.graphs)
+    return Statement(triples_map.where, select.sql, subject, graphs, tuple(properties))
+
+
+def _constant(name: NamedNode) -> TermMap:
+    return TermMap("", TermType.IRI, constant=name)

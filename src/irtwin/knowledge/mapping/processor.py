@@ -1,0 +1,72 @@
+"""From rows to quads, row by row (W3C R2RML, section 11.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from pyoxigraph import Quad, RdfFormat, serialize
+from sqlalchemy import Connection, Engine
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.document import read_document
+from irtwin.knowledge.mapping.plan import Statement, plan
+from irtwin.knowledge.mapping.source import read, snapshot_options
+from irtwin.storage import files
+from irtwin.storage.engine import open_engine
+
+BASE_IRI = "https://w3id.org/irtwin/id/"
+
+
+def map_database(engine: Engine, documents: Sequence[Path], base_iri: str | None = None) -> Iterator[Quad]:
+    """Yield the quads that mapping documents make of a database, as one snapshot of it shows it.
+
+    base_iri: what relative IRIs lie below; else what a document declares as @base, else BASE_IRI.
+    The same quad may come more than once. Memory stays flat: rows are read in chunks.
+    Raises InputError for a fault in a document, before the first quad, and for a row that does not fit it.
+    """
+    checked = [read_document(path) for path in documents]
+    with engine.connect() as connection:
+        connection.execution_options(**snapshot_options(engine))
+        with connection.begin():
+            statements = [
+                statement
+                for document in checked
+                for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
+            ]
+            for statement in statements:
+                yield from _quads(connection, statement)
+
+
+def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | None = None) -> None:
+    """Write the quads of one mapping document as N-Quads; the file is there whole or not at all."""
+    if not out.parent.is_dir():
+        raise InputError(f"{out.parent}: no such folder to write to")
+    engine = open_engine(database_url, must_exist=True)
+    try:
+        with files.temporary_beside(out.parent) as temporary:
+            serialize(map_database(engine, [mapping], base_iri), str(temporary), RdfFormat.N_QUADS)
+            files.put_in_place(temporary, out)
+    finally:
+        engine.dispose()
+
+
+def _quads(connection: Connection, statement: Statement) -> Iterator[Quad]:
+    for row in read(connection, statement.sql, statement.where):
+        subject = statement.subject(row)
+        if subject is None:
+            continue
+        own = statement.graphs(row)
+        for item in statement.properties:
+            graphs = own if item.graphs is None else item.graphs(row)
+            for make_predicate in item.predicates:
+                predicate = make_predicate(row)
+                if predicate is None:
+                    continue
+                for make_object in item.objects:
+                    value = make_object(row)
+                    if value is None:
+                        continue
+                    for graph in graphs:
+                        # Document checks leave only an IRI or blank node here, and an IRI as predicate.
+                        yield Quad(subject, predicate, value, graph)  # type: ignore[arg-type]

@@ -1,0 +1,123 @@
+"""Logical tables as a database shows them (W3C R2RML, section 5)."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, CursorResult, Engine
+from sqlalchemy.exc import DBAPIError
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.document import LogicalTable
+from irtwin.knowledge.mapping.identifiers import Identifier, quoted
+from irtwin.knowledge.mapping.natural import Natural, by_declared_type, by_value
+
+_CHUNK = 5000  # rows fetched at a time
+_SQL_TOKEN = re.compile(r"""'(?:[^']|'')*'|"(?:[^"]|"")*"|--[^\n]*|/\*.*?\*/|[^'";/-]+|.""", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A logical table in SQL, with its columns and how their values read.
+
+    folded: whether the columns are a table's, so that a regular identifier means a folded name.
+    """
+
+    where: str
+    sql: str
+    columns: dict[str, Natural]
+    folded: bool
+
+    def column(self, identifier: Identifier, where: str) -> str:
+        """Return the name of the column that an identifier means. Raises InputError where there is none."""
+        name = identifier.find(self.columns, self.folded)
+        if name is None:
+            raise InputError(
+                f"{where}: no column {identifier} in its logical table, which has "
+                f"{', '.join(str(Identifier(name, delimited=True)) for name in self.columns)}"
+            )
+        return name
+
+
+def snapshot_options(engine: Engine) -> dict[str, Any]:
+    """Return the execution options of a transaction that reads one state and can write nothing."""
+    if engine.dialect.name == "postgresql":
+        return {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
+    return {}  # in SQLite a transaction is a snapshot, and what stands in FROM (...) cannot write
+
+
+def describe(connection: Connection, table: LogicalTable) -> Source:
+    """Find a logical table's columns. Raises InputError where it is not there or the query is not valid."""
+    sql = _from_item(connection, table)
+    result = run(connection, f"SELECT * FROM {sql} source WHERE 1 = 0", table.where)
+    names = [column[0] for column in result.cursor.description] if result.cursor else []
+    result.close()
+    repeated = _repeated(names, connection.dialect.name)
+    if repeated:
+        raise InputError(f"{table.where}: column {repeated} comes more than once; give each its own name by AS")
+    columns: dict[str, Natural] = dict.fromkeys(names, by_value)
+    if connection.dialect.name == "sqlite":
+        columns |= _declared(connection, sql, table.where)
+    return Source(table.where, sql, columns, folded=table.query is None)
+
+
+def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Any]]:
+    """Yield a query's rows, a chunk of them in memory at a time."""
+    result = run(connection, sql, where)
+    try:
+        for rows in result.partitions(_CHUNK):
+            yield from rows
+    except DBAPIError as error:
+        raise _refused(where, error) from None
+    finally:
+        result.close()
+
+
+def run(connection: Connection, sql: str, where: str) -> CursorResult[Any]:
+    """Run SQL as it stands: `%` and `:` mean nothing here."""
+    options = {"no_parameters": True, "stream_results": True, "max_row_buffer": _CHUNK}
+    try:
+        return connection.exec_driver_sql(sql, execution_options=options)
+    except DBAPIError as error:
+        raise _refused(where, error) from None
+
+
+def _from_item(connection: Connection, table: LogicalTable) -> str:
+    if table.query is None:
+        preparer = connection.dialect.identifier_preparer
+        return ".".join(quoted(part, preparer) for part in table.table)
+    return f"({_single_query(table.query, table.where)}\n)"
+
+
+def _single_query(query: str, where: str) -> str:
+    """Return a query without the semicolon at its end. Raises InputError where more follows."""
+    tokens = _SQL_TOKEN.findall(query)
+    if ";" not in tokens:
+        return query
+    end = tokens.index(";")
+    if any(token.strip(";").strip() and not token.startswith(("--", "/*")) for token in tokens[end:]):
+        raise InputError(f"{where}: rr:sqlQuery holds more than one statement; give one query")
+    return "".join(tokens[:end])
+
+
+def _declared(connection: Connection, sql: str, where: str) -> dict[str, Natural]:
+    """SQLite tells a column's declared type, through expressions too, only for a view."""
+    run(connection, f"CREATE TEMP VIEW irtwin_described AS SELECT * FROM {sql} source", where)
+    result = run(connection, "PRAGMA temp.table_info(irtwin_described)", where)
+    declared = {row["name"]: by_declared_type(row["type"]) for row in result.mappings()}
+    run(connection, "DROP VIEW temp.irtwin_described", where)
+    return declared
+
+
+def _repeated(names: Sequence[str], dialect: str) -> str | None:
+    if dialect == "sqlite":  # it renames the second of two columns X to X:1
+        names = [name.rsplit(":", 1)[0] if name.rsplit(":", 1)[0] in names else name for name in names]
+    return next((name for name, count in Counter(names).items() if count > 1), None)
+
+
+def _refused(where: str, error: DBAPIError) -> InputError:
+    return InputError(f"{where}: the database refuses it: {str(error.orig).strip().splitlines()[0]}")

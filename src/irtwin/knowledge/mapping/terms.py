@@ -1,0 +1,145 @@
+"""Terms made of rows (W3C R2RML, section 11.2)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import quote
+
+from pyoxigraph import BlankNode, Literal, NamedNode
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.document import TermMap, TermType
+from irtwin.knowledge.mapping.identifiers import Identifier
+from irtwin.knowledge.mapping.natural import STRING, Lexical, Natural, is_lexical
+
+Term = NamedNode | BlankNode | Literal
+Row = Sequence[Any]
+TermMaker = Callable[[Row], Term | None]
+_Text = Callable[[Row], Lexical | None]
+
+# All that RFC 3987 does not leave unreserved.
+_RESERVED = re.compile(
+    "[^A-Za-z0-9._~\u00a0-\ud7ff\uf900-\ufdcf\ufdf0-\uffef"
+    + "".join(f"{chr(plane << 16)}-{chr((plane << 16) + 0xFFFD)}" for plane in range(1, 14))
+    + f"{chr(0xE1000)}-{chr(0xEFFFD)}-]"
+)
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a row holds a column, and how its values read."""
+
+    index: int
+    natural: Natural
+
+
+Columns = Mapping[Identifier, Column]
+
+
+def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:
+    """Return the function that makes the map's term of a row, None where a column is NULL.
+
+    It raises InputError where a value does not fit: no valid IRI, outside the datatype's lexical space.
+    """
+    if term_map.constant is not None:
+        constant = term_map.constant
+        return lambda row: constant
+    text = _text(term_map, columns)
+    if term_map.term_type is TermType.LITERAL:
+        return _literal_maker(term_map, text)
+    if term_map.term_type is TermType.BLANK_NODE:
+        return _blank_node_maker(text)
+    return _iri_maker(term_map, text, base_iri)
+
+
+def _text(term_map: TermMap, columns: Columns) -> _Text:
+    if term_map.column is None:
+        return _template_text(term_map, columns)
+    column = columns[term_map.column]
+    index, natural = column.index, column.natural
+
+    def text(row: Row) -> Lexical | None:
+        value = row[index]
+        return None if value is None else natural(value)
+
+    return text
+
+
+def _template_text(term_map: TermMap, columns: Columns) -> _Text:
+    parts = [part if isinstance(part, str) else columns[part] for part in term_map.template]
+    encoded = term_map.term_type is TermType.IRI
+
+    def text(row: Row) -> Lexical | None:
+        result = ""
+        for part in parts:
+            if isinstance(part, str):
+                result += part
+                continue
+            value = row[part.index]
+            if value is None:
+                return None
+            lexical = part.natural(value)[0]
+            result += _RESERVED.sub(_percent_encoded, lexical) if encoded else lexical
+        return result, STRING
+
+    return text
+
+
+def _percent_encoded(match: re.Match[str]) -> str:
+    return quote(match[0], safe="")
+
+
+def _iri_maker(term_map: TermMap, text: _Text, base_iri: str) -> TermMaker:
+    def make(row: Row) -> NamedNode | None:
+        found = text(row)
+        if found is None:
+            return None
+        try:
+            return NamedNode(found[0])
+        except ValueError:  # not absolute: below the base, or no IRI at all
+            return _below(base_iri, found[0], term_map)
+
+    return make
+
+
+def _below(base_iri: str, value: str, term_map: TermMap) -> NamedNode:
+    try:
+        return NamedNode(base_iri + value)
+    except ValueError:
+        raise InputError(
+            f"{term_map.where}: the value {value!r} makes no valid IRI; use a template, which encodes it"
+        ) from None
+
+
+def _blank_node_maker(text: _Text) -> TermMaker:
+    def make(row: Row) -> BlankNode | None:
+        found = text(row)
+        return None if found is None else BlankNode(f"b{found[0].encode().hex()}")
+
+    return make
+
+
+def _literal_maker(term_map: TermMap, text: _Text) -> TermMaker:
+    language, datatype = term_map.language, term_map.datatype
+
+    def natural(row: Row) -> Literal | None:
+        found = text(row)
+        return None if found is None else Literal(found[0], datatype=found[1])
+
+    def tagged(row: Row) -> Literal | None:
+        found = text(row)
+        return None if found is None else Literal(found[0], language=language)
+
+    def typed(row: Row) -> Literal | None:
+        found = text(row)
+        if found is None:
+            return None
+        assert datatype is not None
+        if found[1] != datatype and not is_lexical(found[0], datatype):
+            raise InputError(f"{term_map.where}: the value {found[0]!r} is no {datatype.value}")
+        return Literal(found[0], datatype=datatype)
+
+    return tagged if language else typed if datatype else natural
