@@ -1,0 +1,115 @@
+"""The condition number of the scaled base regressor of a motion, and which way it falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import qr
+
+from irtwin.robot.description import Robot
+
+_SHARPNESS = 4  # of the smooth maximum and minimum of the eigenvalues
+_STEP = 1e-6  # rad, rad/s: for the differences of the regressor
+
+
+@dataclass(frozen=True)
+class MotionGradient:
+    """Derivatives of a number with respect to each sample of a motion, (N, n) each."""
+
+    q: np.ndarray
+    dq: np.ndarray
+    ddq: np.ndarray
+
+
+class BaseRegressor:
+    """Columns that torque can tell apart: rigid body, rotor inertia, viscous and Coulomb friction, torque offset.
+
+    Of these 10 n + 4 n columns the base columns are chosen once, by QR with pivoting on random motion.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._model = robot.model
+        self._data = robot.model.createData()
+        self._n = len(robot.joints)
+        random = np.random.default_rng(0)
+        q = random.uniform(-2, 2, (60 + 20 * self._n, self._n))
+        dq, ddq = random.normal(size=q.shape), random.normal(size=q.shape)
+        self.columns = independent_columns(self._all(q, dq, ddq, np.sign(dq)))
+
+    def matrix(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+        """Return the base regressor W of a motion, (N n, p): joint torque = W times base parameters."""
+        return self._all(q, dq, ddq, np.sign(dq))[:, self.columns]
+
+    def condition_number(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> float:
+        """Return the condition number of W with each column divided by its length; inf where a column is empty."""
+        matrix = self.matrix(q, dq, ddq)
+        length = np.linalg.norm(matrix, axis=0)
+        return float(np.linalg.cond(matrix / length)) if length.all() else np.inf
+
+    def cost(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, slow: np.ndarray) -> tuple[float, MotionGradient]:
+        """Return a smooth cost and its gradient: log condition number of the scaled W less the mean log column length.
+
+        The condition number alone is blind to size: a joint that creeps has columns as fine as one that swings. The
+        column lengths are what D-optimality adds to it. `slow`: (n,) rad/s, where the sign of speed is rounded.
+        """
+        n, samples = self._n, len(q)
+        sign = np.tanh(dq / slow)
+        everything = self._all(q, dq, ddq, sign)
+        value, slope = _smooth_cost(everything[:, self.columns])
+        weight = np.zeros_like(everything)
+        weight[:, self.columns] = slope
+        weight = weight.reshape(samples, n, -1)
+        rigid, joint = weight[:, :, : 10 * n], np.arange(n)
+        rotor, viscous, coulomb = (weight[:, joint, (10 + k) * n + joint] for k in range(3))
+        gradient = MotionGradient(np.zeros_like(q), viscous + coulomb * (1 - sign**2) / slow, rotor.copy())
+        here = self._rigid(q, dq, ddq)
+        for j, e in enumerate(np.eye(n)):
+            for target, step, moved in (
+                (gradient.q, _STEP, self._rigid(q + _STEP * e, dq, ddq)),
+                (gradient.dq, _STEP, self._rigid(q, dq + _STEP * e, ddq)),
+                (gradient.ddq, 1.0, self._rigid(q, dq, ddq + e)),  # linear in ddq: exact
+            ):
+                target[:, j] += np.einsum("nij,nij->n", moved - here, rigid) / step
+        return value, gradient
+
+    def _rigid(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+        stack = np.empty((len(q), self._n, 10 * self._n))
+        for row, sample in enumerate(zip(q, dq, ddq, strict=True)):
+            stack[row] = pin.computeJointTorqueRegressor(self._model, self._data, *sample)
+        return stack
+
+    def _all(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        each_joint = [_diagonals(ddq), _diagonals(dq), _diagonals(sign), _diagonals(np.ones_like(dq))]
+        stack = np.concatenate([self._rigid(q, dq, ddq), *each_joint], axis=2)
+        return stack.reshape(-1, stack.shape[2])
+
+
+def independent_columns(matrix: np.ndarray, tolerance: float = 1e-8) -> np.ndarray:
+    """Return the indices, rising, of a largest well-conditioned set of independent columns of `matrix`."""
+    length = np.linalg.norm(matrix, axis=0)
+    alive = np.flatnonzero(length > tolerance * length.max())
+    triangle, order = qr(matrix[:, alive] / length[alive], mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(triangle))
+    return np.sort(alive[order[: np.count_nonzero(diagonal > tolerance * diagonal[0])]])
+
+
+def _diagonals(values: np.ndarray) -> np.ndarray:
+    """Turn (N, n) into N diagonal matrices (N, n, n)."""
+    return values[:, :, None] * np.eye(values.shape[1])
+
+
+def _smooth_cost(matrix: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return log condition number of the scaled `matrix` less mean log column length, and its slope, same shape."""
+    length = np.linalg.norm(matrix, axis=0)
+    scaled = matrix / length
+    eigenvalues, vectors = np.linalg.eigh(scaled.T @ scaled)
+    eigenvalues = np.maximum(eigenvalues, np.finfo(float).eps * eigenvalues[-1])
+    large, small = (eigenvalues / eigenvalues[-1]) ** _SHARPNESS, (eigenvalues[0] / eigenvalues) ** _SHARPNESS
+    smooth = (np.log(large.sum()) + np.log(small.sum())) / (2 * _SHARPNESS)
+    value = smooth + 0.5 * np.log(eigenvalues[-1] / eigenvalues[0]) - float(np.mean(np.log(length)))
+    along = (large / large.sum() - small / small.sum()) / (2 * eigenvalues)
+    slope = 2 * scaled @ (vectors * along) @ vectors.T
+    slope -= scaled * (scaled * slope).sum(axis=0)  # lengths are divided out
+    return float(value), (slope - scaled / len(length)) / length

@@ -1,0 +1,243 @@
+"""Exciting motions: those that let identification tell the base parameters of a robot apart."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+from scipy.optimize import minimize
+
+from irtwin.errors import InputError
+from irtwin.identification.base_condition import BaseRegressor
+from irtwin.identification.descent import descend
+from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
+from irtwin.identification.motion_limits import Box, JointLimits, Workspace
+from irtwin.robot.description import Robot
+
+Progress = Callable[[int, float, float], None]
+"""Called with the iteration, the best condition number so far and the seconds since the start."""
+
+_LONGEST_PERIOD = 20.0  # s: longer motions repeat one of at most this
+_BARRIERS = (0.3, 0.1, 0.03, 0.01, 0.003)  # weights of the walls, falling: an interior-point method
+_RESERVE = 0.99  # share of the joint limits that is used: controllers round, too
+_STARTS = 10
+_POSTURES = 300
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """An exciting motion of n joints, `seconds` long, and what is known of it.
+
+    condition_number: of the scaled base regressor at the samples of `rate`, Hz. limit_margin: least distance to a
+    joint limit at any time, as a share of it. clearance: lower bound at any time on the distance to the floor and the
+    box, m. interrupted: the search was broken off, and this is the best found until then.
+    """
+
+    joint_names: tuple[str, ...]
+    series: FourierSeries
+    seconds: float
+    rate: float
+    condition_number: float
+    limit_margin: float
+    clearance: float
+    interrupted: bool = False
+
+    def sample(self, rate: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return time (N,) s and q, dq, ddq (N, n) in SI from rest to rest, evenly at (nearly) `rate` Hz."""
+        time = np.linspace(0.0, self.seconds, 1 + max(1, round(self.seconds * (rate or self.rate))))
+        q, dq, ddq = (np.round(values, 12) + 0.0 for values in self.series.motion(time))  # rest is 0, not -1e-16
+        return time, q, dq, ddq
+
+    def write_csv(self, path: Path) -> None:
+        """Write columns time, q_J, dq_J, ddq_J (s, rad, rad/s, rad/s^2) for each joint J. Raises InputError."""
+        header = ["time", *(f"{kind}_{name}" for kind in ("q", "dq", "ddq") for name in self.joint_names)]
+        part = path.with_name(path.name + ".part")
+        try:
+            with part.open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(header)
+                writer.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(self.sample()))
+            part.replace(path)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def excite(
+    robot: Robot,
+    seconds: float,
+    *,
+    rate: float = 100.0,
+    seed: int = 0,
+    box: Box | None = None,
+    iterations: int = 200,
+    time_limit: float = math.inf,
+    progress: Progress | None = None,
+) -> Excitation:
+    """Search a motion of `seconds` whose scaled base regressor has the least condition number (Yan 2018, eq. 4).
+
+    The limits of the joints, the floor and the `box` are kept at every instant. Equal seeds give equal motions, other
+    seeds other ones, unless `time_limit` (s) ends the search before its `iterations`. A KeyboardInterrupt ends it with
+    the best motion so far. Raises InputError where limits are missing or contradictory or the box is out of reach.
+    """
+    if not 0.5 <= seconds <= 3600:
+        raise InputError(f"an exciting motion of {seconds:g} s: ask for 0.5 to 3600 s")
+    if not (math.isfinite(rate) and 1 <= rate <= 10_000):
+        raise InputError(f"a rate of {rate:g} Hz: ask for 1 to 10000 Hz")
+    search = _Search(robot, seconds, box, np.random.default_rng(seed))
+    began = monotonic()
+    interrupted = False
+    try:
+        for iteration, _ in enumerate(search.run(iterations)):
+            elapsed = monotonic() - began
+            if progress is not None:
+                progress(iteration, search.best_condition, elapsed)
+            if elapsed > time_limit:
+                break
+    except KeyboardInterrupt:
+        if search.best is None:
+            raise
+        interrupted = True
+    return search.result(seconds, rate, interrupted)
+
+
+class _Search:
+    """Interior-point search over the coefficients x: (2 K - 1, n); `best` is always a motion that keeps all limits."""
+
+    def __init__(self, robot: Robot, seconds: float, box: Box | None, random: np.random.Generator) -> None:
+        self._robot = robot
+        self._limits = JointLimits.of(robot)
+        self._workspace = Workspace(robot, self._limits, box)
+        self._regressor = BaseRegressor(robot)
+        self._random = random
+        period = seconds / math.ceil(seconds / _LONGEST_PERIOD)
+        self._rest = RestSeries(period, min(10, max(5, math.ceil(period / 2))))
+        factor = between_samples(self._rest.harmonics, len(self._rest.grid))
+        self._ranges = tuple(_RESERVE * limit / factor for limit in self._limits.ranges)
+        self._keep_off = 0.03 * self._workspace.reach  # from walls at the grid: for what happens in between
+        self.best: FourierSeries | None = None
+        self.best_condition = math.inf
+
+    def run(self, iterations: int) -> Iterator[None]:
+        """Improve `best` step by step."""
+        postures = self._postures()
+        starts = []
+        for _ in range(_STARTS):
+            start = self._start(postures[self._random.integers(len(postures))])
+            starts.append((self._consider(start), start.ravel()))
+            yield
+        x = min(starts, key=lambda start: start[0])[1]
+        for weight in _BARRIERS:
+
+            def cost(x: np.ndarray, weight: float = weight) -> tuple[float, np.ndarray]:
+                return self._cost(x, weight)
+
+            for x in descend(cost, x, iterations // len(_BARRIERS)):  # noqa: B020 - the next barrier goes on from here
+                self._consider(self._shaped(x))
+                yield
+
+    def result(self, seconds: float, rate: float, interrupted: bool) -> Excitation:
+        """Return the best motion and what is known of it."""
+        assert self.best is not None
+        count = max(2, round(self.best.period * rate))
+        motion = self.best.motion(np.arange(count) * (self.best.period / count))
+        return Excitation(
+            joint_names=self._robot.joint_names,
+            series=self.best,
+            seconds=seconds,
+            rate=rate,
+            condition_number=self._regressor.condition_number(*motion),
+            limit_margin=self._limits.margin(self.best),
+            clearance=self._workspace.least_clearance(self.best),
+            interrupted=interrupted,
+        )
+
+    def _shaped(self, x: np.ndarray) -> np.ndarray:
+        return x.reshape(-1, len(self._robot.joints))
+
+    def _motion(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        position, speed, acceleration = self._rest.bases
+        return position @ x, speed @ x, acceleration @ x
+
+    def _consider(self, x: np.ndarray) -> float:
+        """Return the condition number of the motion, and keep it if it is the best and proven to keep the limits."""
+        condition = self._regressor.condition_number(*self._motion(x))
+        if condition < self.best_condition:
+            series = self._rest.series(x)
+            if self._limits.margin(series) > 0 and self._workspace.least_clearance(series) > 0:
+                self.best, self.best_condition = series, condition
+        return condition
+
+    def _cost(self, flat: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
+        """Return cost plus logarithmic barriers at the limits, and its gradient; infinite where a limit is broken."""
+        x = self._shaped(flat)
+        motion = self._motion(x)
+        shares = self._shares(motion)
+        clearance, clearance_slope = self._workspace.clearance_slope(motion[0])
+        room = (clearance - self._keep_off) / self._workspace.reach
+        if max(float(np.abs(share).max()) for share in shares) >= 1 or room.min(initial=1.0) <= 0:
+            return math.inf, flat
+        weight /= len(motion[0])
+        value, slope = self._regressor.cost(*motion, slow=0.02 * self._limits.speed)
+        value -= weight * (sum(float(np.log1p(-(share**2)).sum()) for share in shares) + float(np.log(room).sum()))
+        barriers = [
+            weight * 2 * share / (1 - share**2) / limit for share, limit in zip(shares, self._ranges, strict=True)
+        ]
+        barriers[0] -= weight * np.einsum("nw,nwj->nj", 1 / (room * self._workspace.reach), clearance_slope)
+        slopes = (slope.q, slope.dq, slope.ddq)
+        gradient = sum(b.T @ (s + r) for b, s, r in zip(self._rest.bases, slopes, barriers, strict=True))
+        return value, np.asarray(gradient).ravel()
+
+    def _shares(self, motion: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+        """Return position, speed and acceleration as shares of what the grid may show, -1..1, (M, n) each."""
+        about = (self._limits.centre, 0.0, 0.0)
+        return tuple((v - c) / r for v, c, r in zip(motion, about, self._ranges, strict=True))
+
+    def _postures(self) -> np.ndarray:
+        """Return postures clear of the walls, (p, n), about which to start; raise InputError where there is none."""
+        n = len(self._robot.joints)
+        q = self._limits.centre + self._ranges[0] * self._random.uniform(-0.7, 0.7, (_POSTURES, n))
+        clearance = self._workspace.clearance(q).min(axis=1, initial=self._workspace.reach)
+        if clearance.max() <= 0:
+            q = np.array([self._towards(posture) for posture in q[np.argsort(-clearance)[:10]]])
+            clearance = self._workspace.clearance(q).min(axis=1)
+        best = float(clearance.max())
+        if best <= 4 * self._workspace.resolution:
+            raise InputError(
+                f"{self._robot.name}: no posture within the joint limits was found with every link above the floor and "
+                "the flange inside the box; give a larger box, in metres in the base frame"
+            )
+        self._keep_off = min(self._keep_off, best / 3)
+        return np.asarray(q[clearance >= 0.5 * best])
+
+    def _towards(self, posture: np.ndarray) -> np.ndarray:
+        """Return a posture nearer to the inside of all walls, within the joint limits: (n,)."""
+
+        def outside(q: np.ndarray) -> tuple[float, np.ndarray]:
+            clearance, slope = self._workspace.clearance_slope(q[None])
+            lack = np.minimum(clearance[0] - 0.02 * self._workspace.reach, 0)
+            return float(lack @ lack), 2 * lack @ slope[0]
+
+        room = 0.9 * self._limits.ranges[0]
+        bounds = list(zip(self._limits.centre - room, self._limits.centre + room, strict=True))
+        return np.asarray(minimize(outside, posture, jac=True, bounds=bounds, method="L-BFGS-B").x)
+
+    def _start(self, posture: np.ndarray) -> np.ndarray:
+        """Return a random motion about the posture, as large as the limits let it be: (2 K - 1, n)."""
+        x = self._random.normal(size=(2 * self._rest.harmonics - 1, len(posture)))
+        x[0] = 0
+        room = (self._ranges[0] - np.abs(posture - self._limits.centre), *self._ranges[1:])
+        largest = [np.abs(v).max(axis=0) for v in self._motion(x)]
+        x *= 0.9 * np.min([r / v for r, v in zip(room, largest, strict=True)], axis=0)
+        x[0] = posture
+        while not self._clear(x):
+            x[1:] *= 0.8
+        return x
+
+    def _clear(self, x: np.ndarray) -> bool:
+        at_grid = self._workspace.clearance(self._motion(x)[0]).min(initial=math.inf)
+        return at_grid > self._keep_off and self._workspace.least_clearance(self._rest.series(x)) > 0

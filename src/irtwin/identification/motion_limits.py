@@ -1,0 +1,189 @@
+"""What a motion must keep to: limits of the joints, and walls in space, also between the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.errors import InputError
+from irtwin.identification.fourier_series import FourierSeries, between_samples
+from irtwin.robot.description import Joint, Robot
+from irtwin.robot.kinematics import flange
+
+FULL_SPEED_AFTER = 0.3  # s: the acceleration limit of a joint whose maker gives none is speed / 0.3 s
+CLEARANCE = 0.1  # m above the floor, or a tenth of the reach if that is less
+
+
+@dataclass(frozen=True)
+class Box:
+    """Where the flange must stay: lower and upper corner in the base frame, m; infinite where nothing bounds it."""
+
+    lower: tuple[float, float, float]
+    upper: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of n joints, (n,) each: rad, rad/s, rad/s^2 (m for prismatic ones)."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    speed: np.ndarray
+    acceleration: np.ndarray
+
+    @classmethod
+    def of(cls, robot: Robot) -> JointLimits:
+        """Take the limits of a robot; raise InputError where they are missing or contradict one another.
+
+        A continuous joint may turn half a revolution either way. Where the acceleration is not given, a joint
+        reaches its full speed in FULL_SPEED_AFTER seconds, which is gentler than the makers of arms allow.
+        """
+        if not robot.joints:
+            raise InputError(f"{robot.name}: no joint moves, so there is no motion to design")
+        rows = np.array([_limits(robot.name, joint) for joint in robot.joints])
+        return cls(*rows.T)
+
+    @property
+    def centre(self) -> np.ndarray:
+        """The middle of the position ranges, (n,)."""
+        return np.asarray((self.lower + self.upper) / 2)
+
+    @property
+    def ranges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Largest |q - centre|, |dq| and |ddq|, (n,) each."""
+        return (self.upper - self.lower) / 2, self.speed, self.acceleration
+
+    def margin(self, series: FourierSeries) -> float:
+        """Return the least distance to a limit at any time, as a share of the limit; negative where one is broken."""
+        grid = series.grid()
+        factor = between_samples(series.harmonics, len(grid))
+        values = series.centred(self.centre).motion(grid)
+        return 1 - factor * max(float((np.abs(v) / r).max()) for v, r in zip(values, self.ranges, strict=True))
+
+
+def _limits(robot: str, joint: Joint) -> tuple[float, float, float, float]:
+    where = f'{robot}: joint "{joint.name}"'
+    lower, upper = joint.lower, joint.upper
+    if joint.kind == "continuous":
+        lower, upper = max(lower, -np.pi), min(upper, np.pi)
+    if not (np.isfinite(lower) and np.isfinite(upper)):
+        raise InputError(f'{where} has no position limits; give <limit lower="..." upper="..."/> in the URDF')
+    if lower >= upper:
+        raise InputError(f"{where} cannot move: its lower limit {lower:g} is not below its upper limit {upper:g}")
+    if not (np.isfinite(joint.velocity) and joint.velocity > 0):
+        raise InputError(f'{where} has no speed limit; give <limit velocity="..."/> in the URDF')
+    acceleration = joint.velocity / FULL_SPEED_AFTER if joint.acceleration is None else joint.acceleration
+    if not (np.isfinite(acceleration) and acceleration > 0):
+        raise InputError(f"{where} has the acceleration limit {acceleration:g}; it must be positive")
+    return lower, upper, joint.velocity, acceleration
+
+
+@dataclass(frozen=True)
+class _Wall:
+    """A link's origin must keep side * (position[axis] - bound) above zero."""
+
+    frame: int
+    axis: int
+    side: float
+    bound: float
+
+
+class Workspace:
+    """Walls: the floor for the origin of every link that moves up or down, the box for the flange."""
+
+    def __init__(self, robot: Robot, limits: JointLimits, box: Box | None) -> None:
+        self._model = robot.model
+        self._data = robot.model.createData()
+        self._levers = _levers(robot, limits)
+        self.reach = max(0.01, float(max(lever.max() for lever in self._levers)))  # m
+        self.resolution = self.reach / 1000  # m: what the proof of clearance gives away
+        self._walls = self._floor(robot, limits) + self._box(robot, box)
+        self._frames = sorted({wall.frame for wall in self._walls})
+
+    def clearance(self, q: np.ndarray) -> np.ndarray:
+        """Return the distance to each wall, (N, w) m, at the joint positions `q`: (N, n); negative behind a wall."""
+        result = np.empty((len(q), len(self._walls)))
+        for row, sample in enumerate(q):
+            pin.forwardKinematics(self._model, self._data, sample)
+            result[row] = self._distances()
+        return result
+
+    def clearance_slope(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the clearance (N, w) and its derivative with respect to each joint, (N, w, n)."""
+        value = np.empty((len(q), len(self._walls)))
+        slope = np.empty((*value.shape, q.shape[1]))
+        for row, sample in enumerate(q):
+            pin.computeJointJacobians(self._model, self._data, sample)
+            value[row] = self._distances()
+            jacobians = {
+                frame: pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
+                for frame in self._frames
+            }
+            slope[row] = [wall.side * jacobians[wall.frame][wall.axis] for wall in self._walls]
+        return value, slope
+
+    def least_clearance(self, series: FourierSeries) -> float:
+        """Return a lower bound, in m, on the clearance at any time of the motion.
+
+        Between two instants h apart a function lies within h^2 / 8 max|x''| of the straight line. With the speeds V
+        and accelerations A that the series never passes, the acceleration of a point at most r_k from joint k is at
+        most sum_k r_k A_k + sum_kl r_max(k,l) V_k V_l: the joint farther down the chain turns the shorter lever.
+        h is chosen so that `resolution` is given away.
+        """
+        grid = series.grid()
+        factor = between_samples(series.harmonics, len(grid))
+        speed, acceleration = (factor * np.abs(v).max(axis=0) for v in series.motion(grid)[1:])
+        farther = np.maximum.outer(np.arange(len(speed)), np.arange(len(speed)))
+        worst = max(float(r @ acceleration + speed @ r[farther] @ speed) for r in self._levers)
+        count = max(len(grid), int(np.ceil(series.period * np.sqrt(worst / (8 * self.resolution)))))
+        q = series.motion(np.arange(count) * (series.period / count))[0]
+        return float(self.clearance(q).min(initial=np.inf)) - self.resolution
+
+    def _distances(self) -> list[float]:
+        places = {frame: pin.updateFramePlacement(self._model, self._data, frame).translation for frame in self._frames}
+        return [wall.side * (places[wall.frame][wall.axis] - wall.bound) for wall in self._walls]
+
+    def _floor(self, robot: Robot, limits: JointLimits) -> list[_Wall]:
+        bound = min(CLEARANCE, self.reach / 10)
+        walls = [_Wall(robot.model.getFrameId(link.name, pin.FrameType.BODY), 2, 1.0, bound) for link in robot.links]
+        self._walls, self._frames = walls, [wall.frame for wall in walls]
+        heights = self.clearance(np.random.default_rng(0).uniform(limits.lower, limits.upper, (50, len(limits.lower))))
+        return [wall for wall, moves in zip(walls, np.ptp(heights, axis=0) > 1e-9, strict=True) if moves]
+
+    def _box(self, robot: Robot, box: Box | None) -> list[_Wall]:
+        if box is None:
+            return []
+        frame = robot.model.getFrameId(flange(robot), pin.FrameType.BODY)
+        corners = np.array([box.lower, box.upper], dtype=float)
+        if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
+            raise InputError(f"box {box.lower} to {box.upper}: every lower bound must be below its upper bound")
+        return [
+            _Wall(frame, axis, side, float(bound))
+            for side, corner in ((1.0, corners[0]), (-1.0, corners[1]))
+            for axis, bound in enumerate(corner)
+            if np.isfinite(bound)
+        ]
+
+
+def _levers(robot: Robot, limits: JointLimits) -> list[np.ndarray]:
+    """Return for each link how far, (n,) m, its origin can be from each joint; 0 where that joint does not move it.
+
+    A prismatic joint moves everything behind it by its own speed: its lever is 1.
+    """
+    model, levers = robot.model, []
+    for frame in (frame for frame in model.frames if frame.type == pin.FrameType.BODY):
+        lever = np.zeros(len(robot.joints))
+        distance, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
+        while joint > 0:
+            column = joint - 1  # the universe is Pinocchio's joint 0
+            if robot.joints[column].kind == "prismatic":
+                lever[column] = 1.0
+                distance += max(abs(limits.lower[column]), abs(limits.upper[column]))
+            else:
+                lever[column] = distance
+            distance += float(np.linalg.norm(model.jointPlacements[joint].translation))
+            joint = model.parents[joint]
+        levers.append(lever)
+    return levers
