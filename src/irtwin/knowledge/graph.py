@@ -1,0 +1,214 @@
+"""The knowledge graph: an Oxigraph store of named graphs, asked as one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any, overload
+
+from pyoxigraph import (
+    BlankNode,
+    DefaultGraph,
+    Literal,
+    NamedNode,
+    Quad,
+    QueryBoolean,
+    QuerySolutions,
+    RdfFormat,
+    Store,
+    Triple,
+    Variable,
+    parse,
+)
+
+from irtwin.errors import InputError
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES, XSD
+from irtwin.resources import folder
+
+Row = dict[str, Any]  # a variable's Python value, None where it is unbound
+MOST_ROWS = 1_000_000
+
+_INTEGERS = {XSD + name for name in ("integer", "int", "long", "short", "byte", "nonNegativeInteger", "unsignedInt")}
+_FLOATS = {XSD + name for name in ("double", "float", "decimal")}
+
+# What SPARQL reads as comment, IRI, string, variable or local name, where the word SERVICE means nothing.
+_HARMLESS = re.compile(
+    r"""<[^<>"{}|^`\\\s]*>|\"\"\".*?\"\"\"|'''.*?'''|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*'|\#[^\n]*|[?$]\w+|:[\w.%-]*""",
+    re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class Table(Sequence[Row]):
+    """The rows that answer a query, with its variables in the order of the query."""
+
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    @overload
+    def __getitem__(self, index: int) -> Row: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Row, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Row | tuple[Row, ...]:
+        """Return a row, or some."""
+        return self.rows[index]
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.rows)
+
+
+class KnowledgeGraph:
+    """Ontology, individuals and inferences in named graphs, on disk at `path` or in memory.
+
+    The store's default graph holds the union of the named graphs, each triple once: Oxigraph's own union
+    repeats a triple that several graphs hold, and a sum would count it twice.
+    """
+
+    def __init__(self, path: Path | None = None):
+        try:
+            self._store = Store() if path is None else Store(str(path))
+        except OSError as error:
+            raise InputError(f"{path}: the graph cannot be opened: {error}") from error
+
+    def load_ontology(self) -> None:
+        """Put the modules of `ontology/` into the ontology's graph."""
+        modules = sorted(folder("ontology").glob("*.ttl"))
+        self.replace(
+            in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
+        )
+
+    def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
+        """Make the quads the whole content of the named graphs whose IRIs start with one of `below`.
+
+        Happens in one transaction, whole or not at all. Graphs that stay as they are are left alone;
+        returns the IRIs of those that changed.
+        """
+        new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
+        new.extend(_belonging(quads, below))
+        names = {*_names(new), *self.graphs(*below)}
+        changed = sorted(name for name in names if _read(new, name) != _read(self._store, name))
+        if changed:
+            self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
+            self._store.flush()
+        return changed
+
+    def graphs(self, *below: str) -> list[str]:
+        """Return the IRIs of the named graphs, of all or of those that start with one of `below`."""
+        return sorted(name for name in _names(self._store) if not below or name.startswith(below))
+
+    def triples(self, *below: str) -> set[Triple]:
+        """Return the triples of the named graphs whose IRIs start with one of `below`, of all without it."""
+        if not below:
+            return {quad.triple for quad in self._store.quads_for_pattern(None, None, None, DefaultGraph())}
+        return {triple for name in self.graphs(*below) for triple in _read(self._store, name)}
+
+    def query(self, text: str, bindings: Mapping[str, str] | None = None) -> Table:
+        """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
+
+        `bindings` gives variables the IRI that they stand for. The usual prefixes need no PREFIX.
+        InputError where the text is no such query, asks another server, or has too many answers.
+        """
+        answer = self._ask(text, bindings or {})
+        if isinstance(answer, QueryBoolean):
+            return Table(("answer",), ({"answer": bool(answer)},))
+        if isinstance(answer, QuerySolutions):
+            columns = tuple(variable.value for variable in answer.variables)
+            rows = (
+                {name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in _counted(answer)
+            )
+            return Table(columns, tuple(rows))
+        columns = ("subject", "predicate", "object")
+        found = ((triple.subject, triple.predicate, triple.object) for triple in _counted(answer))
+        return Table(columns, tuple(dict(zip(columns, map(to_python, triple), strict=True)) for triple in found))
+
+    def construct(self, text: str) -> set[Triple]:
+        """Return the triples that a CONSTRUCT makes of the union of all named graphs."""
+        return set(self._ask(text, {}))
+
+    def _ask(self, text: str, bindings: Mapping[str, str]) -> Any:
+        if "service" in _HARMLESS.sub(" ", text).lower():
+            raise InputError("SERVICE asks another server, which is not allowed here: ask this graph alone")
+        try:
+            return self._store.query(
+                text,
+                prefixes=PREFIXES,
+                substitutions={Variable(name): NamedNode(iri) for name, iri in bindings.items()},
+            )
+        except SyntaxError as error:
+            raise InputError(f"not a SPARQL query: {error}") from error
+
+
+def read_turtle(file: Path) -> Iterator[Triple]:
+    """Read a Turtle file; InputError names the file and the line where it is broken."""
+    try:
+        for quad in parse(path=str(file), format=RdfFormat.TURTLE, rename_blank_nodes=True):
+            yield quad.triple
+    except SyntaxError as error:
+        raise InputError(f"{file}, line {error.lineno}: {error.msg}") from error
+
+
+def in_graph(triples: Iterable[Triple], name: str) -> Iterator[Quad]:
+    """Say of each triple that it belongs into the named graph."""
+    graph = NamedNode(name)
+    return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
+
+
+def to_python(term: NamedNode | BlankNode | Literal | Triple | None) -> Any:
+    """Turn an RDF term into a Python value: an IRI into its text, a literal into number, time, truth or text."""
+    if not isinstance(term, Literal):
+        return None if term is None else term.value if isinstance(term, NamedNode) else str(term)
+    kind = term.datatype.value
+    try:
+        if kind in _FLOATS:
+            return float(term.value)
+        if kind in _INTEGERS:
+            return int(term.value)
+        if kind == XSD + "boolean":
+            return term.value in ("true", "1")
+        if kind == XSD + "dateTime":
+            return datetime.fromisoformat(term.value)
+        if kind == XSD + "date":
+            return date.fromisoformat(term.value)
+    except ValueError:  # an ill-typed literal is shown as it is written
+        return term.value
+    return term.value
+
+
+def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
+    for quad in quads:
+        if not (isinstance(quad.graph_name, NamedNode) and quad.graph_name.value.startswith(below)):
+            raise ValueError(f"a quad of graph {quad.graph_name} does not belong into {', '.join(below)}")
+        yield quad
+
+
+def _names(store: Store) -> list[str]:
+    return [graph.value for graph in store.named_graphs() if isinstance(graph, NamedNode)]
+
+
+def _read(store: Store, name: str) -> set[Triple]:
+    return {quad.triple for quad in store.quads_for_pattern(None, None, None, NamedNode(name))}
+
+
+def _replacement(name: str, triples: set[Triple]) -> str:
+    """Return the SPARQL Update that swaps a named graph's content, and keeps the default graph the union."""
+    text = "\n".join(f"{triple} ." for triple in triples)
+    return f"""
+    DELETE {{ ?s ?p ?o }} WHERE {{
+      GRAPH <{name}> {{ ?s ?p ?o }}
+      FILTER NOT EXISTS {{ GRAPH ?other {{ ?s ?p ?o }} FILTER(?other != <{name}>) }}
+    }} ;
+    DROP SILENT GRAPH <{name}> ;
+    INSERT DATA {{ {text} GRAPH <{name}> {{ {text} }} }}"""
+
+
+def _counted(answers: Iterable[Any]) -> Iterator[Any]:
+    for count, answer in enumerate(answers):
+        if count == MOST_ROWS:
+            raise InputError(f"the query has more than {MOST_ROWS:,} answers: add a LIMIT, or ask for less")
+        yield answer

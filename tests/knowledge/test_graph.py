@@ -1,0 +1,176 @@
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+import pytest
+from pyoxigraph import Literal, NamedNode, Quad
+
+from irtwin.errors import InputError
+from irtwin.knowledge import graph as graph_module
+from irtwin.knowledge.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, individual, term
+
+A, B = "https://example.org/g/a", "https://example.org/g/b"
+
+
+def quad(subject: str, value: float, graph: str) -> Quad:
+    return Quad(
+        NamedNode(f"https://example.org/{subject}"), NamedNode(term("Energy")), Literal(value), NamedNode(graph)
+    )
+
+
+def total(graph: KnowledgeGraph) -> float:
+    return graph.query("SELECT (SUM(?energy) AS ?total) { ?s irt:Energy ?energy }")[0]["total"]
+
+
+def test_triple_in_two_graphs_counts_once() -> None:
+    graph = KnowledgeGraph()
+    graph.replace([quad("x", 2.0, A), quad("x", 2.0, B), quad("y", 3.0, B)], A, B)
+    assert total(graph) == 5.0
+    graph.replace([], B)  # x is still said by A
+    assert total(graph) == 2.0
+    graph.replace([], A)
+    assert total(graph) == 0
+
+
+def test_replace_drops_graphs_below_that_have_nothing_left(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
+    kept = [quad for quad in two_robots if "Arm_B" not in quad.graph_name.value]
+    changed = graph.replace(kept, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    assert all("Arm_B" in name for name in changed)
+    assert graph.graphs(GRAPH_ACTIVITY + "energy") == [GRAPH_ACTIVITY + "energy.Arm_A"]
+    assert graph.graphs(GRAPH_ONTOLOGY) == [GRAPH_ONTOLOGY]
+
+
+def test_same_quads_change_nothing(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
+    assert graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY) == []
+
+
+def test_failed_replace_leaves_the_former_content(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
+    before = graph.triples()
+
+    def breaking():
+        yield two_robots[0]
+        raise RuntimeError("the database went away")
+
+    with pytest.raises(RuntimeError):
+        graph.replace(breaking(), GRAPH_SOURCE)
+    assert graph.triples() == before
+
+
+def test_quad_outside_the_named_graphs_is_a_bug() -> None:
+    with pytest.raises(ValueError, match="does not belong"):
+        KnowledgeGraph().replace([quad("x", 1.0, A)], B)
+
+
+def test_graph_on_disk_outlives_its_process_object(tmp_path: Path, two_robots: list[Quad]) -> None:
+    graph = KnowledgeGraph(tmp_path / "graph")
+    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    count = len(graph.triples())
+    del graph
+    assert len(KnowledgeGraph(tmp_path / "graph").triples()) == count > 600
+
+
+def test_open_graph_cannot_be_opened_again(tmp_path: Path) -> None:
+    first = KnowledgeGraph(tmp_path / "graph")
+    with pytest.raises(InputError, match="cannot be opened"):
+        KnowledgeGraph(tmp_path / "graph")
+    assert first.graphs() == []
+
+
+def test_rows_hold_python_values(graph: KnowledgeGraph) -> None:
+    run = individual("run", "Arm_A.fit_1")
+    table = graph.query(
+        """SELECT ?run ?name ?time ?count ?start ?nothing WHERE {
+             ?run irt:Run_Name ?name ; irt:Run_Time ?time ; irt:Sample_Count ?count ; irt:Start_Time ?start
+             OPTIONAL { ?run irt:Note ?nothing } }""",
+        {"run": run},
+    )
+    assert table.columns == ("run", "name", "time", "count", "start", "nothing")
+    (row,) = table
+    assert (row["run"], row["name"], row["time"], row["count"], row["nothing"]) == (run, "fit_1", 10.0, 1000, None)
+    assert row["start"].isoformat() == "2026-03-02T08:00:00+00:00"
+
+
+def test_ask_and_construct(graph: KnowledgeGraph) -> None:
+    assert graph.query("ASK { ?s a irt:Industrial_Robot }").rows == ({"answer": True},)
+    table = graph.query("CONSTRUCT { ?s irt:Run_Name ?n } WHERE { ?s irt:Run_Name ?n }")
+    assert len(table) == 5
+    assert set(table.columns) == {"subject", "predicate", "object"}
+
+
+@pytest.mark.parametrize("text", ["", "SELECT", "SELECT * WHERE { ?s ?p }", "INSERT DATA { }", "DROP ALL"])
+def test_what_is_no_query_is_refused(graph: KnowledgeGraph, text: str) -> None:
+    before = graph.triples()
+    with pytest.raises(InputError, match="not a SPARQL query"):
+        graph.query(text)
+    assert graph.triples() == before
+
+
+def test_too_many_answers_are_refused(graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph_module, "MOST_ROWS", 10)
+    with pytest.raises(InputError, match="add a LIMIT"):
+        graph.query("SELECT * { ?s ?p ?o }")
+    assert len(graph.query("SELECT * { ?s ?p ?o } LIMIT 10")) == 10
+
+
+@pytest.fixture
+def other_server():
+    """A server on this machine that notes who asks it; yields its URL and the list of requests."""
+    requests: list[str] = []
+
+    class Listener(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            requests.append(self.path)
+            self.send_error(404)
+
+        do_POST = do_GET
+
+        def log_message(self, *arguments: object) -> None:
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Listener)
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/", requests
+    server.shutdown()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "SELECT * { SERVICE <URL> { ?s ?p ?o } }",
+        "SELECT * { service silent <URL> { ?s ?p ?o } }",
+        "PREFIX : <URL> SELECT * { SERVICE:sparql { ?s ?p ?o } }",
+        "PREFIX service: <URL> SELECT * { SERVICE service:x { ?s ?p ?o } }",
+        "SELECT * { BIND(1 AS ?x) ?s ?p 1SERVICE <URL> { ?s ?p ?o } }",
+        "SELECT * { VALUES ?x { <URL> } SERVICE?x { ?s ?p ?o } }",
+        "SELECT * { # ' \n SERVICE <URL> { ?s ?p '' } }",
+        'SELECT * { BIND("\\"" AS ?q) SERVICE <URL> { ?s ?p "" } }',
+        "SELECT * { BIND('''it's''' AS ?q) SERVICE <URL> { ?s ?p '' } }",
+        "SELECT * { BIND(1 AS ?x) FILTER(?x<2) SERVICE <URL> { ?s ?p ?o FILTER(?o>1) } }",
+        "SELECT * { \\u0053ERVICE <URL> { ?s ?p ?o } }",
+    ],
+)
+def test_no_query_reaches_another_server(graph: KnowledgeGraph, other_server, text: str) -> None:
+    url, requests = other_server
+    with pytest.raises(InputError):
+        graph.query(text.replace("URL", url))
+    assert requests == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'SELECT * { ?service ?p "SERVICE" }',
+        "PREFIX ex: <https://example.org/service#> SELECT * { ?s a ex:Customer_Service }",
+        "SELECT * { ?s ?p ?o } # SERVICE",
+    ],
+)
+def test_the_word_itself_is_harmless(graph: KnowledgeGraph, text: str) -> None:
+    graph.query(text)
+
+
+def test_broken_turtle_names_file_and_line(tmp_path: Path) -> None:
+    file = tmp_path / "broken.ttl"
+    file.write_text("@prefix ex: <https://example.org/> .\nex:a ex:b .\n")
+    with pytest.raises(InputError, match=r"broken\.ttl, line 2"):
+        list(read_turtle(file))
