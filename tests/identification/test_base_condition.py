@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+from arms import kr6, two_joints
+
+from irtwin.identification.base_condition import BaseRegressor, independent_columns
+
+
+def motion(n: int, samples: int = 40) -> list[np.ndarray]:
+    random = np.random.default_rng(3)
+    return [size * random.normal(size=(samples, n)) for size in (1.0, 2.0, 5.0)]
+
+
+def test_a_six_axis_arm_has_its_known_number_of_base_columns() -> None:
+    # 36 of the rigid body, 4 rotor inertias that these cannot stand for, 3 times 6 of friction and offset
+    assert len(BaseRegressor(kr6()).columns) == 36 + 4 + 18
+
+
+def test_independent_columns_leave_out_what_others_make() -> None:
+    random = np.random.default_rng(0).normal(size=(30, 4))
+    matrix = np.column_stack([random, random @ [1, 2, 3, 4], np.zeros(30)])
+    assert len(independent_columns(matrix)) == 4
+
+
+@pytest.mark.parametrize("robot", [kr6(), two_joints(kind="prismatic")])
+def test_the_gradient_is_that_of_the_cost(robot) -> None:  # type: ignore[no-untyped-def]
+    regressor = BaseRegressor(robot)
+    n = len(robot.joints)
+    signals, slow = motion(n), np.full(n, 0.5)
+    gradient = regressor.cost(*signals, slow)[1]
+    for number, slope in enumerate((gradient.q, gradient.dq, gradient.ddq)):
+        towards = np.random.default_rng(number).normal(size=slope.shape)
+        ahead, behind = (
+            [s + (h * towards if k == number else 0) for k, s in enumerate(signals)] for h in (1e-5, -1e-5)
+        )
+        difference = (regressor.cost(*ahead, slow)[0] - regressor.cost(*behind, slow)[0]) / 2e-5
+        assert float((slope * towards).sum()) == pytest.approx(difference, rel=1e-3, abs=1e-6)
+
+
+def test_a_larger_motion_costs_less() -> None:
+    regressor = BaseRegressor(two_joints())
+    q, dq, ddq = motion(2)
+    small = regressor.cost(q, dq, ddq, np.full(2, 1e-6))[0]
+    large = regressor.cost(q, 3 * dq, 9 * ddq, np.full(2, 1e-6))[0]
+    assert large < small
+
+
+def test_a_joint_at_rest_has_no_condition_number() -> None:
+    q, dq, ddq = motion(2)
+    dq[:, 0] = 0
+    assert BaseRegressor(two_joints()).condition_number(q, dq, ddq) == np.inf
