@@ -39,7 +39,9 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
     try:
-        engine.connect().close()
+        with engine.connect() as connection:
+            if engine.dialect.name == "sqlite":
+                connection.exec_driver_sql("PRAGMA schema_version")  # SQLite reads the file only now
     except DBAPIError as error:
         raise InputError(f"{shown(address)}: cannot open the database: {_reason(error)}") from None
     return engine

@@ -1,0 +1,60 @@
+"""A private PostgreSQL server for the tests that want a second database."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import create_engine, text
+
+
+def _server_programs() -> Path | None:
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/pg_ctl"))
+    path = shutil.which("pg_ctl")
+    return found[-1].parent if found else Path(path).parent if path else None
+
+
+@pytest.fixture(scope="session")
+def new_postgresql_database() -> Iterator[Callable[[], str]]:
+    """Give a function that makes an empty database and returns its URL."""
+    programs = _server_programs()
+    if programs is None:
+        pytest.skip("no PostgreSQL server on this machine")
+    # PostgreSQL refuses to run as root. Its socket's path must be short, and its own.
+    as_server = ["runuser", "-u", "postgres", "--"] if os.geteuid() == 0 else []
+    folder = Path(tempfile.mkdtemp(prefix="pg", dir="/tmp"))
+    if as_server:
+        shutil.chown(folder, "postgres")
+    data, log = str(folder / "data"), str(folder / "log")
+
+    def call(program: str, *arguments: str) -> None:
+        subprocess.run(
+            [*as_server, str(programs / program), *arguments],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            cwd="/",
+        )
+
+    call("initdb", "-D", data, "-A", "trust", "-U", "postgres", "-E", "UTF8", "--no-sync")
+    call("pg_ctl", "-D", data, "-l", log, "-w", "-o", f"-k {folder} -c listen_addresses='' -c fsync=off", "start")
+    numbers = itertools.count()
+    server = create_engine(f"postgresql+psycopg://postgres@/postgres?host={folder}", isolation_level="AUTOCOMMIT")
+
+    def make() -> str:
+        name = f"test_{next(numbers)}"
+        with server.connect() as connection:
+            connection.execute(text(f"CREATE DATABASE {name}"))
+        return f"postgresql+psycopg://postgres@/{name}?host={folder}"
+
+    try:
+        yield make
+    finally:
+        server.dispose()
+        call("pg_ctl", "-D", data, "-m", "immediate", "stop")
+        shutil.rmtree(folder)

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+import rows
+from sqlalchemy import select, text
+from sqlalchemy.exc import IntegrityError
+
+from irtwin.errors import InputError
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Activity, ActivityUse, Base, Run, RunEnergy, RunState, Series, Twin
+
+WORK = f"{rows.ROBOT}.work"
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
+def workspace(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Workspace]:
+    url = None if request.param == "sqlite" else request.getfixturevalue("new_postgresql_database")()
+    with Workspace(tmp_path / "workspace", url) as opened:
+        yield opened
+
+
+def state(workspace: Workspace) -> dict[str, object]:
+    """All rows and all files."""
+    with workspace.reading() as session:
+        found: dict[str, object] = {
+            table.name: sorted(map(tuple, session.execute(select(table))), key=str)
+            for table in Base.metadata.sorted_tables
+        }
+    for name in ("series", "twins"):
+        folder = workspace.folder / name
+        found[f"{name} files"] = {file.name: file.read_bytes() for file in folder.iterdir()} if folder.is_dir() else {}
+    return found
+
+
+def populate(workspace: Workspace) -> None:
+    workspace.ingest(*rows.data_set())
+    workspace.replace_activity(rows.activity("state.1", "run_state", "run"), ["series"], rows.run_state())
+    workspace.replace_activity(
+        rows.activity("twin.1", "identification"), ["runs"], rows.twin("t1"), documents={"twins/t1.json": b"{}"}
+    )
+    workspace.replace_activity(
+        rows.activity("energy.1", "energy"), ["twin"], rows.run_energy("t1"), series={WORK: rows.samples(9)}
+    )
+
+
+def test_a_data_set_is_taken_in(workspace: Workspace) -> None:
+    assert workspace.ingest(*rows.data_set()) == "new"
+    assert workspace.read_series(WORK).equals(rows.samples(1))
+    assert workspace.read_series(WORK, columns=["power"]).column_names == ["power"]
+    with workspace.reading() as session:
+        assert session.get_one(Run, f"{rows.ROBOT}.again").repeat_of == WORK
+
+
+def test_the_same_data_set_changes_nothing(workspace: Workspace) -> None:
+    populate(workspace)
+    before = state(workspace)
+    assert workspace.ingest(*rows.data_set()) == "unchanged"
+    assert state(workspace) == before
+
+
+def test_the_time_of_taking_in_is_no_change(workspace: Workspace) -> None:
+    _, _, runs, series = rows.data_set()
+    for moment in (rows.NOON, rows.NOON + timedelta(days=1)):
+        runs = [rows.run(run.name, start_time=moment, start_time_from="ingest") for run in runs]
+        outcome = workspace.ingest(rows.robot(), rows.joints(), runs, series)
+    assert outcome == "unchanged"
+
+
+@pytest.mark.parametrize("change", ["robot", "checksum", "joint", "run"])
+def test_a_changed_data_set_replaces_all_that_was_derived(workspace: Workspace, change: str) -> None:
+    populate(workspace)
+    robot, joints, runs, series = rows.data_set()
+    if change == "robot":
+        robot.weight_kg = 51.0
+    elif change == "checksum":
+        runs[1].sha256 = "3" * 64
+        series[WORK] = rows.samples(7)
+    elif change == "joint":
+        joints[0].gear_ratio = 101.0
+    else:
+        runs, series = [runs[1]], {WORK: series[WORK]}
+    assert workspace.ingest(robot, joints, runs, series) == "replaced"
+    found = state(workspace)
+    assert not any(
+        found[table] for table in ("activity", "activity_use", "run_state", "twin", "run_energy", "twins files")
+    )
+    assert len(found["run"]) == len(runs)  # type: ignore[arg-type]
+    assert workspace.read_series(WORK).equals(series[WORK])
+
+
+def test_another_robot_is_left_alone(workspace: Workspace) -> None:
+    populate(workspace)
+    other = rows.run("alone", run_id="Other.alone", robot_id="Other")
+    assert workspace.ingest(rows.robot(robot_id="Other"), [], [other], {"Other.alone": rows.samples(4)}) == "new"
+    workspace.drop_robot(rows.ROBOT)
+    with workspace.reading() as session:
+        assert session.scalars(select(Run.run_id)).all() == ["Other.alone"]
+    assert workspace.read_series("Other.alone").num_rows == 5
+    assert len(list((workspace.folder / "series").iterdir())) == 1
+
+
+def test_lost_series_are_taken_in_again(workspace: Workspace) -> None:
+    workspace.ingest(*rows.data_set())
+    for file in (workspace.folder / "series").iterdir():
+        file.unlink()
+    with pytest.raises(InputError, match="the series is missing"):
+        workspace.read_series(WORK)
+    assert workspace.ingest(*rows.data_set()) == "replaced"
+    assert workspace.read_series(WORK).equals(rows.samples(1))
+
+
+def test_a_provider_replaces_what_it_made_of_the_same_subject(workspace: Workspace) -> None:
+    populate(workspace)
+    workspace.replace_activity(rows.activity("state.2", "run_state", "run"), [], rows.run_state())
+    workspace.replace_activity(rows.activity("state.3", "other", "run"), ["a", "a"], [])
+    with workspace.reading() as session:
+        assert session.scalars(select(RunState.activity_id)).all() == ["state.2"]
+        assert session.scalars(select(ActivityUse.entity).where(ActivityUse.activity_id == "state.3")).all() == ["a"]
+        assert set(session.scalars(select(Activity.activity_id))) == {"state.2", "state.3", "twin.1", "energy.1"}
+
+
+def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace) -> None:
+    populate(workspace)
+    assert workspace.read_series(WORK, "modelled").equals(rows.samples(9))
+    workspace.replace_activity(
+        rows.activity("twin.2", "identification"), [], rows.twin("t2"), documents={"twins/t2.json": b"{2}"}
+    )
+    with workspace.reading() as session:
+        assert session.scalars(select(Twin.twin_id)).all() == ["t2"]
+        assert session.scalars(select(RunEnergy)).all() == []
+        assert set(session.scalars(select(Series.kind))) == {"measured"}
+        assert set(session.scalars(select(Activity.activity_id))) == {"state.1", "twin.2"}
+    assert [file.name for file in (workspace.folder / "twins").iterdir()] == ["t2.json"]
+    assert len(list((workspace.folder / "series").iterdir())) == 2
+
+
+def test_a_failing_replacement_leaves_the_earlier_state(workspace: Workspace) -> None:
+    populate(workspace)
+    before = state(workspace)
+    with pytest.raises(IntegrityError):
+        workspace.replace_activity(
+            rows.activity("energy.2", "energy"), [], rows.run_energy("no such twin"), series={WORK: rows.samples(3)}
+        )
+    workspace.remove_orphans()
+    assert state(workspace) == before
+
+
+def test_a_document_stays_inside_the_workspace(workspace: Workspace) -> None:
+    workspace.ingest(*rows.data_set())
+    with pytest.raises(InputError, match="leads out of the workspace"):
+        workspace.replace_activity(rows.activity("a", "p"), [], [], documents={"../escaped.json": b""})
+    assert not (workspace.folder.parent / "escaped.json").exists()
+
+
+def test_times_come_back_in_utc(workspace: Workspace) -> None:
+    eastern = timezone(timedelta(hours=-5))
+    run = rows.run("work", start_time=datetime(2026, 1, 2, 23, 30, tzinfo=eastern))
+    assert workspace.ingest(rows.robot(), [], [run], {WORK: rows.samples(1)}) == "new"
+    with workspace.reading() as session:
+        found = session.get_one(Run, WORK).start_time
+    assert found.isoformat() == "2026-01-03T04:30:00+00:00"
+    assert workspace.ingest(rows.robot(), [], [run], {WORK: rows.samples(1)}) == "unchanged"
+
+
+def test_a_run_without_series_is_a_programming_error(workspace: Workspace) -> None:
+    robot, joints, runs, _ = rows.data_set()
+    with pytest.raises(ValueError, match="runs and series differ"):
+        workspace.ingest(robot, joints, runs, {})
+
+
+def test_a_run_that_is_not_there(workspace: Workspace) -> None:
+    with pytest.raises(InputError, match="run none has no measured series"):
+        workspace.read_series("none")
+
+
+def test_a_workspace_must_exist_to_be_read(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no workspace here; run `irtwin run"):
+        Workspace.existing(tmp_path)
+    Workspace(tmp_path).close()
+    Workspace.existing(tmp_path).close()
+
+
+def test_a_workspace_where_a_file_stands(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot make the workspace"):
+        Workspace(tmp_path / "file")
+
+
+def test_a_workspace_of_another_version(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as workspace, workspace.engine.begin() as connection:
+        connection.execute(text("ALTER TABLE robot ADD COLUMN colour VARCHAR"))
+    with pytest.raises(InputError, match="table robot is of another irtwin version"):
+        Workspace(tmp_path)

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import IntegrityError
+
+from irtwin.errors import InputError
+from irtwin.storage import engine
+
+
+def test_a_password_never_shows() -> None:
+    with pytest.raises(InputError) as caught:
+        engine.open_engine("postgresql://me:secret@127.0.0.1:1/none?connect_timeout=2")
+    assert "postgresql+psycopg://me:***@127.0.0.1:1/none" in str(caught.value)
+    assert "cannot open the database" in str(caught.value)
+    assert "secret" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("url", ["no url:secret", ""])
+def test_a_url_that_cannot_be_read(url: str) -> None:
+    with pytest.raises(InputError, match="the database URL cannot be read") as caught:
+        engine.open_engine(url)
+    assert "secret" not in str(caught.value)
+
+
+def test_an_unknown_driver_is_named() -> None:
+    with pytest.raises(InputError, match=r"nosuch://me:\*\*\*@host/db: no driver for this database"):
+        engine.open_engine("nosuch://me:secret@host/db")
+
+
+def test_a_missing_sqlite_file_is_not_made(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such SQLite database"):
+        engine.open_engine(f"sqlite:///{tmp_path}/none.db", must_exist=True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_no_database(tmp_path: Path) -> None:
+    (tmp_path / "text.db").write_text("no database at all, only some text " * 50)
+    with pytest.raises(InputError, match="file is not a database"):
+        engine.open_engine(f"sqlite:///{tmp_path}/text.db")
+
+
+def test_a_writer_commits_all_or_nothing(tmp_path: Path) -> None:
+    database = engine.open_engine(f"sqlite:///{tmp_path}/a.db")
+    with engine.writing(database) as session:
+        session.execute(text("CREATE TABLE one (a INTEGER PRIMARY KEY)"))
+    with pytest.raises(IntegrityError), engine.writing(database) as session:
+        session.execute(text("INSERT INTO one VALUES (1)"))
+        session.execute(text("INSERT INTO one VALUES (1)"))
+    with database.connect() as connection:
+        assert connection.scalar(text("SELECT count(*) FROM one")) == 0
+
+
+def test_foreign_keys_hold_in_sqlite(tmp_path: Path) -> None:
+    database = engine.open_engine(f"sqlite:///{tmp_path}/a.db")
+    with database.connect() as connection:
+        assert connection.scalar(text("PRAGMA foreign_keys")) == 1
+
+
+def test_a_second_writer_waits_then_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "BUSY_TIMEOUT", 0.1)
+    one, two = (engine.open_engine(f"sqlite:///{tmp_path}/a.db") for _ in range(2))
+    with (
+        engine.writing(one),
+        pytest.raises(InputError, match=r"another process has been writing for 0\.1 s; try again later"),
+        engine.writing(two),
+    ):
+        pass
