@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ class Motion:
 
     time: (N,) s; q, dq, ddq: (N, n) rad, rad/s, rad/s^2; torque: (N, n) N m on the joint side;
     current: (N, n) A; temperature: (N, n) degC; power: (N,) W; payload_com: (3,) m in the flange frame.
+    `cutoff` is that of the zero-phase filter that the signals went through, Hz; None for a planned motion.
     """
 
     run: str
@@ -26,6 +27,7 @@ class Motion:
     power: np.ndarray | None = None
     payload_mass: float = 0.0  # kg
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cutoff: float | None = None
 
     @property
     def rate(self) -> float:
@@ -38,8 +40,8 @@ class Motion:
         def cut(signal: np.ndarray | None) -> np.ndarray | None:
             return None if signal is None else signal[start:stop]
 
-        return Motion(
-            run=self.run,
+        return replace(
+            self,
             time=self.time[start:stop],
             q=self.q[start:stop],
             dq=self.dq[start:stop],
@@ -48,6 +50,4 @@ class Motion:
             current=cut(self.current),
             temperature=cut(self.temperature),
             power=cut(self.power),
-            payload_mass=self.payload_mass,
-            payload_com=self.payload_com,
         )

@@ -1,0 +1,80 @@
+"""Weighted least squares on accumulated factors, under a weak prior and physical bounds (Yan 2018, eq. 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from irtwin.effects.effect import Term
+from irtwin.identification.accumulate import Block, triangle
+
+_REWEIGHTINGS = 4
+_LEAST_NOISE = 1e-9  # of the measurement's size: exact data still have finite weights
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Coefficients `values` (K,) with `covariance` (K, K), and the residual `noise` (g,) of each equation (RMS).
+
+    `blocks` is the number of independent blocks behind the covariance.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    noise: np.ndarray
+    blocks: int
+
+
+def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]) -> Estimate:
+    """Estimate the coefficients of `terms` (K) from g equations a sample.
+
+    Each equation is weighted by its residual's inverse RMS, found by iteration. The prior of each term (mean
+    `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that
+    they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Bounds hold
+    (`lowest`). The covariance is explained in `uncertainty`.
+    """
+    from irtwin.identification.uncertainty import covariance
+
+    factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
+    rows = sum(block.rows for block in blocks)
+    expected = np.array([term.expected for term in terms])
+    prior = 1 / np.array([term.spread for term in terms])
+    lowest = np.array([term.lowest for term in terms])
+    sizes = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(rows)
+    noise = np.maximum(sizes, np.finfo(float).tiny)
+    values = expected
+    for _ in range(_REWEIGHTINGS):
+        values = _solve(factors, noise, expected, prior, lowest)
+        residual = [np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors]
+        noise = np.maximum(np.array(residual) / np.sqrt(rows), np.maximum(_LEAST_NOISE * sizes, np.finfo(float).tiny))
+    spread = covariance(blocks, pattern, values, noise, prior)
+    return Estimate(values, spread, noise, len(blocks))
+
+
+def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:
+    """Return one factor, of all K + 1 columns, of rows whose factors have only the `used` ones (K,)."""
+    factor = triangle(np.concatenate(list(factors)))
+    full = np.zeros((len(factor), len(used) + 1))
+    full[:, np.append(used, True)] = factor
+    return full
+
+
+def _solve(
+    factors: Sequence[np.ndarray], noise: np.ndarray, expected: np.ndarray, prior: np.ndarray, lowest: np.ndarray
+) -> np.ndarray:
+    """Solve in the coefficients' deviation from expectation, in units of their spread: well scaled."""
+    rows = np.concatenate([factor / level for factor, level in zip(factors, noise, strict=True)])
+    target = rows[:, -1] - rows[:, :-1] @ expected
+    scaled = np.concatenate([rows[:, :-1] / prior, np.eye(len(expected))])
+    target = np.concatenate([target, np.zeros(len(expected))])
+    factor = triangle(np.column_stack([scaled, target]))
+    left, right = factor[:-1, :-1], factor[:-1, -1]
+    deviation = np.linalg.solve(left, right)
+    bounds = (lowest - expected) * prior
+    if np.any(deviation < bounds):
+        deviation = lsq_linear(left, right, bounds=(bounds - 1e-12, np.inf), method="bvls").x
+        deviation = np.maximum(deviation, bounds)
+    return np.asarray(expected + deviation / prior)

@@ -1,0 +1,60 @@
+"""Torque constants from the balance of electrical power, where currents were measured and no torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.effects.effect import Effect, Term, catalogue, force_unit
+from irtwin.identification.accumulate import accumulate
+from irtwin.identification.estimators import Estimate, estimate
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+
+
+@dataclass(frozen=True)
+class TorqueConstants:
+    """`constants` (n,) N m/A reflected to the joints; `terms` and `estimate` are theirs, for the record."""
+
+    constants: np.ndarray
+    terms: tuple[tuple[Effect, Term], ...]
+    estimate: Estimate
+
+
+def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants:
+    """Find each joint's torque constant from P = P0 + sum_j (kt_j i_j dq_j + R_j i_j^2).
+
+    Linear in P0, kt and R, all of them positive. One common kt and R for all joints are found first; these are then
+    what each joint's own are expected to be, give or take as much: a joint that hardly draws power keeps the common
+    value.
+    """
+    joints = robot.joints
+    standby = Term("P0", "W", spread=600.0, lowest=0.0)
+    common = [standby, Term("kt", "N m/A", spread=50.0, lowest=0.0), Term("R", "ohm", spread=20.0, lowest=0.0)]
+    _, constant, resistance = _balance(motions, common, pooled=True).values
+    units = [f"{force_unit(joint)}/A" for joint in joints]
+    own = [
+        Term("kt", unit, joint=joint.name, expected=constant, spread=constant, lowest=0.0)
+        for joint, unit in zip(joints, units, strict=True)
+    ]
+    heat = [Term("R", "ohm", joint=joint.name, expected=resistance, spread=resistance, lowest=0.0) for joint in joints]
+    found = _balance(motions, [standby, *own, *heat], pooled=False)
+    index = slice(1, 1 + len(joints))
+    mechanical = catalogue()["mechanical_power"]
+    kept = Estimate(found.values[index], found.covariance[index, index], found.noise, found.blocks)
+    return TorqueConstants(found.values[index], tuple((mechanical, term) for term in own), kept)
+
+
+def _balance(motions: Sequence[Motion], terms: Sequence[Term], *, pooled: bool) -> Estimate:
+    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert motion.current is not None and motion.power is not None
+        parts = [motion.current * motion.dq, motion.current**2]
+        if pooled:
+            parts = [part.sum(axis=1, keepdims=True) for part in parts]
+        columns = np.column_stack([np.ones(len(motion.time)), *parts])
+        return columns[:, None], np.zeros((len(columns), 1)), motion.power[:, None]
+
+    pattern = np.ones((1, len(terms)), dtype=bool)
+    return estimate(accumulate(motions, equations, pattern), pattern, terms)

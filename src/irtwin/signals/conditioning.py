@@ -1,0 +1,112 @@
+"""From a run as logged to a motion: even sampling, zero-phase filter, derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.signals.filter import low_pass
+from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
+
+_BAND_SHARE = 0.99  # of the speed's power lies below the band of the motion
+_BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the motion
+_ABOVE_NOISE = 3.0  # times the mean noise: what stands out is motion
+_FEWEST_PERIODS = 10  # of the cutoff in a run
+_NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is chosen
+_AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this from those of the positions
+_FEWEST = 20  # samples
+
+
+def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
+    """Return the run's signals at an even rate (the median one), low-pass filtered without phase shift.
+
+    Speeds and accelerations are derivatives of the filtered positions; speeds that were logged are taken instead
+    where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`. Raises InputError on a cutoff
+    that is no positive number, or on a run of fewer than 20 samples.
+    """
+    signals = run.signals
+    if len(signals.time) < _FEWEST:
+        raise InputError(f"{run.file}: has {len(signals.time)} samples; a run needs at least {_FEWEST}")
+    if cutoff is None:
+        cutoff = choose_cutoff([run])
+    if not (np.isfinite(cutoff) and cutoff > 0):
+        raise InputError(f"a cutoff of {cutoff:g} Hz filters everything away; give a positive frequency")
+    time = _even_time(signals.time)
+    rate = 1 / (time[1] - time[0])
+
+    def clean(values: np.ndarray | None, order: int = 1) -> np.ndarray | None:
+        if values is None:
+            return None
+        even = make_interp_spline(signals.time, values, k=order)(time)
+        return low_pass(even, rate, cutoff)
+
+    q = clean(signals.q, order=3)
+    assert q is not None
+    dq = _agreeing(clean(signals.dq), differentiate(q, rate))
+    ddq = _agreeing(clean(signals.ddq), differentiate(dq, rate))
+    return Motion(
+        run=run.name,
+        time=time,
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        torque=clean(signals.torque),
+        current=clean(signals.current),
+        temperature=clean(signals.temperature),
+        power=clean(signals.power),
+        payload_mass=run.payload_mass,
+        payload_com=run.payload_com,
+        cutoff=cutoff,
+    )
+
+
+def choose_cutoff(runs: Iterable[Run]) -> float:
+    """Return the cutoff (Hz) for runs that are to be treated alike.
+
+    The band of a motion ends where 99 % of the power of its speeds lies below; white noise of the positions, as
+    seen in the highest octave, is taken off first. The cutoff is ten times that (M. Gautier, "Dynamic
+    identification of robots with power model", ICRA 1997, asks for at least five), so that the filter leaves the
+    motion and its accelerations as they are and takes away the noise above; at most 0.8 of the Nyquist frequency.
+    Of several runs the one of the widest band decides.
+    """
+    return max(_cutoff(run.signals.time, run.signals.q) for run in runs)
+
+
+def differentiate(signal: np.ndarray, rate: float) -> np.ndarray:
+    """Return the time derivative of an even (N, ...) signal through the quintic spline that interpolates it."""
+    time = np.arange(len(signal)) / rate
+    return np.asarray(make_interp_spline(time, signal, k=5).derivative()(time))
+
+
+def _even_time(time: np.ndarray) -> np.ndarray:
+    count = round((time[-1] - time[0]) / float(np.median(np.diff(time)))) + 1
+    return np.linspace(time[0], time[-1], count)
+
+
+def _cutoff(time: np.ndarray, q: np.ndarray) -> float:
+    even = _even_time(time)
+    rate = 1 / (even[1] - even[0])
+    speed = np.diff(make_interp_spline(time, q, k=1)(even), axis=0)
+    power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(speed), 1 / rate)
+    gain = np.sin(np.pi * frequency / rate)[:, None] ** 2  # white positions, differenced
+    octave = frequency > rate / 4
+    noise = np.median(power[octave] / gain[octave], axis=0) / np.log(2)  # mean of what is exponential, from its median
+    power = np.maximum(power - _ABOVE_NOISE * noise * gain, 0.0).sum(axis=1)
+    share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
+    band = frequency[min(int(np.searchsorted(share, _BAND_SHARE)), len(frequency) - 1)]
+    highest = _NYQUIST_SHARE * rate / 2
+    return float(min(max(_BAND_FACTOR * band, _FEWEST_PERIODS / (even[-1] - even[0])), highest))
+
+
+def _agreeing(logged: np.ndarray | None, derived: np.ndarray) -> np.ndarray:
+    """Return what was logged where it agrees, over all joints, with what the positions say; else the latter."""
+    if logged is None:
+        return derived
+    scale = np.sqrt(np.mean(derived**2))
+    return logged if np.sqrt(np.mean((logged - derived) ** 2)) <= _AGREEMENT * scale else derived

@@ -1,0 +1,61 @@
+"""The zero-phase low-pass filter that regressors and measurements share.
+
+A symmetric FIR kernel: zero phase by construction, and of finite length, so that a long run can be filtered in
+pieces that join exactly, and decimated while it is filtered.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import oaconvolve
+
+_LOBES = 2  # of the sinc on either side: stop band below -40 dB from about 1.5 cutoffs on
+_OVERSAMPLING = 4  # samples kept per cutoff period after decimation
+
+
+def kernel(rate: float, cutoff: float) -> np.ndarray:
+    """Return the symmetric low-pass kernel, (2 K + 1,) of sum one: a sinc under a Hann window.
+
+    rate, cutoff in Hz. Where the cutoff reaches the Nyquist frequency nothing is to be filtered: the kernel is [1].
+    """
+    if cutoff >= rate / 2:
+        return np.ones(1)
+    half = round(_LOBES * rate / (2 * cutoff))
+    steps = np.arange(-half, half + 1)
+    taps = np.sinc(2 * cutoff / rate * steps) * np.cos(np.pi * steps / (2 * half + 2)) ** 2
+    return np.asarray(taps / taps.sum())
+
+
+def low_pass(signal: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
+    """Filter along the first axis without phase shift; same shape.
+
+    The ends are continued by reflection in their end points, so constants and ramps pass unchanged.
+    """
+    taps = kernel(rate, cutoff)
+    half = min(len(taps) // 2, len(signal) - 1)
+    if half == 0:
+        return np.array(signal, dtype=float)
+    taps = taps[len(taps) // 2 - half : len(taps) // 2 + half + 1]
+    before = 2 * signal[0] - signal[half:0:-1]
+    after = 2 * signal[-1] - signal[-2 : -half - 2 : -1]
+    padded = np.concatenate([before, signal, after])
+    shape = (-1,) + (1,) * (signal.ndim - 1)
+    return np.asarray(oaconvolve(padded, (taps / taps.sum()).reshape(shape), mode="valid", axes=0))
+
+
+def decimation(rate: float, cutoff: float) -> int:
+    """Return the step between samples that still carries everything below the cutoff."""
+    return max(1, int(rate / (_OVERSAMPLING * cutoff)))
+
+
+def decimate(signal: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
+    """Filter (N, ...) by the (2 K + 1,) taps and keep every step-th sample from sample K to N - K (exclusive)."""
+    flat = signal.reshape(len(signal), -1)
+    count = max(0, -(-(len(flat) - len(taps) + 1) // step))
+    if len(taps) == 1:
+        kept = flat[::step]
+    else:
+        kept = np.empty((count, flat.shape[1]))
+        for row in range(count):
+            kept[row] = taps @ flat[row * step : row * step + len(taps)]
+    return kept.reshape((count, *signal.shape[1:]))

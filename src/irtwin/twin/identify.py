@@ -1,0 +1,196 @@
+"""Identification: from measured motions to a twin. What was measured decides the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from irtwin.effects.effect import BASELINE, Effect, Term
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.identification.accumulate import Equations, accumulate
+from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
+from irtwin.identification.estimators import Estimate, combine, estimate
+from irtwin.identification.torque_constants import TorqueConstants, torque_constants
+from irtwin.identification.uncertainty import half_widths
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+from irtwin.twin.twin import BaseParameter, Parameter, Twin
+
+Terms = Sequence[tuple[Effect, Term]]
+
+_TORQUE_PASSES = 3
+
+
+def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str] = BASELINE) -> Twin:
+    """Return the twin of a robot that fits the motions.
+
+    - Where torque was measured, it gives the coefficients of torque; then power, where it was measured, gives those
+      of power, on top of the torque that the twin predicts.
+    - Where power and motor currents were measured but no torque, their balance gives the torque constants first, and
+      these the torque.
+    - Where power alone was measured, the coefficients of torque are found through the power that torque carries.
+
+    Effects that nothing measured can show are listed as `unidentified`, and left out. Raises InputError where there
+    is nothing to fit.
+    """
+    if not motions:
+        raise InputError("there is no run to fit a twin to; give at least one")
+    constants = None
+    if not any(motion.torque is not None for motion in motions):
+        robot, motions, constants = _torque_from_current(robot, motions)
+    with_torque = [motion for motion in motions if motion.torque is not None]
+    with_power = [motion for motion in motions if motion.power is not None]
+    if not with_torque and not with_power:
+        raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
+    stack = _visible(robot, effects, torque=bool(with_torque), power=bool(with_power))
+    fit = _fit_torque(stack, with_torque) if with_torque else None
+    if fit:
+        parameters = _parameters(stack.torque_terms, fit.estimate)
+        parameters += _fit_power(stack, with_power, fit.estimate.values) if with_power else []
+    else:
+        parameters = _fit_through_power(stack, with_power)
+    if constants:
+        parameters += _parameters(constants.terms, constants.estimate)
+    return Twin(
+        robot=robot,
+        effects=stack.ids,
+        parameters=tuple(parameters),
+        cutoff=max((motion.cutoff for motion in motions if motion.cutoff), default=None),
+        unidentified=tuple(effect for effect in effects if effect not in stack.ids),
+        base_parameters=fit.base if fit else (),
+        condition_number=fit.condition if fit else None,
+        fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
+    )
+
+
+@dataclass(frozen=True)
+class _TorqueFit:
+    estimate: Estimate
+    base: tuple[BaseParameter, ...]
+    condition: float
+
+
+def _visible(robot: Robot, effects: Sequence[str], *, torque: bool, power: bool) -> Stack:
+    """Return the effects that can be told from what was measured, or that hold nothing to be told."""
+    whole = Stack(robot, effects)
+    seen = {effect.id for effect, term in whole.power_terms if power or term.fixed}
+    seen |= {effect.id for effect, _ in whole.torque_terms if torque or effect.channel == "torque"}
+    return Stack(robot, [effect for effect in effects if effect in seen])
+
+
+def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot, list[Motion], TorqueConstants | None]:
+    """Give motions their torque, current times torque constant, where the power balance tells the constants."""
+    telling = [motion for motion in motions if motion.current is not None and motion.power is not None]
+    if not telling:
+        return robot, list(motions), None
+    found = torque_constants(robot, telling)
+    joints = tuple(
+        replace(joint, torque_constant=float(constant))
+        for joint, constant in zip(robot.joints, found.constants, strict=True)
+    )
+    known = [
+        motion if motion.current is None else replace(motion, torque=motion.current * found.constants)
+        for motion in motions
+    ]
+    return replace(robot, joints=joints), known, found
+
+
+def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
+    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert motion.torque is not None
+        columns = stack.torque_columns(motion)
+        return columns, columns @ stack.shift(motion), motion.torque
+
+    blocks = accumulate(motions, equations, stack.pattern)
+    found = estimate(blocks, stack.pattern, [term for _, term in stack.torque_terms])
+    base = base_parameters(stack)
+    factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
+    return _TorqueFit(found, _base(base, found), condition_number(np.concatenate(factors)[:, :-1], base))
+
+
+def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> list[Parameter]:
+    """Fit the coefficients of power on top of the torque that was found."""
+    free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
+    fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
+    if not free:
+        return []
+
+    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert motion.power is not None
+        torque = stack.real_torque(motion, torque_values)
+        columns = stack.power_columns(motion, torque)
+        known = columns[:, fixed] @ _expected(stack.power_terms)[fixed]
+        return columns[:, None, ~fixed], known[:, None], motion.power[:, None]
+
+    found = _estimate(motions, equations, free)
+    return _parameters(free, found)
+
+
+def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Parameter]:
+    """Fit the coefficients of torque and power together to measured power: torque carries tau dq of it.
+
+    Losses that grow with torque squared are linear in their coefficient only once the torque is known: the fit is
+    repeated with the torque that the one before found.
+    """
+    real = [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
+    free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
+    fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
+    torque_values = _expected(stack.torque_terms)
+    found = None
+    for _ in range(_TORQUE_PASSES):
+        frozen = torque_values
+
+        def equations(motion: Motion, frozen: np.ndarray = frozen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            assert motion.power is not None
+            carried = np.einsum("tj,tjk->tk", motion.dq, stack.torque_columns(motion))
+            power = stack.power_columns(motion, stack.real_torque(motion, frozen))
+            columns = np.concatenate([carried[:, stack.real], power[:, ~fixed]], axis=1)
+            known = carried @ np.where(stack.real, stack.shift(motion), 0.0)
+            return columns[:, None], known[:, None], motion.power[:, None]
+
+        found = _estimate(motions, equations, [*real, *free])
+        torque_values[stack.real] = found.values[: len(real)]
+    assert found is not None
+    return _parameters([*real, *free], found)
+
+
+def _estimate(motions: Sequence[Motion], equations: Equations, terms: Terms) -> Estimate:
+    """Estimate the terms of one equation a sample."""
+    pattern = np.ones((1, len(terms)), dtype=bool)
+    return estimate(accumulate(motions, equations, pattern), pattern, [term for _, term in terms])
+
+
+def _expected(terms: Terms) -> np.ndarray:
+    return np.array([term.expected for _, term in terms], dtype=float)
+
+
+def _parameters(terms: Terms, found: Estimate) -> list[Parameter]:
+    spread = np.array([term.spread for _, term in terms])
+    widths = half_widths(found.covariance, spread, found.blocks)
+    return [
+        Parameter(
+            effect=effect.id,
+            joint=term.joint,
+            link=term.link,
+            name=term.name,
+            value=float(value),
+            unit=term.unit,
+            lower=None if np.isnan(width) else float(max(value - width, term.lowest)),
+            upper=None if np.isnan(width) else float(value + width),
+        )
+        for (effect, term), value, width in zip(terms, found.values, widths, strict=True)
+    ]
+
+
+def _base(base: BaseParameters, found: Estimate) -> tuple[BaseParameter, ...]:
+    values = base.grouping @ found.values
+    covariance = base.grouping @ found.covariance @ base.grouping.T
+    widths = half_widths(covariance, np.full(len(values), np.inf), found.blocks)
+    units = [base.terms[k].unit for k in base.independent]
+    return tuple(
+        BaseParameter(name, float(value), unit, float(value - width), float(value + width))
+        for name, value, unit, width in zip(base.names(), values, units, widths, strict=True)
+    )
