@@ -1,0 +1,162 @@
+"""A machine: a robot as drawn, and the one that was built from the drawings, a little off everywhere."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+from xml.etree import ElementTree
+
+import numpy as np
+
+from plant.arm import Arm, LinkTolerance, Payload
+from plant.controller import ControlData
+from plant.drive import DriveData
+from plant.friction import FrictionData
+from plant.motion import Limits
+from plant.sensors import SensorData
+from plant.supply import SupplyData
+from plant.thermal import ThermalData
+
+Data = TypeVar("Data", DriveData, FrictionData)
+
+ROBOTS = Path(__file__).parent / "robots"
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Standard deviations of the built robot from its drawings: relative, com in m."""
+
+    mass: float
+    inertia: float
+    com: float
+    rotor_inertia: float
+    torque_constant: float
+    resistance: float
+    friction: float
+    friction_per_run: float
+
+
+@dataclass(frozen=True)
+class Drawings:
+    """All that the maker knows of a robot, read from robots/NAME.toml."""
+
+    urdf: str
+    manufacturer: str
+    weight: float
+    rated_payload: float
+    acceleration: np.ndarray
+    step: float
+    log_interval: float
+    tolerance: Tolerance
+    drive: DriveData
+    friction: FrictionData
+    thermal: ThermalData
+    control: ControlData
+    supply: SupplyData
+    sensors: SensorData
+
+    @cached_property
+    def joints(self) -> list[str]:
+        """Names of the joints, in the order of every (n,) array."""
+        return self.arm(Payload()).joint_names
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Position limits and speeds of the URDF (MuJoCo keeps no speeds), accelerations of the drawings."""
+        lower, upper = self.arm(Payload()).model.jnt_range.T
+        return Limits(lower.copy(), upper.copy(), _urdf_speeds(self.urdf, self.joints), self.acceleration)
+
+    def arm(self, payload: Payload) -> Arm:
+        """Return the arm as drawn."""
+        return Arm(self.urdf, self.drive.joint_inertia, payload, self.step)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """One built robot. The seed makes it: the same seed is the same robot."""
+
+    drawings: Drawings
+    seed: int
+    drive: DriveData
+    friction: FrictionData
+    torque_offset: np.ndarray  # (n,) N m, of the current sensors
+    meter_gain: float
+
+    def arm(self, payload: Payload) -> Arm:
+        """Return the arm as built."""
+        arm = Arm(self.drawings.urdf, self.drive.joint_inertia, payload, self.drawings.step)
+        tolerance = self.drawings.tolerance
+        arm.perturb(
+            LinkTolerance(tolerance.mass, tolerance.inertia, tolerance.com), np.random.default_rng([self.seed, 1])
+        )
+        return arm
+
+
+def build(drawings: Drawings, seed: int) -> Machine:
+    """Build a robot to the drawings and their tolerances."""
+    rng = np.random.default_rng([seed, 2])
+    tolerance, sensors = drawings.tolerance, drawings.sensors
+    return Machine(
+        drawings,
+        seed,
+        scatter(
+            drawings.drive,
+            {name: getattr(tolerance, name) for name in ("rotor_inertia", "torque_constant", "resistance")},
+            rng,
+        ),
+        scatter(
+            drawings.friction, dict.fromkeys(("coulomb", "stiction", "viscous", "load"), tolerance.friction), rng
+        ),
+        sensors.torque_offset * rng.standard_normal(len(drawings.joints)),
+        1 + sensors.meter_gain_error * rng.standard_normal(),
+    )
+
+
+def scatter(
+    data: Data, deviations: dict[str, float], rng: np.random.Generator
+) -> Data:
+    """Return the data with the named arrays off by relative standard deviations, two at most."""
+    changed = {}
+    for name, deviation in deviations.items():
+        value = getattr(data, name)
+        changed[name] = value * (1 + deviation * np.clip(rng.standard_normal(value.shape), -2, 2))
+    return replace(data, **changed)
+
+
+def read_drawings(name: str) -> Drawings:
+    """Read robots/NAME.toml and the URDF it names."""
+    file = ROBOTS / f"{name}.toml"
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    parts = {
+        "tolerance": Tolerance,
+        "drive": DriveData,
+        "friction": FrictionData,
+        "thermal": ThermalData,
+        "control": ControlData,
+        "supply": SupplyData,
+        "sensors": SensorData,
+    }
+    for key, part in parts.items():
+        table[key] = _typed(part, table[key])
+    table["urdf"] = (file.parent / table["urdf"]).resolve().read_text(encoding="utf-8")
+    table["acceleration"] = np.asarray(table["acceleration"], dtype=float)
+    return Drawings(**table)
+
+
+def _typed(part: type, table: dict[str, Any]) -> Any:
+    unknown = set(table) - {field.name for field in fields(part)}
+    if unknown:
+        raise ValueError(f"{part.__name__} has no {sorted(unknown)}")
+    return part(**{key: np.asarray(v, dtype=float) if isinstance(v, list) else v for key, v in table.items()})
+
+
+def _urdf_speeds(urdf: str, joints: list[str]) -> np.ndarray:
+    speeds = {
+        joint.get("name"): float(limit.get("velocity", "inf"))
+        for joint in ElementTree.fromstring(urdf).findall("joint")
+        if (limit := joint.find("limit")) is not None
+    }
+    return np.array([speeds[name] for name in joints])
