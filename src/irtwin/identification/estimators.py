@@ -76,5 +76,4 @@ def _solve(
     bounds = (lowest - expected) * prior
     if np.any(deviation < bounds):
         deviation = lsq_linear(left, right, bounds=(bounds - 1e-12, np.inf), method="bvls").x
-        deviation = np.maximum(deviation, bounds)
-    return np.asarray(expected + deviation / prior)
+    return np.asarray(np.maximum(expected + deviation / prior, lowest))

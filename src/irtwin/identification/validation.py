@@ -12,6 +12,7 @@ from irtwin.signals.motion import Motion
 FIT, HELD_OUT = "fit", "held_out"
 _FEW = 3  # runs that differ; fewer are cut in time instead
 _FIT_SHARE = 2 / 3
+_GOLDEN = (1 + 5**0.5) / 2
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,9 @@ def split(motions: Sequence[Motion], repeats: dict[str, str] | None = None) -> S
     """Split motions into a part to fit and a part to judge.
 
     `repeats`: name of a run -> run whose programmed motion it repeats. Runs of one programmed motion stay
-    together. With three or more such groups every third group (the third, sixth, ...) is held out;
-    with fewer each run is cut in time, its first two thirds fitted and the rest held out.
+    together. With three or more such groups about one in three is held out: the k-th (from 1) where the fraction
+    of k times the golden ratio lies below 1/3, so that no regular order of a log (every third run a work cycle)
+    falls on one side. With fewer, each run is cut in time, its first two thirds fitted and the rest held out.
     """
     groups = _groups(motions, repeats or {})
     if len(groups) < _FEW:
@@ -44,11 +46,11 @@ def split(motions: Sequence[Motion], repeats: dict[str, str] | None = None) -> S
             tuple(motion.part(cut, len(motion.time)) for motion, cut in zip(motions, cuts, strict=True)),
             "each run cut in time: first two thirds fitted, last third held out",
         )
-    judged = {run for group in groups[_FEW - 1 :: _FEW] for run in group}
+    judged = {run for k, group in enumerate(groups, 1) if k * _GOLDEN % 1 < 1 - _FIT_SHARE for run in group}
     return Split(
         tuple(motion for motion in motions if motion.run not in judged),
         tuple(motion for motion in motions if motion.run in judged),
-        "every third programmed motion held out, with its repeats",
+        "one programmed motion in three held out, with its repeats",
     )
 
 

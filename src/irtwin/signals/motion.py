@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +34,11 @@ class Motion:
     def rate(self) -> float:
         """Samples per second, Hz."""
         return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+    def pieces(self, size: int) -> Iterator[Motion]:
+        """Yield the motion in consecutive parts of at most `size` samples."""
+        for start in range(0, len(self.time), size):
+            yield self.part(start, start + size)
 
     def part(self, start: int, stop: int) -> Motion:
         """Return samples start..stop (exclusive) as a motion of the same run."""

@@ -21,7 +21,9 @@ from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 Terms = Sequence[tuple[Effect, Term]]
 
-_TORQUE_PASSES = 3
+_STEPS = 20  # of Gauss-Newton, at most
+_CONVERGED = 1e-3  # of the prior spread
+_TORQUE_STEP = 1e-2  # N m, exact for what is quadratic in torque
 
 
 def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str] = BASELINE) -> Twin:
@@ -130,31 +132,46 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
 
 
 def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Parameter]:
-    """Fit the coefficients of torque and power together to measured power: torque carries tau dq of it.
+    """Fit the coefficients of torque and power together to measured power, which torque carries into it.
 
-    Losses that grow with torque squared are linear in their coefficient only once the torque is known: the fit is
-    repeated with the torque that the one before found.
+    Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from the expected values.
     """
     real = [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
     free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
     fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
-    torque_values = _expected(stack.torque_terms)
-    found = None
-    for _ in range(_TORQUE_PASSES):
-        frozen = torque_values
-
-        def equations(motion: Motion, frozen: np.ndarray = frozen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            assert motion.power is not None
-            carried = np.einsum("tj,tjk->tk", motion.dq, stack.torque_columns(motion))
-            power = stack.power_columns(motion, stack.real_torque(motion, frozen))
-            columns = np.concatenate([carried[:, stack.real], power[:, ~fixed]], axis=1)
-            known = carried @ np.where(stack.real, stack.shift(motion), 0.0)
-            return columns[:, None], known[:, None], motion.power[:, None]
-
+    torque_values, power_values = _expected(stack.torque_terms), _expected(stack.power_terms)
+    spread = np.array([term.spread for _, term in (*real, *free)])
+    before = np.full(len(spread), np.inf)
+    for _ in range(_STEPS):
+        equations = _linearised(stack, torque_values.copy(), power_values.copy())
         found = _estimate(motions, equations, [*real, *free])
-        torque_values[stack.real] = found.values[: len(real)]
-    assert found is not None
+        torque_values[stack.real], power_values[~fixed] = np.split(found.values, [len(real)])
+        if np.all(np.abs(found.values - before) < _CONVERGED * spread):
+            break
+        before = found.values
     return _parameters([*real, *free], found)
+
+
+def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
+    """Return the equation of power, linear in the deviation of the torque coefficients from `torque_values`."""
+    fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
+
+    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert motion.power is not None
+        columns = stack.torque_columns(motion)[:, :, stack.real]
+        torque = stack.real_torque(motion, torque_values)
+        power = stack.power_columns(motion, torque)
+        slope = np.empty_like(torque)  # of power over torque, (N, n)
+        for joint in range(torque.shape[1]):
+            step = np.zeros(torque.shape[1])
+            step[joint] = _TORQUE_STEP
+            rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
+            slope[:, joint] = rise @ power_values / (2 * _TORQUE_STEP)
+        carried = np.einsum("tj,tjk->tk", slope, columns)
+        known = power[:, fixed].sum(axis=1) - carried @ torque_values[stack.real]
+        return np.concatenate([carried, power[:, ~fixed]], axis=1)[:, None], known[:, None], motion.power[:, None]
+
+    return equations
 
 
 def _estimate(motions: Sequence[Motion], equations: Equations, terms: Terms) -> Estimate:

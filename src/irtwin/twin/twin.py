@@ -13,6 +13,8 @@ from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+_PIECE = 8192  # samples whose regressor is held at once
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -72,16 +74,17 @@ class Twin:
 
     def torque(self, motion: Motion) -> np.ndarray:
         """Return the torque that a measurement would show, (N, n) N m: real torque and what the sensing adds."""
-        columns = self.stack.torque_columns(motion)
-        return np.asarray(columns @ (self._torque_values + self.stack.shift(motion)))
+        values = self._torque_values + self.stack.shift(motion)
+        return np.concatenate([self.stack.torque_columns(piece) @ values for piece in motion.pieces(_PIECE)])
 
     def joint_torque(self, motion: Motion) -> np.ndarray:
         """Return the real torque in the joints, (N, n) N m (Yan 2018, eqs. 1 to 3)."""
-        return self.stack.real_torque(motion, self._torque_values)
+        return np.concatenate([self._joint_torque(piece) for piece in motion.pieces(_PIECE)])
 
     def power(self, motion: Motion) -> np.ndarray:
         """Return the electrical power, (N,) W (Yan 2018, eqs. 7, 8). Without an effect of power: zero."""
-        return np.asarray(self.stack.power_columns(motion, self.joint_torque(motion)) @ self._power_values)
+        columns = self.stack.power_columns(motion, self.joint_torque(motion))
+        return np.asarray(columns @ self._power_values)
 
     def energy(self, motion: Motion) -> float:
         """Return the energy over the motion, J (Yan 2018, eq. 9)."""
@@ -92,26 +95,36 @@ class Twin:
 
         Mechanical power is entered under the effects of torque that take it.
         """
-        columns = self.stack.torque_columns(motion)
-        values = np.where(self.stack.real, self._torque_values + self.stack.shift(motion), 0.0)
-        power = self.stack.power_columns(motion, columns @ values) * self._power_values
         entries: dict[tuple[str, str | None], float] = {}
-        for index, (effect, term) in enumerate(self.stack.power_terms):
-            if effect.id != "mechanical_power":
-                key = (effect.id, term.joint)
-                entries[key] = entries.get(key, 0.0) + energy(motion.time, power[:, index])
-        if "mechanical_power" in self.effects:
-            work = np.trapezoid(columns * motion.dq[:, :, None], motion.time, axis=0) * values  # (n, K)
-            for index, (effect, _) in enumerate(self.stack.torque_terms):
-                for joint, name in enumerate(self.robot.joint_names):
-                    if self.stack.real[index] and self.stack.pattern[joint, index]:
-                        key = (effect.id, name)
-                        entries[key] = entries.get(key, 0.0) + float(work[joint, index])
+
+        def enter(effect: str, joint: str | None, value: float) -> None:
+            entries[effect, joint] = entries.get((effect, joint), 0.0) + value
+
+        values = np.where(self.stack.real, self._torque_values + self.stack.shift(motion), 0.0)
+        durations = np.gradient(motion.time) if len(motion.time) > 1 else np.zeros(1)
+        durations[[0, -1]] /= 2  # weights of the trapezoidal rule
+        start = 0
+        for piece in motion.pieces(_PIECE):
+            weights = durations[start : start + len(piece.time)]
+            start += len(piece.time)
+            columns = self.stack.torque_columns(piece)
+            watts = weights @ self.stack.power_columns(piece, columns @ values) * self._power_values  # (L,)
+            for value, (effect, term) in zip(watts, self.stack.power_terms, strict=True):
+                if effect.id != "mechanical_power":
+                    enter(effect.id, term.joint, float(value))
+            if "mechanical_power" in self.effects:
+                work = np.einsum("t,tj,tjk->jk", weights, piece.dq, columns) * values
+                for joint, index in zip(*np.nonzero(self.stack.pattern & self.stack.real), strict=True):
+                    effect, _ = self.stack.torque_terms[index]
+                    enter(effect.id, self.robot.joint_names[joint], float(work[joint, index]))
         return tuple(LedgerEntry(effect, joint, value) for (effect, joint), value in entries.items())
 
     def value(self, effect: str, term: Term) -> float:
         """Return the identified value of an effect's coefficient."""
         return term.expected if term.fixed else self._values[effect, term.joint, term.link, term.name]
+
+    def _joint_torque(self, motion: Motion) -> np.ndarray:
+        return self.stack.real_torque(motion, self._torque_values)
 
     @cached_property
     def _values(self) -> dict[tuple[str, str | None, str | None, str], float]:

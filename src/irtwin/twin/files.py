@@ -1,0 +1,157 @@
+"""Twins as JSON files."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.robot.urdf import parse_urdf
+from irtwin.twin.twin import BaseParameter, Parameter, Twin
+
+_FORMAT, _VERSION = "irtwin twin", 1
+_SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
+_PARAMETER = {
+    "effect": (str,),
+    "joint": (str, None),
+    "link": (str, None),
+    "name": (str,),
+    "value": (float,),
+    "unit": (str,),
+    "lower": (float, None),
+    "upper": (float, None),
+}
+_BASE_PARAMETER = {"name": (str,), "value": (float,), "unit": (str,), "lower": (float,), "upper": (float,)}
+
+
+def save(twin: Twin, path: Path) -> None:
+    """Write a twin, whole or not at all."""
+    robot = twin.robot
+    document = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "robot": {
+            "name": robot.name,
+            "manufacturer": robot.manufacturer,
+            "type": robot.type,
+            "weight": robot.weight,
+            "joints": {joint.name: {key: getattr(joint, key) for key in _SHEET} for joint in robot.joints},
+            "urdf": robot.urdf,
+        },
+        "effects": list(twin.effects),
+        "unidentified": list(twin.unidentified),
+        "fitted": list(twin.fitted),
+        "cutoff": twin.cutoff,
+        "condition_number": twin.condition_number,
+        "parameters": [asdict(parameter) for parameter in twin.parameters],
+        "base_parameters": [asdict(parameter) for parameter in twin.base_parameters],
+    }
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def load(path: Path) -> Twin:
+    """Read a twin. Raises InputError, naming file and key, where the file is none."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name a twin that irtwin saved") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON ({error}); name a twin that irtwin saved") from error
+    reader = _Reader(path, document, "")
+    if reader.take("format", str) != _FORMAT:
+        raise InputError(f'{path}: "format" is not "{_FORMAT}"; name a twin that irtwin saved')
+    if reader.take("version", int) != _VERSION:
+        raise InputError(f'{path}: "version" is not {_VERSION}; identify the twin again with this irtwin')
+    twin = Twin(
+        robot=_robot(path, reader.inner("robot")),
+        effects=tuple(reader.texts("effects")),
+        parameters=tuple(Parameter(**row) for row in reader.rows("parameters", _PARAMETER)),
+        cutoff=reader.take("cutoff", float, None),
+        unidentified=tuple(reader.texts("unidentified")),
+        base_parameters=tuple(BaseParameter(**row) for row in reader.rows("base_parameters", _BASE_PARAMETER)),
+        condition_number=reader.take("condition_number", float, None),
+        fitted=tuple(reader.texts("fitted")),
+    )
+    _check_complete(path, twin)
+    return twin
+
+
+class _Reader:
+    """An object of the document, whose faults name file and key."""
+
+    def __init__(self, path: Path, values: Any, place: str):
+        if not isinstance(values, dict):
+            raise InputError(
+                f"{path}: {place or 'the document'} should be a JSON object; name a twin that irtwin saved"
+            )
+        self.path, self.values, self.place = path, values, place
+
+    def fail(self, key: str, what: str) -> InputError:
+        return InputError(f'{self.path}: {self.place}"{key}" {what}; save the twin again')
+
+    def take(self, key: str, *kinds: type | None) -> Any:
+        if key not in self.values:
+            raise self.fail(key, "is missing")
+        value = self.values[key]
+        if value is None and None in kinds:
+            return None
+        if float in kinds and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if isinstance(value, bool) or not isinstance(value, tuple(kind for kind in kinds if kind)):
+            raise self.fail(key, f"is no {' or '.join(kind.__name__ for kind in kinds if kind)}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self.fail(key, "is not a finite number")
+        return value
+
+    def inner(self, key: str) -> _Reader:
+        return _Reader(self.path, self.take(key, dict), f'in "{key}": ')
+
+    def texts(self, key: str) -> list[str]:
+        values = self.take(key, list)
+        if not all(isinstance(value, str) for value in values):
+            raise self.fail(key, "holds something that is no text")
+        return list(values)
+
+    def rows(self, key: str, columns: dict[str, tuple[type | None, ...]]) -> list[dict[str, Any]]:
+        rows = [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
+        return [{name: row.take(name, *kinds) for name, kinds in columns.items()} for row in rows]
+
+
+def _robot(path: Path, reader: _Reader) -> Robot:
+    robot = parse_urdf(reader.take("urdf", str), source=f"{path}, URDF in it")
+    sheets = reader.inner("joints")
+    joints = []
+    for joint in robot.joints:
+        sheet = sheets.inner(joint.name)
+        joints.append(replace(joint, **{key: sheet.take(key, float, None) for key in _SHEET}))
+    return replace(
+        robot,
+        name=reader.take("name", str),
+        manufacturer=reader.take("manufacturer", str, None),
+        type=reader.take("type", str, None),
+        weight=reader.take("weight", float, None),
+        joints=tuple(joints),
+    )
+
+
+def _check_complete(path: Path, twin: Twin) -> None:
+    """Raise where an effect is unknown or one of its coefficients is missing."""
+    try:
+        stack = Stack(twin.robot, twin.effects)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    for effect, term in (*stack.torque_terms, *stack.power_terms):
+        try:
+            twin.value(effect.id, term)
+        except KeyError:
+            place = term.link or term.joint or "robot"
+            raise InputError(
+                f'{path}: parameter {term.name} of effect "{effect.id}" on {place} is missing; save the twin again'
+            ) from None
