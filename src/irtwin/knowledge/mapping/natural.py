@@ -38,7 +38,7 @@ _LEXICAL_SPACE = {
     DATE_TIME: re.compile(f"{_DATE}T{_TIME}{_ZONE}"),
     HEX_BINARY: re.compile(r"(?:[0-9a-fA-F]{2})*"),
 }
-_FRACTION = re.compile(r"\.?0+(?=$|Z|[+-]\d\d:)")
+_FRACTION = re.compile(r"\.(\d*?)0*(?!\d)")
 
 
 def is_lexical(lexical: str, datatype: NamedNode) -> bool:
@@ -105,7 +105,7 @@ def _temporal(datatype: NamedNode) -> Natural:
         if datatype is DATE_TIME:
             text = text.replace(" ", "T", 1)
         if "." in text:
-            text = _FRACTION.sub("", text)
+            text = _FRACTION.sub(lambda match: f".{match[1]}" if match[1] else "", text)
         if text.endswith("+00:00"):
             text = text.removesuffix("+00:00") + "Z"
         return (text, datatype) if is_lexical(text, datatype) else (str(value), STRING)

@@ -26,7 +26,7 @@ GraphName = NamedNode | DefaultGraph
 GraphMaker = Callable[[Row], Sequence[GraphName]]
 
 _RDF_TYPE = NamedNode("http://www.w3.org/1999/02/22-rdf-syntax-ns#type")
-_DEFAULT_GRAPH = NamedNode(str(RR.defaultGraph))
+_DEFAULT_GRAPH = NamedNode(f"{RR}defaultGraph")
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from pyoxigraph import Quad, RdfFormat, serialize
 from sqlalchemy import Connection, Engine
 
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping.document import read_document
 from irtwin.knowledge.mapping.plan import Statement, plan
+from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.mapping.source import read, snapshot_options
 from irtwin.storage import files
 from irtwin.storage.engine import open_engine

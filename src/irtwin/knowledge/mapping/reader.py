@@ -1,0 +1,283 @@
+"""R2RML mapping documents, read and checked (W3C R2RML, sections 4 to 9).
+
+Every fault is an InputError that names the file, the triples map and the term map.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NoReturn, TypeVar
+
+from pyoxigraph import BlankNode, Literal, NamedNode, RdfFormat, parse
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.document import (
+    RR,
+    Document,
+    Join,
+    LogicalTable,
+    Node,
+    PredicateObjectMap,
+    TermMap,
+    TermType,
+    TriplesMap,
+)
+from irtwin.knowledge.mapping.identifiers import parse_identifier, parse_table, parse_template
+
+_RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
+# BCP 47, as far as it is in use: no language of five letters or more is registered.
+_LANGUAGE = re.compile(r"[a-z]{2,3}(?:-[a-z0-9]{1,8})*|[xi](?:-[a-z0-9]{1,8})+", re.IGNORECASE)
+_SQL_VERSIONS = {
+    *("SQL2008", "Oracle", "MySQL", "MSSQLServer", "HSQLDB", "PostgreSQL", "DB2", "Informix", "Ingres"),
+    *("Progress", "SybaseASE", "SybaseSQLAnywhere", "Virtuoso", "Firebird"),
+}
+_Parsed = TypeVar("_Parsed")
+
+
+def read_document(path: Path) -> Document:
+    """Read and check a mapping document in Turtle."""
+    file_iri = path.resolve().as_uri()
+    try:
+        parser = parse(path.read_bytes(), RdfFormat.TURTLE, base_iri=file_iri)
+        graph = _Graph((quad.subject, quad.predicate, quad.object) for quad in parser)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except SyntaxError as error:
+        raise InputError(f"{path}: no valid Turtle: {error.msg}") from None
+    declared = None if parser.base_iri == file_iri else parser.base_iri
+    return Document(declared, _Reader(path, graph).triples_maps())
+
+
+class _Graph:
+    """The triples of a document, by subject and property."""
+
+    def __init__(self, triples: Iterable[tuple[Node, NamedNode, Node]]) -> None:
+        self.properties: dict[Node, dict[str, list[Node]]] = {}
+        for subject, predicate, value in triples:
+            values = self.properties.setdefault(subject, {}).setdefault(predicate.value, [])
+            if value not in values:
+                values.append(value)
+
+    def objects(self, node: Node, name: str) -> list[Node]:
+        """Return the values of a node's property rr:NAME, in a fixed order."""
+        return sorted(self.properties.get(node, {}).get(RR + name, []), key=str)
+
+    def names(self, node: Node) -> list[str]:
+        """Return the IRIs of a node's properties."""
+        return sorted(self.properties.get(node, {}))
+
+
+class _Reader:
+    """Reads one document; holds its graph, so that each fault can say where it is."""
+
+    def __init__(self, path: Path, graph: _Graph) -> None:
+        self.path = path
+        self.graph = graph
+
+    def triples_maps(self) -> dict[Node, TriplesMap]:
+        nodes: set[Node] = set()
+        for node, properties in self.graph.properties.items():
+            typed = NamedNode(f"{RR}TriplesMap") in properties.get(_RDF_TYPE, [])
+            if typed or any(RR + name in properties for name in ("logicalTable", "subjectMap", "subject")):
+                nodes.add(node)
+            nodes.update(self.graph.objects(node, "parentTriplesMap"))
+        if not nodes:
+            raise InputError(f"{self.path}: no rr:TriplesMap in it")
+        return {node: self.triples_map(node) for node in sorted(nodes, key=str)}
+
+    def triples_map(self, node: Node) -> TriplesMap:
+        where = f"{self.path}: {_label(node)}"
+        self.only(node, where, "logicalTable subjectMap subject predicateObjectMap")
+        subject_node, subject = self.subject(node, where)
+        return TriplesMap(
+            where=where,
+            table=self.logical_table(node, where),
+            subject=subject,
+            classes=self.classes(subject_node, where),
+            graphs=self.graphs(subject_node, where),
+            properties=tuple(
+                self.predicate_object_map(item, where) for item in self.graph.objects(node, "predicateObjectMap")
+            ),
+        )
+
+    def logical_table(self, node: Node, where: str) -> LogicalTable:
+        table = self.one(node, "logicalTable", where)
+        where = f"{where}, logical table"
+        self.only(table, where, "tableName sqlQuery sqlVersion")
+        for version in self.graph.objects(table, "sqlVersion"):
+            if version.value.removeprefix(RR) not in _SQL_VERSIONS:
+                self.fault(where, f"{_label(version)} is no SQL version identifier; take rr:SQL2008 or leave it out")
+        name, query = self.text(table, "tableName", where), self.text(table, "sqlQuery", where)
+        if (name is None) is (query is None):
+            self.fault(where, "give either rr:tableName or rr:sqlQuery")
+        if name is not None:
+            return LogicalTable(where, table=self.parsed(parse_table, name, where))
+        return LogicalTable(where, query=query)
+
+    def subject(self, node: Node, where: str) -> tuple[Node | None, TermMap]:
+        """Return the subject map's node (None for the shortcut rr:subject) and the map."""
+        maps = self.maps(node, "subject", where)
+        if len(maps) != 1:
+            self.fault(where, f"has {len(maps)} subject maps; give one rr:subjectMap or rr:subject")
+        kind, item = maps[0]
+        where = f"{where}, subject map"
+        if kind == "constant":
+            return None, self.constant(item, where, TermType.IRI)
+        allowed = (TermType.IRI, TermType.BLANK_NODE)
+        return item, self.term_map(item, where, allowed, extra="class graph graphMap")
+
+    def classes(self, node: Node | None, where: str) -> tuple[NamedNode, ...]:
+        found = [] if node is None else self.graph.objects(node, "class")
+        return tuple(self.iri(item, f"{where}, rr:class") for item in found)
+
+    def graphs(self, node: Node | None, where: str) -> tuple[TermMap, ...]:
+        where = f"{where}, graph map"
+        found = [] if node is None else self.maps(node, "graph", where)
+        return tuple(self.shortcut_or_map(kind, item, where) for kind, item in found)
+
+    def predicate_object_map(self, node: Node, where: str) -> PredicateObjectMap:
+        allowed = "predicate predicateMap object objectMap graph graphMap"
+        self.only(node, f"{where}, predicate-object map", allowed)
+        predicates = self.maps(node, "predicate", where)
+        objects = self.maps(node, "object", where)
+        name = next((_label(item) for kind, item in predicates if kind == "constant"), _label(node))
+        if not predicates or not objects:
+            self.fault(where, f"predicate-object map {name} needs a predicate and an object")
+        return PredicateObjectMap(
+            predicates=tuple(
+                self.shortcut_or_map(kind, item, f"{where}, predicate map of {name}") for kind, item in predicates
+            ),
+            objects=tuple(self.object_map(kind, item, f"{where}, object map of {name}") for kind, item in objects),
+            graphs=self.graphs(node, f"{where}, {name}"),
+        )
+
+    def object_map(self, kind: str, node: Node, where: str) -> TermMap | Join:
+        if kind == "constant":
+            return self.constant(node, where)
+        if self.graph.objects(node, "parentTriplesMap"):
+            return self.join(node, where)
+        return self.term_map(node, where, tuple(TermType), extra="datatype language")
+
+    def shortcut_or_map(self, kind: str, node: Node, where: str) -> TermMap:
+        if kind == "constant":
+            return self.constant(node, where, TermType.IRI)
+        return self.term_map(node, where, (TermType.IRI,))
+
+    def join(self, node: Node, where: str) -> Join:
+        self.only(node, where, "parentTriplesMap joinCondition")
+        conditions = []
+        for item in self.graph.objects(node, "joinCondition"):
+            self.only(item, where, "child parent")
+            sides = [self.text(item, side, where) for side in ("child", "parent")]
+            if sides[0] is None or sides[1] is None:
+                self.fault(where, "a join condition needs rr:child and rr:parent")
+            conditions.append(
+                (self.parsed(parse_identifier, sides[0], where), self.parsed(parse_identifier, sides[1], where))
+            )
+        return Join(where, self.one(node, "parentTriplesMap", where), tuple(conditions))
+
+    def term_map(self, node: Node, where: str, allowed: tuple[TermType, ...], extra: str = "") -> TermMap:
+        self.only(node, where, f"constant column template termType inverseExpression {extra}")
+        constants = self.graph.objects(node, "constant")
+        column, template = self.text(node, "column", where), self.text(node, "template", where)
+        if len(constants) + (column is not None) + (template is not None) != 1:
+            self.fault(where, "give just one of rr:constant, rr:column and rr:template")
+        if constants:
+            return self.constant(constants[0], where, None if TermType.LITERAL in allowed else TermType.IRI)
+        language, datatype = self.language(node, where), self.datatype(node, where)
+        term_type = self.term_type(node, where, allowed, literal=bool(column or language or datatype))
+        if term_type is not TermType.LITERAL and (language or datatype):
+            self.fault(where, "rr:language and rr:datatype are for literals only")
+        if language and datatype:
+            self.fault(where, "give rr:language or rr:datatype, not both")
+        return TermMap(
+            where=where,
+            term_type=term_type,
+            column=None if column is None else self.parsed(parse_identifier, column, where),
+            template=() if template is None else self.parsed(parse_template, template, where),
+            datatype=datatype,
+            language=language,
+        )
+
+    def term_type(self, node: Node, where: str, allowed: tuple[TermType, ...], literal: bool) -> TermType:
+        found = self.optional(node, "termType", where)
+        if found is None:
+            return TermType.LITERAL if literal and TermType.LITERAL in allowed else TermType.IRI
+        for kind in allowed:
+            if found == NamedNode(RR + kind.value):
+                return kind
+        names = ", ".join(f"rr:{kind.value}" for kind in allowed)
+        self.fault(where, f"term type {_label(found)} is not allowed here; take one of {names}")
+
+    def language(self, node: Node, where: str) -> str | None:
+        tag = self.text(node, "language", where)
+        if tag is not None and not _LANGUAGE.fullmatch(tag):
+            self.fault(where, f"{tag!r} is no language tag; write one like en or en-GB")
+        return tag
+
+    def datatype(self, node: Node, where: str) -> NamedNode | None:
+        found = self.optional(node, "datatype", where)
+        return None if found is None else self.iri(found, f"{where}, rr:datatype")
+
+    def constant(self, node: Node, where: str, required: TermType | None = None) -> TermMap:
+        if isinstance(node, NamedNode):
+            return TermMap(where, TermType.IRI, constant=node)
+        if required is not None or not isinstance(node, Literal):
+            self.fault(where, f"the constant {_label(node)} must be an IRI{'' if required else ' or a literal'}")
+        return TermMap(where, TermType.LITERAL, constant=node)
+
+    def maps(self, node: Node, name: str, where: str) -> list[tuple[str, Node]]:
+        """Return the term maps given by rr:NAMEMap and by the shortcut rr:NAME, with which of them it is."""
+        shortcuts = [("constant", item) for item in self.graph.objects(node, name)]
+        return shortcuts + [("map", item) for item in self.graph.objects(node, f"{name}Map")]
+
+    def only(self, node: Node, where: str, allowed: str) -> None:
+        """Refuse R2RML properties that do not belong here: misspelt ones would be silently ignored."""
+        for predicate in self.graph.names(node):
+            if predicate.startswith(RR) and predicate.removeprefix(RR) not in allowed.split():
+                name = _label(NamedNode(predicate))
+                self.fault(where, f"{name} does not belong here; allowed are {', '.join(allowed.split())}")
+
+    def one(self, node: Node, name: str, where: str) -> Node:
+        found = self.optional(node, name, where)
+        if found is None:
+            self.fault(where, f"rr:{name} is missing")
+        return found
+
+    def optional(self, node: Node, name: str, where: str) -> Node | None:
+        found = self.graph.objects(node, name)
+        if len(found) > 1:
+            self.fault(where, f"{len(found)} values of rr:{name}; give one")
+        return found[0] if found else None
+
+    def text(self, node: Node, name: str, where: str) -> str | None:
+        found = self.optional(node, name, where)
+        if found is not None and not isinstance(found, Literal):
+            self.fault(where, f"rr:{name} must be a string")
+        return None if found is None else found.value
+
+    def iri(self, node: Node, where: str) -> NamedNode:
+        if not isinstance(node, NamedNode):
+            self.fault(where, f"{_label(node)} must be an IRI")
+        return node
+
+    def parsed(self, parse: Callable[[str], _Parsed], text: str, where: str) -> _Parsed:
+        try:
+            return parse(text)
+        except ValueError as error:
+            self.fault(where, str(error))
+
+    def fault(self, where: str, message: str) -> NoReturn:
+        raise InputError(f"{where}: {message}")
+
+
+def _label(node: Node) -> str:
+    if isinstance(node, BlankNode):
+        return "[...]"
+    if isinstance(node, Literal):
+        return repr(node.value)
+    if node.value.startswith(RR):
+        return f"rr:{node.value.removeprefix(RR)}"
+    return f"<{re.split('[/#]', node.value)[-1] or node.value}>"
