@@ -16,7 +16,8 @@ from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 _FORMAT, _VERSION = "irtwin twin", 1
 _SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
-_PARAMETER = {
+_Columns = dict[str, tuple[type | None, ...]]
+_PARAMETER: _Columns = {
     "effect": (str,),
     "joint": (str, None),
     "link": (str, None),
@@ -26,11 +27,34 @@ _PARAMETER = {
     "lower": (float, None),
     "upper": (float, None),
 }
-_BASE_PARAMETER = {"name": (str,), "value": (float,), "unit": (str,), "lower": (float,), "upper": (float,)}
+_BASE_PARAMETER: _Columns = {
+    "name": (str,),
+    "value": (float,),
+    "unit": (str,),
+    "lower": (float,),
+    "upper": (float,),
+}
 
 
 def save(twin: Twin, path: Path) -> None:
     """Write a twin, whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(to_json(twin), encoding="utf-8")
+    partial.replace(path)
+
+
+def load(path: Path) -> Twin:
+    """Read a twin. Raises InputError, naming file and key, where the file is none."""
+    try:
+        return from_json(path.read_text(encoding="utf-8"), path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name a twin that irtwin saved") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text; name a twin that irtwin saved") from error
+
+
+def to_json(twin: Twin) -> str:
+    """Return a twin as JSON text: the same twin, the same text."""
     robot = twin.robot
     document = {
         "format": _FORMAT,
@@ -51,17 +75,13 @@ def save(twin: Twin, path: Path) -> None:
         "parameters": [asdict(parameter) for parameter in twin.parameters],
         "base_parameters": [asdict(parameter) for parameter in twin.base_parameters],
     }
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    partial.replace(path)
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
-def load(path: Path) -> Twin:
-    """Read a twin. Raises InputError, naming file and key, where the file is none."""
+def from_json(text: str, path: Path) -> Twin:
+    """Return the twin of JSON text; `path` is where it stood. Raises InputError, naming file and key."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); name a twin that irtwin saved") from error
+        document = json.loads(text)
     except ValueError as error:
         raise InputError(f"{path}: not JSON ({error}); name a twin that irtwin saved") from error
     reader = _Reader(path, document, "")
@@ -119,7 +139,7 @@ class _Reader:
             raise self.fail(key, "holds something that is no text")
         return list(values)
 
-    def rows(self, key: str, columns: dict[str, tuple[type | None, ...]]) -> list[dict[str, Any]]:
+    def rows(self, key: str, columns: _Columns) -> list[dict[str, Any]]:
         rows = [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
         return [{name: row.take(name, *kinds) for name, kinds in columns.items()} for row in rows]
 

@@ -81,6 +81,13 @@ class Twin:
         """Return the real torque in the joints, (N, n) N m (Yan 2018, eqs. 1 to 3)."""
         return np.concatenate([self._joint_torque(piece) for piece in motion.pieces(_PIECE)])
 
+    def measured_torque(self, motion: Motion) -> np.ndarray | None:
+        """Return the torque that was measured, (N, n) N m; else current times torque constant where both are known."""
+        constants = [joint.torque_constant for joint in self.robot.joints]
+        if motion.torque is not None or motion.current is None or None in constants:
+            return motion.torque
+        return np.asarray(motion.current * np.array(constants, dtype=float))
+
     def power(self, motion: Motion) -> np.ndarray:
         """Return the electrical power, (N,) W (Yan 2018, eqs. 7, 8). Without an effect of power: zero."""
         columns = self.stack.power_columns(motion, self.joint_torque(motion))

@@ -43,7 +43,8 @@ def _judge(twin: Twin, motion: Motion) -> RunFit:
     power = twin.power(motion)
     modelled = energy(motion.time, power)
     measured = None if motion.power is None else energy(motion.time, motion.power)
-    torque = None if motion.torque is None else _pair(motion, motion.torque, twin.torque(motion))
+    shown = twin.measured_torque(motion)
+    torque = None if shown is None else _pair(motion, shown, twin.torque(motion))
     watts = None if motion.power is None else _pair(motion, motion.power, power)
     return RunFit(
         run=motion.run,
