@@ -122,6 +122,7 @@ def run_energy(twin_id: str) -> list[Base]:
             twin_id=twin_id,
             part="fit",
             energy_consumption_j=100.5,
+            energy_from="measured",
             run_power_w=100.5,
             peak_power_w=101.0,
             measured_energy_j=100.5,

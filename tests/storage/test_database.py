@@ -5,10 +5,10 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
-import rows
 from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
 
+import rows
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Activity, ActivityUse, Base, Run, RunEnergy, RunState, Series, Twin
