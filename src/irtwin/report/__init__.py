@@ -1,1 +1,1 @@
-"""HTML reports from queries."""
+"""Pages that open offline, every number of which answers a question put to the graph."""

@@ -1,0 +1,161 @@
+"use strict";
+// Draws the page's figures from the data that it carries. Nothing is fetched.
+(function () {
+  const page = JSON.parse(document.getElementById("page-data").textContent);
+  const INK = "#1c2733", SOFT = "#56636f", LINE = "#e3e8ec";
+  const MEASURED = "#5f6d7a", MODELLED = "#d55e00", HELD_OUT = "#0072b2";
+  const FONT = getComputedStyle(document.body).fontFamily;
+  const PAPER_WIDTH = 680; // CSS pixels between the margins of an A4 page
+  const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+
+  function base(extra) {
+    const axis = { gridcolor: LINE, zerolinecolor: "#9aa5af", linecolor: "#9aa5af", automargin: true, title: { standoff: 8 } };
+    const layout = {
+      font: { family: FONT, size: 12, color: INK }, paper_bgcolor: "#fff", plot_bgcolor: "#fff",
+      margin: { l: 56, r: 12, t: 30, b: 40 }, hovermode: "x unified",
+      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", xanchor: "left", font: { color: SOFT } },
+    };
+    Object.assign(layout, extra);
+    layout.xaxis = Object.assign({ type: "category" }, axis, { gridcolor: "#fff" }, extra.xaxis);
+    layout.yaxis = Object.assign({}, axis, extra.yaxis);
+    return layout;
+  }
+
+  function values(packed) {
+    const text = atob(packed.data), count = text.length / 2, result = new Array(count);
+    for (let i = 0; i < count; i++) {
+      const raw = text.charCodeAt(2 * i) | (text.charCodeAt(2 * i + 1) << 8);
+      const level = raw > 32767 ? raw - 65536 : raw;
+      result[i] = level === -32768 ? null : packed.offset + packed.scale * level;
+    }
+    return result;
+  }
+
+  function curves(chart, unit, suffix, legend) {
+    const x = values(chart.time), traces = [];
+    const add = (name, packed, colour, width) => traces.push({
+      type: "scatter", mode: "lines", name: name, x: x, y: values(packed), line: { color: colour, width: width },
+      xaxis: "x" + suffix, yaxis: "y" + suffix, legendgroup: name, showlegend: legend,
+      hovertemplate: name + ": %{y:.4~g} " + unit + "<extra></extra>",
+    });
+    if (chart.measured) add("measured", chart.measured, MEASURED, 1.5);
+    add("modelled", chart.modelled, MODELLED, 1.5);
+    return traces;
+  }
+
+  // Panels in a grid, one time axis for all: zooming one zooms them together.
+  function panels(charts, heldOut, columns, rowHeight) {
+    const rows = Math.ceil(charts.length / columns), height = rows * rowHeight + 70;
+    const gapX = 0.075, gapY = 46 / height, width = (1 - gapX * (columns - 1)) / columns;
+    const panelHeight = (1 - gapY * (rows - 1)) / rows;
+    const layout = base({ height: height, hovermode: "x", shapes: [], annotations: [], margin: { l: 58, r: 12, t: 46, b: 44 } });
+    layout.legend.y = 1 + 26 / (height - 90);
+    delete layout.xaxis; delete layout.yaxis;
+    const data = [];
+    charts.forEach(function (chart, index) {
+      const column = index % columns, row = Math.floor(index / columns), suffix = index === 0 ? "" : String(index + 1);
+      const left = column * (width + gapX), top = 1 - row * (panelHeight + gapY);
+      const last = index + columns >= charts.length;
+      layout["xaxis" + suffix] = {
+        domain: [left, left + width], anchor: "y" + suffix, matches: index ? "x" : undefined, gridcolor: LINE, zeroline: false,
+        showticklabels: last, title: last ? { text: "time since the run began, s", font: { size: 11, color: SOFT }, standoff: 6 } : undefined,
+      };
+      layout["yaxis" + suffix] = {
+        domain: [top - panelHeight, top], anchor: "x" + suffix, gridcolor: LINE, zerolinecolor: "#b4bec6", nticks: 5, fixedrange: false,
+      };
+      layout.annotations.push({
+        text: "<b>" + plain(chart.title) + "</b>, " + chart.unit, x: left, xref: "paper", xanchor: "left", y: top, yref: "paper", yanchor: "bottom",
+        showarrow: false, font: { size: 12, color: INK },
+      });
+      heldOut.forEach((span) => layout.shapes.push({
+        type: "rect", xref: "x" + suffix, yref: "y" + suffix + " domain", x0: span[0], x1: span[1], y0: 0, y1: 1,
+        fillcolor: HELD_OUT, opacity: 0.07, line: { width: 0 }, layer: "below",
+      }));
+      data.push.apply(data, curves(chart, chart.unit, suffix, index === 0));
+    });
+    return { data: data, layout: layout };
+  }
+
+  function plain(text) {
+    return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  }
+
+  const PARTS = { held_out: "held out: no sample of it was fitted", both: "fitted in part, the rest held out", fit: "took part in the fit" };
+
+  function drawRun(index) {
+    const run = page.explorer.runs[index];
+    document.getElementById("run-part").textContent = PARTS[run.part] || "";
+    const torque = document.getElementById("figure-torque"), power = document.getElementById("figure-power");
+    if (torque) {
+      const charts = run.torque.map((chart) => Object.assign({ unit: "N m" }, chart));
+      const figure = panels(charts, run.held_out, torque.clientWidth < 620 ? 1 : 2, 150);
+      Plotly.react(torque, figure.data, figure.layout, CONFIG);
+    }
+    if (power) {
+      const charts = [[run.power, "W"], [run.energy, "J"]].filter((pair) => pair[0]);
+      const figure = panels(charts.map((pair) => Object.assign({ unit: pair[1] }, pair[0])), run.held_out, 1, 190);
+      Plotly.react(power, figure.data, figure.layout, CONFIG);
+    }
+  }
+
+  // Torque and power share their time axis across the two figures.
+  function link(first, second) {
+    if (!first || !second) return;
+    let busy = false;
+    const follow = (from, to) => from.on("plotly_relayout", function (change) {
+      const update = {};
+      for (const key of Object.keys(change)) {
+        const axis = key.match(/^xaxis\d*\.(range\[[01]\]|autorange)$/);
+        if (axis) update["xaxis." + axis[1]] = change[key];
+      }
+      if (busy || !Object.keys(update).length) return;
+      busy = true;
+      Plotly.relayout(to, update).then(() => { busy = false; });
+    });
+    follow(first, second);
+    follow(second, first);
+  }
+
+  function drawAll() {
+    for (const holder of document.querySelectorAll("[data-figure]")) {
+      const figure = page.figures[holder.dataset.figure];
+      const several = figure.data.length > 1, bars = new Set(figure.data.flatMap((trace) => trace.x)).size;
+      const layout = base(Object.assign({ showlegend: several, bargap: Math.max(0.3, 1 - 0.14 * bars) }, figure.layout));
+      if (!several) layout.margin.t = 8;
+      Plotly.newPlot(holder, figure.data, layout, CONFIG);
+    }
+    if (!page.explorer) return;
+    const choice = document.getElementById("run-choice");
+    drawRun(Number(choice.value));
+    choice.addEventListener("change", () => drawRun(Number(choice.value)));
+    link(document.getElementById("figure-torque"), document.getElementById("figure-power"));
+  }
+
+  // On paper a chart is as wide as the page, and closed tables stand open.
+  function forPaper(yes) {
+    for (const long of document.querySelectorAll("details.long")) {
+      if (yes) { long.dataset.was = long.open; long.open = true; } else long.open = long.dataset.was === "true";
+    }
+    for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+      Plotly.relayout(plot, yes ? { width: PAPER_WIDTH } : { width: null, autosize: true });
+    }
+  }
+
+  function followSections() {
+    const links = new Map([...document.querySelectorAll(".sections a")].map((a) => [a.hash.slice(1), a]));
+    const mark = new IntersectionObserver(function (entries) {
+      for (const entry of entries) {
+        if (!entry.isIntersecting) continue;
+        links.forEach((a) => a.removeAttribute("aria-current"));
+        const link = links.get(entry.target.id);
+        if (link) link.setAttribute("aria-current", "true");
+      }
+    }, { rootMargin: "-20% 0px -70% 0px" });
+    document.querySelectorAll("main > section, main > header").forEach((section) => mark.observe(section));
+  }
+
+  drawAll();
+  followSections();
+  window.addEventListener("beforeprint", () => forPaper(true));
+  window.addEventListener("afterprint", () => forPaper(false));
+})();

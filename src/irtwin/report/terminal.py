@@ -1,0 +1,36 @@
+"""Answers as tables in the terminal."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from irtwin.knowledge import graph
+
+
+def show(answer: graph.Table) -> None:
+    """Print an answer as a table, numbers to the right."""
+    table = Table(header_style="bold")
+    for column in answer.columns:
+        numbers = any(isinstance(row[column], int | float) for row in answer)
+        table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
+    for row in answer:
+        table.add_row(*(Text(_text(row[column])) for column in answer.columns))
+    console = Console()
+    # a pipe has no width: give it what the table needs, so that nothing is folded
+    console.print(table, width=None if console.is_terminal else 10_000, no_wrap=not console.is_terminal)
+    console.print(f"{len(answer)} row{'' if len(answer) == 1 else 's'}", style="dim", highlight=False)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, datetime):
+        return value.isoformat(sep=" ", timespec="seconds")
+    return str(value)

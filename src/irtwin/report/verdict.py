@@ -1,0 +1,67 @@
+"""What the page says first: the robot's twin judged in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from irtwin.report import wording
+from irtwin.report.questions import Answers, Row
+
+SEED_ENERGY_ERROR = 6.54  # %, Yan 2018, equation (15)
+
+# A twin is judged on data that it never saw; failing that, on what there is, and the page says so.
+_TORQUE_PARTS = (("held_out", "on data it never saw"), ("fit", "on the data it was fitted to"))
+_ENERGY_PARTS = (
+    ("held_out", "of runs it never saw"),
+    ("both", "of runs of which it saw a part"),
+    ("fit", "of the runs it was fitted to"),
+)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A summary row, and in words the data it was judged on; `held_out` where no sample of them was fitted."""
+
+    row: Row
+    on: str
+    held_out: bool
+
+
+def torque(answers: Answers) -> Judged | None:
+    """Return how well the twin explains joint torque, None where no torque was measured."""
+    return _best(answers["torque_verdict"].rows, _TORQUE_PARTS)
+
+
+def energy(answers: Answers) -> Judged | None:
+    """Return how well the twin gives energy, None where no power was measured."""
+    return _best(answers["energy_verdict"].rows, _ENERGY_PARTS)
+
+
+def sentence(answers: Answers) -> str:
+    """Return the verdict in plain words."""
+    if answers["twin"].first is None:
+        return "No twin of this robot has been identified yet: this page shows what was recorded."
+    explained, missed = torque(answers), energy(answers)
+    if explained and missed:
+        return f"The twin {_explains(explained)} and {_misses(missed)}."
+    if explained:
+        return f"The twin {_explains(explained)}. No electrical power was measured, so its energy is not checked."
+    if missed:
+        return f"The twin {_misses(missed)}. No joint torque was measured, so its torque is not checked."
+    return "The twin was identified, but nothing that was measured can check it."
+
+
+def _explains(judged: Judged) -> str:
+    return f"explains {wording.share(judged.row['r_squared'])} of joint-torque variance {judged.on}"
+
+
+def _misses(judged: Judged) -> str:
+    error = wording.percent(judged.row["error_percent"])
+    seed = wording.percent(SEED_ENERGY_ERROR, 3)
+    return f"misses the energy {judged.on} by {error}; the seed paper (Yan et al., 2018) reached {seed}"
+
+
+def _best(rows: Sequence[Row], parts: Sequence[tuple[str, str]]) -> Judged | None:
+    by_part = {row["part"]: row for row in rows}
+    return next((Judged(by_part[part], on, part == "held_out") for part, on in parts if part in by_part), None)

@@ -1,0 +1,148 @@
+"""How numbers, units and names are put on a page."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import Any
+
+NONE = "–"  # stands where nobody said
+_SPACE = "\N{NO-BREAK SPACE}"  # between a number and its unit
+_THIN = "\N{NARROW NO-BREAK SPACE}"  # between thousands
+_MINUS = "\N{MINUS SIGN}"
+_POWER = re.compile(r"\^(-?\d+)")
+_ENERGY_UNITS = ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"))
+
+
+def number(value: float | int | None, digits: int = 3) -> str:
+    """Write a number with so many significant digits: 12 345.6 -> "12 346", 1e-7 -> "1.00 × 10⁻⁷"."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(float(f"{abs(value):.{digits - 1}e}")))
+    if not -4 <= exponent < 7:
+        mantissa = f"{value / 10.0**exponent:.{digits - 1}f}"
+        return f"{mantissa}{_SPACE}×{_SPACE}10{_superscript(exponent)}".replace("-", _MINUS)
+    return fixed(value, max(digits - 1 - exponent, 0))
+
+
+def fixed(value: float, decimals: int = 0) -> str:
+    """Write a number with so many decimals: 12345.6 -> "12 346"."""
+    return f"{value:,.{decimals}f}".replace(",", _THIN).replace("-", _MINUS)
+
+
+def given(value: float | None, unit: str = "") -> str:
+    """Write a number that somebody gave, not one that was measured: all its digits and no more."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    text = f"{value:,.6g}" if abs(value) < 1e6 else f"{value:.6g}"
+    return f"{text}{_SPACE}{unit}".rstrip().replace(",", _THIN).replace("-", _MINUS)
+
+
+def quantity(value: float | None, unit: str, digits: int = 3) -> str:
+    """Write a number and its unit."""
+    return NONE if value is None else f"{number(value, digits)}{_SPACE}{unit}"
+
+
+def percent(value: float | None, digits: int = 2) -> str:
+    """Write a value that is already in per cent."""
+    return quantity(value, "%", digits)
+
+
+def share(value: float | None) -> str:
+    """Write a share of 0 to 1 in per cent, without claiming 100 % short of it."""
+    if value is None:
+        return NONE
+    hundredths = 100.0 * value
+    return quantity(hundredths, "%", 3 if 99.0 < hundredths < 99.95 else 2)
+
+
+def energy_unit(values: Iterable[float | None]) -> tuple[float, str]:
+    """Return the divisor and the unit in which energies (J) of one table or figure are written."""
+    largest = max((abs(value) for value in values if value is not None), default=0.0)
+    return next(((size, unit) for size, unit in _ENERGY_UNITS if largest >= size), (1.0, "J"))
+
+
+def energy(value: float | None, digits: int = 3) -> str:
+    """Write an energy (J) in the unit that suits it."""
+    size, unit = energy_unit([value])
+    return NONE if value is None else quantity(value / size, unit, digits)
+
+
+def duration(seconds: float | None) -> str:
+    """Write a time span: "35.0 s", "12 min 5 s", "2 h 3 min"."""
+    if seconds is None:
+        return NONE
+    if seconds < 120:
+        return quantity(seconds, "s")
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 120:
+        return f"{minutes}{_SPACE}min {rest}{_SPACE}s"
+    return f"{minutes // 60}{_SPACE}h {minutes % 60}{_SPACE}min"
+
+
+def angle(radians: float | None, kind: str | None) -> str:
+    """Write a joint's position: degrees, or millimetres where it is prismatic."""
+    if radians is None or not math.isfinite(radians):
+        return NONE
+    if kind == "prismatic":
+        return given(round(radians * 1000, 1), "mm")
+    return f"{given(round(math.degrees(radians), 1))}°"
+
+
+def angular_speed(speed: float | None, kind: str | None) -> str:
+    """Write a joint's speed: degrees a second, or millimetres a second where it is prismatic."""
+    text = angle(speed, kind)
+    return text if text == NONE else f"{text}/s"
+
+
+def unit_symbol(unit: str | None) -> str:
+    """Write a unit's symbol as it is printed: "kg m^2" -> "kg m²", "1" for a number without unit -> ""."""
+    if unit is None or unit == "1":
+        return ""
+    return _POWER.sub(lambda power: _superscript(int(power[1])), unit)
+
+
+def moment(time: datetime | None) -> str:
+    """Write a point in time to the minute; it is UTC's."""
+    if time is None:
+        return NONE
+    aware = time if time.tzinfo else time.replace(tzinfo=UTC)
+    return f"{aware.astimezone(UTC):%Y-%m-%d %H:%M}"
+
+
+def local_name(iri: str) -> str:
+    """Return the end of an IRI: ".../effect/coulomb_friction" -> "coulomb_friction"."""
+    return iri.rstrip("/#").rsplit("/", 1)[-1].rsplit("#", 1)[-1]
+
+
+def short_checksum(checksum: str | None) -> str:
+    """Return the start of a checksum, enough to compare by eye."""
+    return NONE if checksum is None else checksum.removeprefix("sha256:")[:12]
+
+
+def notes(text: str | None) -> dict[str, str]:
+    """Return the notes of a data set, a JSON object, as name and text."""
+    if not text:
+        return {}
+    read: Any = json.loads(text)
+    return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in read.items()}
+
+
+def interval(value: float, lower: float, upper: float) -> tuple[str, str]:
+    """Write a value and its interval with as many decimals as the interval's width makes sensible."""
+    half = (upper - lower) / 2
+    if not (math.isfinite(half) and half > 0):
+        return number(value), f"{number(lower)} … {number(upper)}"
+    decimals = max(1 - math.floor(math.log10(float(f"{half:.1e}"))), 0)
+    if decimals > 6:
+        return number(value), f"{number(lower)} … {number(upper)}"
+    return fixed(value, decimals), f"{fixed(lower, decimals)} … {fixed(upper, decimals)}"
+
+
+def _superscript(exponent: int) -> str:
+    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

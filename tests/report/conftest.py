@@ -1,0 +1,30 @@
+"""A graph with robots, and pages made of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from robots import Factory, PageOf
+
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.report.render import render
+
+
+@pytest.fixture
+def graph() -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    return graph
+
+
+@pytest.fixture
+def page_of(graph: KnowledgeGraph, tmp_path: Path) -> PageOf:
+    """Return a function that renders the page of a robot in the graph, as text."""
+
+    def page(factory: Factory) -> str:
+        out = tmp_path / "reports" / f"{factory.robot_id}.html"
+        render(graph, factory.iri, factory.read_series, out)
+        return out.read_text(encoding="utf-8")
+
+    return page

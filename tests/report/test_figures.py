@@ -1,0 +1,67 @@
+import json
+
+import pytest
+from robots import Factory, answers, power_only, six_axis
+
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.report.figures import figures, plain
+
+
+def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):
+    figure = figures(answers(graph, six_axis(graph)))["energy_per_run"]
+    assert figure
+    measured, modelled = figure["data"]
+    assert len(measured["x"]) == len(modelled["x"]) == 6
+    assert modelled["y"] == [9.0] * 6  # kJ
+    assert figure["layout"]["yaxis"]["title"]["text"] == "energy, kJ"
+
+
+def test_energy_error_tells_held_out_runs_from_fitted_ones_and_shows_the_seed(graph: KnowledgeGraph):
+    figure = figures(answers(graph, six_axis(graph)))["energy_error"]
+    assert figure
+    held_out, fitted = figure["data"]
+    assert sorted(held_out["y"]) == [2.0, 3.0]
+    assert sorted(fitted["y"]) == [2.0, 3.0, 4.0, 5.0]
+    assert [line["y0"] for line in figure["layout"]["shapes"]] == [6.54]
+
+
+def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(graph: KnowledgeGraph):
+    drawn = figures(answers(graph, six_axis(graph)))
+    total = 6 * 9.0
+    for name in ("energy_per_effect", "energy_per_joint_and_effect"):
+        figure = drawn[name]
+        assert figure
+        assert sum(sum(trace["y"]) for trace in figure["data"]) == pytest.approx(total)
+    by_joint = drawn["energy_per_joint"]
+    assert by_joint and len(by_joint["data"]) == 6
+    assert sum(sum(trace["y"]) for trace in by_joint["data"]) == pytest.approx(6 * 6.0, rel=1e-4)
+
+
+def test_effects_are_named_by_the_ontology_and_keep_their_colour(graph: KnowledgeGraph):
+    drawn = figures(answers(graph, six_axis(graph)))
+    colours = [
+        {trace["name"]: trace["marker"]["color"] for trace in drawn[name]["data"]}  # type: ignore[index]
+        for name in ("energy_per_effect", "energy_per_joint_and_effect")
+    ]
+    assert colours[0] == colours[1]
+    assert "Coulomb friction" in colours[0]
+    assert drawn["energy_per_joint_and_effect"]["layout"]["xaxis"]["categoryarray"][-1] == "whole robot"  # type: ignore[index]
+
+
+def test_without_power_there_is_no_error_and_no_measured_bar(graph: KnowledgeGraph):
+    factory = Factory("TX40", "TX40", power=False).robot().run("a").twin([], [], both=["a"]).into(graph)
+    drawn = figures(answers(graph, factory))
+    assert drawn["energy_error"] is None
+    assert [trace["name"] for trace in drawn["energy_per_run"]["data"]] == ["modelled by the twin"]  # type: ignore[index]
+
+
+def test_one_day_is_no_figure_and_no_twin_is_none_at_all(graph: KnowledgeGraph):
+    assert figures(answers(graph, power_only(graph)))["energy_per_day"] is None
+    bare = Factory("NEW", "NEW").robot().run("a").into(graph)
+    assert set(figures(answers(graph, bare, twin=False)).values()) == {None}
+
+
+def test_names_are_text_to_plotly(graph: KnowledgeGraph):
+    assert plain("<b>&") == "&lt;b&gt;&amp;"
+    factory = Factory("ODD", "ODD", joint_name="<img src=x{}>").robot().run("a").twin(["a"], []).into(graph)
+    assert "<img" not in json.dumps(figures(answers(graph, factory)))

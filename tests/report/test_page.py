@@ -1,0 +1,134 @@
+"""The page in a real browser, without network."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from robots import power_only, six_axis
+
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.report.render import render
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+playwright = pytest.importorskip("playwright.sync_api")
+pytestmark = [pytest.mark.system, pytest.mark.skipif(not CHROMIUM, reason="no Chromium on this machine")]
+
+Page = playwright.Page
+SCENE = """<div id="stub" style="height: 200px"></div>
+<script>document.getElementById("stub").dataset.ran = "yes";</script>"""
+FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    six = six_axis(graph, runs=16)
+    out = tmp_path_factory.mktemp("page") / "robot.html"
+    render(graph, six.iri, six.read_series, out, draw_scene=lambda columns: SCENE)
+    return out
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[playwright.Browser]:
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser: playwright.Browser, file: Path) -> Iterator[Page]:
+    """Open the page, and let no complaint of the browser pass."""
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True)
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: complaints.append(request.url) if "robot.html" not in request.url else None)
+    page.goto(file.as_uri())
+    page.wait_for_selector("#figure-energy_per_joint .bars path")
+    yield page
+    context.close()
+    assert [text for text in complaints if not text.startswith(("data:", "blob:"))] == []
+
+
+def time_range(page: Page, figure: str) -> list[float]:
+    found: list[float] = page.evaluate(f"document.getElementById('{figure}')._fullLayout.xaxis.range")
+    return found
+
+
+def test_every_figure_is_drawn(page: Page):
+    for plot in page.locator(".plot").all():
+        assert plot.locator(".plot-container").count() == 1
+    assert page.locator("#figure-torque .scatterlayer .trace").count() == 12
+    assert page.locator("#figure-power .scatterlayer .trace").count() == 4
+
+
+def test_the_file_is_small(file: Path):
+    assert file.stat().st_size < 8e6
+
+
+def test_the_scenes_script_may_run(page: Page):
+    assert page.locator("#stub").get_attribute("data-ran") == "yes"
+
+
+def test_dragging_zooms_all_charts_of_the_run(page: Page):
+    page.locator("#figure-torque").scroll_into_view_if_needed()
+    box = page.locator("#figure-torque .nsewdrag").first.bounding_box()
+    assert box
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.25 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], middle, steps=8)
+    page.mouse.up()
+    page.wait_for_timeout(500)
+    start, end = time_range(page, "figure-torque")
+    assert start == pytest.approx(5.0, abs=0.3) and end == pytest.approx(10.0, abs=0.3)
+    assert time_range(page, "figure-power") == pytest.approx([start, end])
+
+
+def test_another_run_can_be_chosen(page: Page):
+    assert page.locator("#run-part").inner_text() == "held out: no sample of it was fitted"
+    before = page.evaluate("document.getElementById('figure-torque').data[0].y.slice(0, 50)")
+    page.select_option("#run-choice", label="exciting_1")
+    page.wait_for_timeout(300)
+    assert page.locator("#run-part").inner_text() == "took part in the fit"
+    assert page.evaluate("document.getElementById('figure-torque').data[0].y.slice(0, 50)") != before
+
+
+@pytest.mark.parametrize("width", [1440, 1024])
+def test_nothing_sticks_out(page: Page, width: int):
+    page.set_viewport_size({"width": width, "height": 900})
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_on_paper_no_chart_is_wider_than_the_page(page: Page, tmp_path: Path):
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_timeout(500)
+    widths = page.evaluate("[...document.querySelectorAll('.main-svg')].map((svg) => svg.clientWidth)")
+    assert widths and max(widths) <= 680
+    assert page.evaluate("[...document.querySelectorAll('details.long')].every((table) => table.open)")
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    page.wait_for_timeout(500)
+    assert page.evaluate("document.querySelector('.main-svg').clientWidth") > 680
+    page.pdf(path=tmp_path / "page.pdf", prefer_css_page_size=True)
+    assert (tmp_path / "page.pdf").stat().st_size > 50_000
+
+
+def test_a_robot_without_torque(browser: playwright.Browser, tmp_path: Path):
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    ur3 = power_only(graph)
+    render(graph, ur3.iri, ur3.read_series, tmp_path / "robot.html")
+    page = browser.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((tmp_path / "robot.html").as_uri())
+    page.wait_for_selector("#figure-power .scatterlayer .trace")
+    assert errors == []
+    page.close()

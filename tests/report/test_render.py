@@ -1,0 +1,151 @@
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from robots import Factory, power_only, six_axis
+
+from conftest import PageOf
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.report.render import content_policy, render
+
+HOSTILE = "<script>alert(1)</script>\"'&</title>"
+
+
+class Elements(HTMLParser):
+    """Elements of a page with their attributes, and the text of each script."""
+
+    def __init__(self, page: str):
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self._inside = False
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        self._inside = tag == "script"
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = False
+
+    def handle_data(self, data: str) -> None:
+        if self._inside:
+            self.scripts.append(data)
+
+
+def without_scripts(page: str) -> str:
+    return re.sub(r"<script[^>]*>.*?</script>", "", page, flags=re.DOTALL)
+
+
+def text(page: str) -> str:
+    return without_scripts(page).replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
+
+
+def test_key_numbers_stand_at_the_top(graph: KnowledgeGraph, page_of: PageOf):
+    page = text(page_of(six_axis(graph)))
+    assert "These logs are simulated." in page
+    assert "misses the energy of runs it never saw by 2.5 %" in page
+    assert "This twin is to be identified again" in page and "passes 10 % on cycle_6" in page
+    assert page.index('class="verdict"') < page.index('class="key-numbers"') < page.index('id="robot"')
+
+
+def test_nothing_is_loaded_from_anywhere(graph: KnowledgeGraph, page_of: PageOf):
+    page = page_of(six_axis(graph))
+    elements = Elements(page)
+    for tag, attributes in elements.found:
+        assert tag not in {"link", "iframe", "object", "embed", "base"}
+        for name in ("src", "href", "srcset", "action"):
+            assert (attributes.get(name) or "#").startswith(("#", "data:")), (tag, attributes)
+    assert not re.search(r"url\(|@import", without_scripts(page))
+
+
+def test_only_the_scripts_of_the_page_may_run(graph: KnowledgeGraph, tmp_path: Path):
+    six = six_axis(graph)
+    out = tmp_path / "page.html"
+    scene = "<div>scene</div><script>let scene = 1;\r\n</script><script>let more = 2;</script>"
+    render(graph, six.iri, six.read_series, out, draw_scene=lambda columns: scene)
+    page = out.read_text(encoding="utf-8")
+    policy = next(a["content"] for tag, a in Elements(page).found if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy and policy.startswith("default-src 'none'")
+    assert policy.count("'sha256-") == 4
+    assert "unsafe-eval" not in policy and "http" not in policy
+    assert content_policy(["let more = 2;"]).split("'")[3] in policy
+
+
+def test_hostile_names_are_text(graph: KnowledgeGraph, page_of: PageOf):
+    factory = Factory("ODD", HOSTILE, joint_name=HOSTILE + "{}").robot(note='{"<script>": "</script><script>alert(2)"}')
+    page = page_of(factory.run(HOSTILE.translate({60: "a", 62: "b", 34: "c", 39: "d"})).into(graph))
+    elements = Elements(page)
+    assert [a.get("type") for tag, a in elements.found if tag == "script"] == ["application/json", None, None]
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+
+
+def test_hostile_joint_names_in_the_data_of_figures_cannot_end_the_script(graph: KnowledgeGraph, page_of: PageOf):
+    factory = Factory("ODD", "ODD", joint_name="</script>{}").robot().run("a").twin(["a"], []).into(graph)
+    data = Elements(page_of(factory)).scripts[0]
+    assert data.startswith("{") and data.endswith("}") and "<" not in data
+
+
+@pytest.mark.parametrize(
+    ("changes", "runs", "expected"),
+    [
+        ({"power": False}, 1, ["No electrical power was measured, so there is no energy error to show."]),
+        ({"torque": False}, 1, ["Joint torque was not measured: only power can be compared."]),
+        ({"joints": 7}, 2, ["joint_7"]),
+        ({"joints": 1, "power": False, "torque": False}, 1, ["nothing that was measured can check it"]),
+    ],
+)
+def test_what_is_missing_is_said(
+    changes: dict[str, object], runs: int, expected: list[str], graph: KnowledgeGraph, page_of: PageOf
+):
+    factory = Factory("R", "R", **changes).robot(facts=False)  # type: ignore[arg-type]
+    names = [f"run_{number}" for number in range(runs)]
+    for name in names:
+        factory.run(name)
+    page = text(page_of(factory.twin(names, []).into(graph)))
+    for words in expected:
+        assert words in page
+    assert "These logs are simulated" not in page
+
+
+def test_a_robot_without_twin_or_runs_has_a_page(graph: KnowledgeGraph, page_of: PageOf):
+    page = text(page_of(Factory("NEW", "NEW").robot(facts=False).into(graph)))
+    assert "No twin of this robot has been identified yet" in page
+    assert "No run of this robot is in the graph." in page
+
+
+def test_a_hundred_runs(graph: KnowledgeGraph, page_of: PageOf):
+    page = page_of(six_axis(graph, runs=100))
+    assert len(page) < 9e6
+    assert page.count("<option ") == 100
+
+
+def test_two_robots_do_not_mix(graph: KnowledgeGraph, page_of: PageOf):
+    six, ur3 = six_axis(graph), power_only(graph)
+    assert "cycle_6" not in page_of(ur3)
+    assert "pick" not in text(page_of(six))
+
+
+def test_every_question_of_the_report_is_shown(graph: KnowledgeGraph, page_of: PageOf):
+    page = page_of(six_axis(graph))
+    for file in Path(__file__).parents[2].glob("reports/energy/*.rq"):
+        assert f"{file.name}</span>" in page, f"{file.name} is asked but not shown"
+
+
+def test_a_violated_constraint_is_shown(graph: KnowledgeGraph, page_of: PageOf):
+    factory = Factory("R", "R").robot().run("a")
+    factory.say(
+        "[] a sh:ValidationReport ; sh:conforms false ; sh:result [ a sh:ValidationResult ;"
+        ' sh:focusNode id:run ; sh:resultSeverity sh:Violation ; sh:resultMessage "Run_Time must be positive" ] .'
+    )
+    page = text(page_of(factory.into(graph)))
+    assert "does not conform" in page and "Run_Time must be positive" in page
+
+
+def test_an_unknown_robot_is_the_users_mistake(graph: KnowledgeGraph, tmp_path: Path):
+    with pytest.raises(InputError, match="the graph knows no such robot"):
+        render(graph, "https://w3id.org/irtwin/id/robot/none", lambda path, checksum: None, tmp_path / "x.html")  # type: ignore[arg-type, return-value]
+    assert not (tmp_path / "x.html").exists()

@@ -1,0 +1,30 @@
+from robots import answers, six_axis
+
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.report import tables
+
+
+def test_joint_parameters_make_a_matrix_and_the_rest_lists(graph: KnowledgeGraph):
+    found = answers(graph, six_axis(graph))
+    parameters = tables.parameters(found["parameters"].rows, found["joints"].rows)
+    assert [line.name for line in parameters.per_joint] == ["Fc", "Fv"]
+    assert list(parameters.per_joint[0].cells) == list(parameters.joints)
+    assert parameters.per_joint[0].cells["joint_1"].value == "7.14"
+    assert parameters.per_joint[1].cells["joint_6"].holds_zero
+    others = dict(parameters.others)
+    assert [line.name for line in others["rigid-body dynamics"]][:3] == ["base_1", "base_2", "base_3"]
+    assert [line.cell and line.cell.interval for line in others["standby power"]] == ["149.90 … 150.10"]
+
+
+def test_conclusions_gather_what_they_are_about_and_who_drew_them(graph: KnowledgeGraph):
+    found = answers(graph, six_axis(graph))
+    by_label = {conclusion.label: conclusion for conclusion in tables.conclusions(found["conclusions"].rows)}
+    assert by_label["idle-heavy run"].about == ("cycle_6",)
+    assert by_label["dominant joint"].about == ("cycle_6: joint_2",)
+    assert by_label["twin to identify again"].by == ("SWRL rules",)
+
+
+def test_fits_by_joint_and_by_run(graph: KnowledgeGraph):
+    found = answers(graph, six_axis(graph))
+    assert tables.fits(found["torque_fit_per_joint"].rows)["joint_2"]["held_out"]["runs"] == 2
+    assert tables.run_fits(found["torque_fit"].rows)["cycle_6", "held_out"]["joint_1"]["rmse_nm"] == 8.0

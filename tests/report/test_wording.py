@@ -1,0 +1,84 @@
+from datetime import UTC, datetime, timedelta, timezone
+
+import pytest
+
+from irtwin.report import wording
+
+
+def spaced(text: str) -> str:
+    return text.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"), (1234.6, "1 235"), (12345.6, "12 346"), (0.012345, "0.0123"), (-3.14159, "−3.14"), (9.999, "10.0"),
+        (999.9, "1 000"), (1.5e-7, "1.50 × 10⁻⁷"), (-2.5e9, "−2.50 × 10⁹"), (None, "–"), (float("nan"), "–"),
+        (float("inf"), "–"),
+    ],
+)  # fmt: skip
+def test_number_keeps_significant_digits(value: float | None, text: str):
+    assert spaced(wording.number(value)) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(8900.0, "8.90 kJ"), (12.0, "12.0 J"), (3.6e6, "3.60 MJ"), (-150.0, "−150 J"), (None, "–")]
+)
+def test_energy_finds_its_unit(value: float | None, text: str):
+    assert spaced(wording.energy(value)) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.97, "97 %"), (0.998, "99.8 %"), (1.0, "100 %"), (-0.2, "−20 %")])
+def test_share_does_not_claim_all_short_of_it(value: float, text: str):
+    assert spaced(wording.share(value)) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(9.0, "9.00 s"), (119.0, "119 s"), (725.0, "12 min 5 s"), (7380.0, "2 h 3 min")]
+)
+def test_duration_in_words(seconds: float, text: str):
+    assert spaced(wording.duration(seconds)) == text
+
+
+def test_given_numbers_keep_their_own_digits():
+    assert spaced(wording.given(50.0, "kg")) == "50 kg"
+    assert spaced(wording.given(-170.5)) == "−170.5"
+    assert wording.given(None, "kg") == "–"
+
+
+def test_angles_are_degrees_and_prismatic_joints_millimetres():
+    assert wording.angle(-2.967, "revolute") == "−170°"
+    assert spaced(wording.angle(0.25, "prismatic")) == "250 mm"
+    assert wording.angle(float("inf"), "continuous") == "–"
+    assert wording.angular_speed(None, "revolute") == "–"
+
+
+@pytest.mark.parametrize(
+    ("numbers", "texts"),
+    [
+        ((7.1432, 7.04, 7.24), ("7.14", "7.04 … 7.24")),
+        ((150.0, 149.9, 150.1), ("150.00", "149.90 … 150.10")),
+        ((1234.0, 1000.0, 1500.0), ("1 234", "1 000 … 1 500")),
+        ((2e-9, 1e-9, 3e-9), ("2.00 × 10⁻⁹", "1.00 × 10⁻⁹ … 3.00 × 10⁻⁹")),
+        ((5.0, 5.0, 5.0), ("5.00", "5.00 … 5.00")),
+    ],
+)
+def test_an_interval_says_how_many_decimals_make_sense(numbers: tuple[float, float, float], texts: tuple[str, str]):
+    assert tuple(map(spaced, wording.interval(*numbers))) == texts
+
+
+def test_units_are_printed_with_real_powers():
+    assert wording.unit_symbol("kg m^2") == "kg m²"
+    assert wording.unit_symbol("N m s^-1") == "N m s⁻¹"
+    assert wording.unit_symbol("1") == wording.unit_symbol(None) == ""
+
+
+def test_moments_are_utc():
+    berlin = timezone(timedelta(hours=1))
+    assert wording.moment(datetime(2026, 3, 1, 8, 30, tzinfo=berlin)) == "2026-03-01 07:30"
+    assert wording.moment(datetime(2026, 3, 1, 8, 30)) == wording.moment(datetime(2026, 3, 1, 8, 30, tzinfo=UTC))
+
+
+def test_notes_are_names_and_text():
+    assert wording.notes('{"supply": "400 V", "axes": [1, 2]}') == {"supply": "400 V", "axes": "[1, 2]"}
+    assert wording.notes(None) == wording.notes("") == {}
