@@ -74,15 +74,13 @@ class Arm:
         """Move on by one step under the net joint torque, (n,) N m; return the acceleration, rad/s^2."""
         self.data.qfrc_applied[:] = torque
         mujoco.mj_step(self.model, self.data)
-        acceleration: np.ndarray = self.data.qacc.copy()
-        return acceleration
+        return np.array(self.data.qacc)
 
     def inverse_dynamics(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the joint torque of a motion state, (n,) N m."""
         self.data.qpos[:], self.data.qvel[:], self.data.qacc[:] = q, dq, ddq
         mujoco.mj_inverse(self.model, self.data)
-        torque: np.ndarray = self.data.qfrc_inverse.copy()
-        return torque
+        return np.array(self.data.qfrc_inverse)
 
     def joint_inertia(self, q: np.ndarray) -> np.ndarray:
         """Return the diagonal of the inertia matrix at `q`, (n,) kg m^2."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from plant.arm import Payload
-from plant.machine import Drawings, Machine, build, read_drawings
-from plant.motion import Limits, Motion, programme, sampled
+from plant.machine import Drawings, build, read_drawings
+from plant.motion import Limits, Motion, fourier, programme
 from plant.simulate import Recording, simulate
 from plant.thermal import Thermal
 
@@ -83,7 +83,7 @@ def _pass_time(thermal: Thermal, run: Run, recording: Recording, following: Run)
 def motion_of(entry: dict[str, Any], drawings: Drawings) -> Motion:
     """Return the motion of a campaign's [motion.NAME] table, checked against the robot's limits."""
     if "file" in entry:
-        motion = sampled(FOLDER / entry["file"], drawings.joints, drawings.step)
+        motion = fourier(FOLDER / entry["file"], drawings.step, entry.get("speed", 1.0))
     else:
         motion = programme(entry["moves"], drawings.limits, drawings.step, entry["cycles"])
     check(motion, drawings.limits)

@@ -56,4 +56,4 @@ class Controller:
         wanted = self.forward[sample] + gain * (error + self.integral)
         free = np.abs(wanted) < self.maximum_torque  # no wind-up while saturated
         self.integral = self.integral + free * error * self.step / d.integral_time
-        return np.clip(wanted, -self.maximum_torque, self.maximum_torque)
+        return np.asarray(np.clip(wanted, -self.maximum_torque, self.maximum_torque))

@@ -27,12 +27,12 @@ class DriveData:
     @property
     def joint_inertia(self) -> np.ndarray:
         """Rotor inertia reflected to the joint, kg m^2."""
-        return self.rotor_inertia * self.gear_ratio**2
+        return np.asarray(self.rotor_inertia * self.gear_ratio**2)
 
     @property
     def joint_torque_constant(self) -> np.ndarray:
         """Torque constant reflected to the joint, N m/A."""
-        return self.torque_constant * self.gear_ratio
+        return np.asarray(self.torque_constant * self.gear_ratio)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,8 @@ class Drive:
         d = self.data
         wanted_current = wanted / d.joint_torque_constant
         self.current = self.current + (1 - np.exp(-step / d.current_time_constant)) * (wanted_current - self.current)
-        return d.joint_torque_constant * (1 - MAGNET_COEFFICIENT * (magnet_temperature - 25)) * self.current
+        weakened = 1 - MAGNET_COEFFICIENT * (magnet_temperature - 25)
+        return np.asarray(d.joint_torque_constant * weakened * self.current)
 
     def losses(self, dq: np.ndarray, winding_temperature: np.ndarray) -> Losses:
         """Return the losses at the present current and the joint speeds `dq`: (n,) rad/s."""

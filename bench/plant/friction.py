@@ -48,14 +48,16 @@ class Friction:
         self.deflection = (old + step * dq) / (1 + step * rate)  # implicit: stable at any speed
         bristle_speed = (self.deflection - old) / step
         damping = self.damping * np.exp(-((speed / (3 * d.stribeck_speed)) ** 2))
-        return self.stiffness * self.deflection + damping * bristle_speed + self._viscous(dq, temperature)
+        bristles = self.stiffness * self.deflection + damping * bristle_speed
+        return np.asarray(bristles + self._viscous(dq, temperature))
 
     def _coulomb(self, q: np.ndarray, load: np.ndarray, temperature: np.ndarray) -> np.ndarray:
         d = self.data
         warm = 1 - d.coulomb_slope * (temperature - d.reference_temperature)
-        return d.coulomb * warm * (1 + d.mesh_ripple * np.sin(d.mesh_teeth * q)) + d.load * np.abs(load)
+        ripple = 1 + d.mesh_ripple * np.sin(d.mesh_teeth * q)
+        return np.asarray(d.coulomb * warm * ripple + d.load * np.abs(load))
 
     def _viscous(self, dq: np.ndarray, temperature: np.ndarray) -> np.ndarray:
         d = self.data
         oil = np.exp(d.vogel / (temperature + d.vogel_offset) - d.vogel / (d.reference_temperature + d.vogel_offset))
-        return d.viscous * oil * d.thinning_speed * np.arcsinh(dq / d.thinning_speed)
+        return np.asarray(d.viscous * oil * d.thinning_speed * np.arcsinh(dq / d.thinning_speed))

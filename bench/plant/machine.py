@@ -107,17 +107,13 @@ def build(drawings: Drawings, seed: int) -> Machine:
             {name: getattr(tolerance, name) for name in ("rotor_inertia", "torque_constant", "resistance")},
             rng,
         ),
-        scatter(
-            drawings.friction, dict.fromkeys(("coulomb", "stiction", "viscous", "load"), tolerance.friction), rng
-        ),
+        scatter(drawings.friction, dict.fromkeys(("coulomb", "stiction", "viscous", "load"), tolerance.friction), rng),
         sensors.torque_offset * rng.standard_normal(len(drawings.joints)),
         1 + sensors.meter_gain_error * rng.standard_normal(),
     )
 
 
-def scatter(
-    data: Data, deviations: dict[str, float], rng: np.random.Generator
-) -> Data:
+def scatter(data: Data, deviations: dict[str, float], rng: np.random.Generator) -> Data:
     """Return the data with the named arrays off by relative standard deviations, two at most."""
     changed = {}
     for name, deviation in deviations.items():

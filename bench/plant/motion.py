@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 
 @dataclass(frozen=True)
@@ -39,17 +39,23 @@ class Motion:
         )
 
 
-def sampled(file: Path, joints: Sequence[str], step: float) -> Motion:
-    """Read a motion from a CSV file of `time` and `q_J` columns (rad) and resample it by a quintic spline."""
-    with file.open(encoding="utf-8") as lines:
-        header = next(lines).strip().split(",")
-        table = np.loadtxt(lines, delimiter=",")
-    time = table[:, header.index("time")]
-    q = table[:, [header.index(f"q_{joint}") for joint in joints]]
-    rest = [(1, np.zeros(q.shape[1])), (2, np.zeros(q.shape[1]))]
-    spline = make_interp_spline(time, q, k=5, bc_type=(rest, rest))
-    fine = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
-    return Motion(spline(fine), spline.derivative(1)(fine), spline.derivative(2)(fine))
+def fourier(file: Path, step: float, speed: float = 1.0) -> Motion:
+    """Read a finite Fourier series from a TOML file and return one period of it, slowed down to `speed`.
+
+    `period` (s), `centre` (n,), `sine` and `cosine` (K, n), rad:
+    q = centre + sum_k sine_k sin(k w t) + cosine_k cos(k w t).
+    """
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    sine, cosine = np.array(table["sine"]), np.array(table["cosine"])
+    period = table["period"] / speed
+    time = step * np.arange(round(period / step) + 1)
+    w = 2 * np.pi / period * np.arange(1, len(sine) + 1)
+    sin, cos = np.sin(np.outer(time, w)), np.cos(np.outer(time, w))
+    return Motion(
+        np.array(table["centre"]) + sin @ sine + cos @ cosine,
+        (cos * w) @ sine - (sin * w) @ cosine,
+        -(sin * w**2) @ sine - (cos * w**2) @ cosine,
+    )
 
 
 def programme(moves: Sequence[dict[str, Any]], limits: Limits, step: float, cycles: int = 1) -> Motion:
@@ -87,9 +93,7 @@ def _point_to_point(
     duration = rows * step
     s = np.arange(1, rows + 1)[:, None] / rows
     travelled, rate, acceleration = _quintic(s) if profile == "quintic" else _trapezoid(s)
-    return Motion(
-        start + distance * travelled, distance * rate / duration, distance * acceleration / duration**2
-    )
+    return Motion(start + distance * travelled, distance * rate / duration, distance * acceleration / duration**2)
 
 
 def _quintic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from plant.arm import Arm, Payload
+from plant.arm import Payload
 from plant.controller import Controller
 from plant.drive import Drive, Losses
 from plant.friction import Friction
@@ -36,7 +36,7 @@ class EnergyBook:
 
     def residual(self) -> float:
         """Return what is unaccounted for: zero but for the integration error."""
-        return 2 * self.grid - sum(vars(self).values())
+        return 2 * self.grid - float(sum(vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,7 @@ class _Cell:
         )
 
 
-def simulate(
-    machine: Machine, motion: Motion, payload: Payload, thermal: Thermal, seed: int
-) -> Recording:
+def simulate(machine: Machine, motion: Motion, payload: Payload, thermal: Thermal, seed: int) -> Recording:
     """Let a machine do a motion; `thermal` is warmed by it, `seed` makes the run's noise."""
     drawings = machine.drawings
     settle = round(SETTLE / drawings.step)

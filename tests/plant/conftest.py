@@ -1,0 +1,23 @@
+"""The plant lies in bench/, beside the package and not in it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="the plant needs irtwin[plant]")
+sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
+
+from plant.machine import Drawings, Machine, build, read_drawings
+
+
+@pytest.fixture(scope="session")
+def drawings() -> Drawings:
+    return read_drawings("kuka_kr6_r700")
+
+
+@pytest.fixture(scope="session")
+def machine(drawings: Drawings) -> Machine:
+    return build(drawings, seed=1)
