@@ -40,8 +40,8 @@ def map_database(engine: Engine, documents: Sequence[Path], base_iri: str | None
 
 def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | None = None) -> None:
     """Write the quads of one mapping document as N-Quads; the file is there whole or not at all."""
-    if not out.parent.is_dir():
-        raise InputError(f"{out.parent}: no such folder to write to")
+    if out.is_dir() or not out.parent.is_dir():
+        raise InputError(f"{out}: not a file that can be written; name one in a folder that is there")
     engine = open_engine(database_url, must_exist=True)
     try:
         with files.temporary_beside(out.parent) as temporary:
