@@ -52,6 +52,8 @@ def test_a_data_set_is_taken_in(workspace: Workspace) -> None:
     assert workspace.read_series(WORK).equals(rows.samples(1))
     assert workspace.read_series(WORK, columns=["power"]).column_names == ["power"]
     with workspace.reading() as session:
+        stored = session.scalars(select(Series).where(Series.run_id == WORK)).one()
+        assert workspace.read_file(stored.path, stored.series_id).equals(rows.samples(1))
         assert session.get_one(Run, f"{rows.ROBOT}.again").repeat_of == WORK
 
 

@@ -126,6 +126,10 @@ class Workspace:
             raise InputError(f"{self.folder}: run {run_id} has no {kind} series; ingest its data set first")
         return read_series(self.folder, found.path, found.series_id, columns)
 
+    def read_file(self, path: str, checksum: str) -> pa.Table:
+        """Read a series by the path and checksum that the graph says of it. Raises InputError as `read_series`."""
+        return read_series(self.folder, path, checksum)
+
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""
         with self._writing() as session:

@@ -209,6 +209,7 @@ class TwinRun(Base):
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     part: Mapped[str]
+    held_out_from_s: Mapped[float | None]  # of the log's time, where the run was cut in time
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -241,7 +242,7 @@ class TorqueFit(Base):
     part: Mapped[str] = mapped_column(primary_key=True)  # "fit" or "held_out"
     robot_id: Mapped[str]
     rmse_nm: Mapped[float]
-    r_squared: Mapped[float]
+    r_squared: Mapped[float | None]  # none where the measured torque does not vary
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -253,14 +254,15 @@ class RunEnergy(Base):
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
     part: Mapped[str]  # "fit", "held_out" or "both": the run's part in the twin
-    energy_consumption_j: Mapped[float]  # measured where it was, else modelled
+    energy_consumption_j: Mapped[float]
+    energy_from: Mapped[str]  # "measured", "modelled", or "mechanical": modelled without the electrical losses
     run_power_w: Mapped[float]  # its mean
     peak_power_w: Mapped[float]
     measured_energy_j: Mapped[float | None]
     modelled_energy_j: Mapped[float]
-    energy_error_percent: Mapped[float | None]  # the seed's (15)
-    power_rmse_w: Mapped[float | None]
-    standby_energy_j: Mapped[float]
+    energy_error_percent: Mapped[float | None]  # the seed's (15); of the part held out, where the run was cut
+    power_rmse_w: Mapped[float | None]  # likewise
+    standby_energy_j: Mapped[float | None]
     standby_share: Mapped[float | None]  # of the modelled energy, 0 to 1
     returned_energy_j: Mapped[float]  # mechanical energy that the joints gave back while they braked, positive
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
