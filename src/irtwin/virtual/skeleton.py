@@ -1,0 +1,96 @@
+"""What of a robot can be seen: its own shapes, or tubes and joint housings made from its kinematics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.robot.description import Robot
+
+_TUBE = (0.86, 0.88, 0.90, 1.0)
+_HOUSING = (0.16, 0.38, 0.58, 1.0)
+_FOOT = (0.35, 0.38, 0.42, 1.0)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A box, cylinder (along z) or sphere, fixed to a joint's frame; `joint` is its column, -1 for the base.
+
+    size in m as in robot.description.Shape; placement: (4, 4), in the joint's frame; colour: RGBA in 0..1.
+    """
+
+    joint: int
+    kind: str
+    size: tuple[float, ...]
+    placement: np.ndarray
+    colour: tuple[float, float, float, float]
+
+
+def drawn_parts(robot: Robot) -> list[Part]:
+    """Return the robot's visual shapes; a skeleton where less than half of its moving bodies have any."""
+    parts = _own_shapes(robot)
+    seen = {part.joint for part in parts if part.joint >= 0}
+    return parts if 2 * len(seen) >= len(robot.joints) else _skeleton(robot)
+
+
+def joint_axes(robot: Robot) -> np.ndarray:
+    """Return each joint's axis in its own frame, (n, 3), from its motion subspace: the same at every position."""
+    data = robot.model.createData()
+    pin.computeJointJacobians(robot.model, data, np.zeros(len(robot.joints)))
+    axes = np.empty((len(robot.joints), 3))
+    for column, joint in enumerate(robot.joints):
+        twist = pin.getJointJacobian(robot.model, data, column + 1, pin.LOCAL)[:, column]
+        axes[column] = twist[:3] if joint.kind == "prismatic" else twist[3:]
+    return axes
+
+
+def _own_shapes(robot: Robot) -> list[Part]:
+    parts = []
+    for link in robot.links:
+        frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
+        for shape in link.shapes:
+            placement = frame.placement.homogeneous @ shape.placement
+            parts.append(Part(frame.parentJoint - 1, shape.kind, shape.size, placement, shape.colour))
+    return parts
+
+
+def _skeleton(robot: Robot) -> list[Part]:
+    """Return a housing around each joint's axis and a tube from joint to joint, thinner towards the flange."""
+    model = robot.model
+    reach = sum(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
+    thick = 0.045 * max(reach, 0.1)
+    radii = [thick * (1 - 0.55 * column / max(len(robot.joints) - 1, 1)) for column in range(len(robot.joints))]
+    parts = [Part(-1, "cylinder", (1.7 * thick, 0.5 * thick), _at(np.array([0, 0, 0.25 * thick])), _FOOT)]
+    for column, (radius, axis) in enumerate(zip(radii, joint_axes(robot), strict=True)):
+        placement = model.jointPlacements[column + 1]
+        parent = model.parents[column + 1] - 1
+        below = 1.25 * radius - placement.translation[2] if parent < 0 else 0.0  # the floor
+        lifted = placement.rotation.T @ np.array([0.0, 0.0, max(below, 0.0)])
+        parts.append(Part(column, "cylinder", (1.15 * radius, 2.5 * radius), _along(axis, lifted), _HOUSING))
+        parts += _tube(parent, np.array(placement.translation), radius if parent < 0 else radii[parent])
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY and frame.parentJoint > 0:
+            parts += _tube(frame.parentJoint - 1, np.array(frame.placement.translation), radii[frame.parentJoint - 1])
+    last, radius = len(radii) - 1, radii[-1]
+    return [*parts, Part(last, "sphere", (1.1 * radius,), np.eye(4), _TUBE)]
+
+
+def _tube(joint: int, end: np.ndarray, radius: float) -> list[Part]:
+    """Return a capsule from the joint's origin to `end`, (3,) m; nothing where they coincide."""
+    length = float(np.linalg.norm(end))
+    if length < 1e-6:
+        return []
+    tube = Part(joint, "cylinder", (0.8 * radius, length), _along(end / length, end / 2), _TUBE)
+    return [tube, Part(joint, "sphere", (0.8 * radius,), _at(end), _TUBE)]
+
+
+def _at(position: np.ndarray) -> np.ndarray:
+    return np.asarray(pin.SE3(np.eye(3), position.astype(float)).homogeneous)
+
+
+def _along(direction: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return the placement whose z axis is `direction`, (3,) of length one."""
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).toRotationMatrix()
+    return np.asarray(pin.SE3(turn, centre.astype(float)).homogeneous)

@@ -1,0 +1,136 @@
+"""The scene in headless Chromium: it draws and moves, its numbers are right, nothing is fetched or complained of."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scene_data import HOSTILE, bare, kr6, run
+
+from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import link_placements
+from irtwin.virtual.scene import scene_html
+
+pytestmark = pytest.mark.system
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+ARGUMENTS = [
+    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+PAGE = '<!DOCTYPE html><html><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{}">'
+SEEK = "time => document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time}}))"
+PLACES = """count => {
+  const viewer = document.querySelector('.irtwin-scene').irtwinScene.viewer, places = [];
+  viewer.scene.updateMatrixWorld(true);
+  let path = ['robot'];
+  for (let joint = 0; joint < count; joint++) {
+    path = [...path, 'joint ' + joint];
+    places.push(viewer.scene_tree.find(path).object.matrixWorld.elements.slice());
+  }
+  return { world: viewer.scene.matrixWorld.elements.slice(), places };
+}"""
+COLOURS = """() => {
+  const source = document.querySelector('.irtwin-scene').irtwinScene.viewer;
+  source.render();
+  const copy = document.createElement('canvas');
+  copy.width = 160; copy.height = 120;
+  const context = copy.getContext('2d');
+  context.drawImage(source.renderer.domElement, 0, 0, 160, 120);
+  return Array.from(context.getImageData(0, 0, 160, 120).data);
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("Chromium is not installed")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as session:
+        chromium = session.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+def open_page(browser: Any, folder: Path, robot: Robot, title: str = "") -> tuple[Any, list[str]]:
+    """Open the scene of a run as a file; return the page and whatever it complains of or asks for."""
+    path = folder / "scene.html"
+    path.write_text(PAGE.format(POLICY) + scene_html(robot, *run(robot), title=title), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1366, "height": 768})
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: complaints.append(request.url))
+    page.goto(path.as_uri())
+    assert complaints == [path.as_uri()]
+    complaints.clear()
+    return page, complaints
+
+
+def pixels(page: Any) -> np.ndarray:
+    return np.array(page.evaluate(COLOURS), dtype=float).reshape(120, 160, 4)[:, :, :3]
+
+
+def test_the_robot_is_drawn_and_moves_and_its_numbers_are_right(browser: Any, tmp_path: Path) -> None:
+    robot = kr6()
+    page, complaints = open_page(browser, tmp_path, robot)
+    first = pixels(page)
+    orange = (first[:, :, 0] > 150) & (first[:, :, 2] < 90)
+    assert orange.mean() > 0.01
+    time, _, energy, power = run(robot)
+    page.evaluate(SEEK, 6.5)
+    assert np.abs(pixels(page) - first).max() > 50
+    assert page.inner_text(".is-time") == "6.5"
+    assert float(page.inner_text(".is-energy")) == pytest.approx(np.interp(6.5, time, energy), abs=0.6)
+    assert float(page.inner_text(".is-power")) == pytest.approx(np.interp(6.5, time, power), abs=3)
+    page.evaluate(SEEK, 1e9)
+    assert float(page.inner_text(".is-energy")) == pytest.approx(energy[-1], abs=0.6)
+    assert complaints == []
+
+
+@pytest.mark.parametrize("robot", [kr6(), bare(kind="prismatic")])
+def test_the_joints_stand_where_the_kinematics_say(browser: Any, tmp_path: Path, robot: Robot) -> None:
+    page, _ = open_page(browser, tmp_path, robot)
+    time, q, *_ = run(robot)
+    for sample in (0, 360, 800):
+        page.evaluate(SEEK, float(time[sample]))
+        answer = page.evaluate(PLACES, len(robot.joints))
+        world = np.array(answer["world"]).reshape(4, 4).T
+        known = link_placements(robot, q[sample])
+        links = [robot.links[1 + joint].name for joint in range(len(robot.joints))]
+        for place, link in zip(answer["places"], links, strict=True):
+            np.testing.assert_allclose(np.linalg.solve(world, np.array(place).reshape(4, 4).T), known[link], atol=1e-5)
+
+
+def test_it_plays_tells_the_time_and_stops_at_the_end(browser: Any, tmp_path: Path) -> None:
+    page, complaints = open_page(browser, tmp_path, kr6())
+    page.evaluate("document.addEventListener('irtwin:time', (event) => { window.heard = event.detail.time; })")
+    page.select_option(".is-speed", "20")
+    page.click(".is-play")
+    page.wait_for_selector(".is-play[aria-label=Pause]")
+    page.wait_for_selector(".is-play[aria-label=Play]")
+    assert page.evaluate("window.heard") == pytest.approx(11.0)
+    assert complaints == []
+
+
+def test_a_print_shows_a_picture(browser: Any, tmp_path: Path) -> None:
+    page, _ = open_page(browser, tmp_path, kr6())
+    page.evaluate(SEEK, 7.0)
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    assert page.is_visible(".is-still")
+    assert page.evaluate("document.querySelector('.is-still').naturalWidth") > 300
+    assert not page.is_visible(".is-controls")
+
+
+def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
+    page, complaints = open_page(browser, tmp_path, bare(HOSTILE), title=HOSTILE)
+    assert page.inner_text(".is-title") == HOSTILE
+    assert page.inner_text(".is-joints tr:first-child th") == HOSTILE
+    assert page.evaluate("window.hacked === undefined")
+    assert complaints == []
