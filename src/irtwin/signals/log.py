@@ -234,4 +234,16 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
                 )
             run = replace(run, repeat_of=target)
         resolved.append(run)
+    _check_circles({run.name: run.repeat_of for run in resolved}, file)
     return tuple(resolved)
+
+
+def _check_circles(repeats: Mapping[str, str | None], file: Path) -> None:
+    for name in repeats:
+        seen: list[str] = []
+        at: str | None = name
+        while at is not None and at not in seen:
+            seen.append(at)
+            at = repeats[at]
+        if at is not None:
+            raise InputError(f"{file}: runs {' and '.join(seen)} repeat each other in a circle; one of them came first")

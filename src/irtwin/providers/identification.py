@@ -1,0 +1,111 @@
+"""The provider of twins: fits a robot's effects to its runs, and judges the fit on what was held out."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
+
+from sqlalchemy import select
+
+from irtwin.effects.effect import BASELINE
+from irtwin.identification.validation import FIT, HELD_OUT, Split, split
+from irtwin.providers.provider import Made
+from irtwin.providers.records import load_robot, load_run, run_iri
+from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.motion import Motion
+from irtwin.storage import schema
+from irtwin.storage.database import TWINS, Workspace
+from irtwin.twin.files import to_json
+from irtwin.twin.identify import identify
+from irtwin.twin.twin import Twin
+from irtwin.twin.validate import validate
+
+
+def provide(workspace: Workspace, robot_id: str) -> Made:
+    """Make a robot's Twin with its effects, parameters, runs and torque fits."""
+    robot = load_robot(workspace, robot_id)
+    with workspace.reading() as session:
+        effects = session.get_one(schema.Robot, robot_id).twin_effects
+        run_ids = session.scalars(select(schema.Run.run_id).where(schema.Run.robot_id == robot_id)).all()
+    runs = {run_id: load_run(workspace, robot, run_id) for run_id in sorted(run_ids)}
+    cutoff = choose_cutoff(runs.values())
+    motions = [condition(run, robot, cutoff) for run in runs.values()]
+    parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
+    twin = identify(robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
+    document = to_json(twin).encode()
+    checksum = hashlib.sha256(document).hexdigest()
+    twin_id = f"{robot_id}.{checksum[:12]}"
+    row = schema.Twin(
+        twin_id=twin_id,
+        robot_id=robot_id,
+        created=datetime.now(UTC),
+        file=f"{TWINS}/{twin_id}.json",
+        sha256=checksum,
+        cutoff_hz=twin.cutoff,
+        condition_number=twin.condition_number,
+        base_parameter_count=len(twin.base_parameters) or None,
+        split=parts.rule,
+    )
+    keys = {run.name: run_id for run_id, run in runs.items()}
+    return Made(
+        robot_id=robot_id,
+        used=[run_iri(run_id) for run_id in runs],
+        rows=[
+            row,
+            *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effects),
+            *_runs(twin_id, keys, parts),
+            *_parameters(twin_id, robot_id, twin),
+            *_torque_fits(twin_id, robot_id, keys, twin, parts),
+        ],
+        documents={row.file: document},
+    )
+
+
+def _runs(twin_id: str, keys: dict[str, str], parts: Split) -> Iterator[schema.TwinRun]:
+    held_out_from = {motion.run: float(motion.time[0]) for motion in parts.held_out}
+    for name, run_id in keys.items():
+        part = parts.part(name)
+        cut = held_out_from[name] if part == "both" else None
+        yield schema.TwinRun(twin_id=twin_id, run_id=run_id, part=part, held_out_from_s=cut)
+
+
+def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[schema.Parameter]:
+    for parameter in twin.parameters:
+        place = parameter.joint or parameter.link or "robot"
+        yield schema.Parameter(
+            parameter_id=f"{twin_id}.{parameter.effect}.{place}.{parameter.name}",
+            twin_id=twin_id,
+            robot_id=robot_id,
+            effect=parameter.effect,
+            joint=parameter.joint,
+            name=parameter.name if parameter.link is None else f"{parameter.name} of {parameter.link}",
+            value=parameter.value,
+            unit=parameter.unit,
+            lower=parameter.lower,
+            upper=parameter.upper,
+        )
+
+
+def _torque_fits(
+    twin_id: str, robot_id: str, keys: dict[str, str], twin: Twin, parts: Split
+) -> Iterator[schema.TorqueFit]:
+    for part, motions in _parts(parts):
+        for fit in validate(twin, motions):
+            if fit.torque_rmse is None or fit.r_squared is None:
+                continue
+            for joint, error, explained in zip(twin.robot.joint_names, fit.torque_rmse, fit.r_squared, strict=True):
+                yield schema.TorqueFit(
+                    twin_id=twin_id,
+                    run_id=keys[fit.run],
+                    joint=joint,
+                    part=part,
+                    robot_id=robot_id,
+                    rmse_nm=float(error),
+                    r_squared=float(explained) if math.isfinite(explained) else None,
+                )
+
+
+def _parts(parts: Split) -> Iterable[tuple[str, Sequence[Motion]]]:
+    return (FIT, parts.fit), (HELD_OUT, parts.held_out)

@@ -1,0 +1,116 @@
+"""The planner: from what the graph lacks and what providers say of themselves, to what is run and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from graphlib import CycleError, TopologicalSorter
+
+from irtwin import __version__
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.providers.provider import load_provider
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Activity
+
+_DECLARATIONS = """
+PREFIX irt: <https://w3id.org/irtwin#>
+SELECT ?provider ?class
+       (GROUP_CONCAT(DISTINCT STR(?required); separator=" ") AS ?requires)
+       (GROUP_CONCAT(DISTINCT STR(?populated); separator=" ") AS ?populates)
+WHERE {
+  ?provider a irt:Data_Provider ; irt:applies_to ?class ; irt:populates ?populated .
+  OPTIONAL { ?provider irt:requires ?required }
+}
+GROUP BY ?provider ?class
+ORDER BY ?provider
+"""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What the ontology says of a provider, in IRIs; `name` is the end of its own."""
+
+    name: str
+    applies_to: str
+    requires: frozenset[str]
+    populates: frozenset[str]
+
+
+def populate(
+    workspace: Workspace, graph: KnowledgeGraph, refresh: Callable[[], None], announce: Callable[[str], None]
+) -> None:
+    """Run every provider on every individual that lacks what it populates and has what it requires.
+
+    Providers run in dependency order, each once; `refresh` brings the graph up to date with the database
+    after each that made something.
+    """
+    for declaration in in_order(declarations(graph)):
+        subjects = lacking(graph, declaration)
+        if not subjects:
+            continue
+        announce(f"  {declaration.name}: {len(subjects)} individual{'s' if len(subjects) > 1 else ''}")
+        provide = load_provider(declaration.name)
+        for subject in subjects:
+            started = datetime.now(UTC)
+            made = provide(workspace, subject.rpartition("/")[2])
+            activity = Activity(
+                activity_id=f"{declaration.name}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
+                robot_id=made.robot_id,
+                provider=declaration.name,
+                subject=subject,
+                started=started,
+                ended=datetime.now(UTC),
+                software=f"irtwin {__version__}",
+            )
+            workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
+        refresh()
+
+
+def declarations(graph: KnowledgeGraph) -> list[Declaration]:
+    """Read what the ontology declares of providers."""
+    return [
+        Declaration(
+            name=row["provider"].rpartition("/")[2],
+            applies_to=row["class"],
+            requires=frozenset((row["requires"] or "").split()),
+            populates=frozenset(row["populates"].split()),
+        )
+        for row in graph.query(_DECLARATIONS)
+    ]
+
+
+def in_order(declared: Sequence[Declaration]) -> list[Declaration]:
+    """Order providers so that each comes after those that populate what it requires; InputError on a circle."""
+    by_name = {declaration.name: declaration for declaration in declared}
+    needs = {
+        one.name: {other.name for other in declared if other is not one and one.requires & other.populates}
+        for one in declared
+    }
+    try:
+        return [by_name[name] for name in TopologicalSorter(needs).static_order()]
+    except CycleError as error:
+        circle = " -> ".join(error.args[1])
+        raise InputError(f"ontology/providers.ttl: providers require each other in a circle: {circle}") from error
+
+
+def lacking(graph: KnowledgeGraph, declaration: Declaration) -> list[str]:
+    """Return the IRIs of individuals that have what the provider requires and nothing of what it populates.
+
+    A requirement may be met by the individual itself, by its robot, or by a run of it.
+    """
+    required = "".join(
+        f"FILTER EXISTS {{ ?subject (irt:run_of|irt:has_RunProcess)? / <{iri}> ?value{place} }}\n"
+        for place, iri in enumerate(sorted(declaration.requires))
+    )
+    populated = " ".join(f"<{iri}>" for iri in sorted(declaration.populates))
+    rows = graph.query(
+        f"""PREFIX irt: <https://w3id.org/irtwin#>
+        SELECT ?subject WHERE {{
+          ?subject a <{declaration.applies_to}> .
+          {required}
+          FILTER NOT EXISTS {{ VALUES ?property {{ {populated} }} ?subject ?property ?there }}
+        }} ORDER BY ?subject"""
+    )
+    return [row["subject"] for row in rows]

@@ -1,0 +1,205 @@
+"""Between the physics' objects and the database's rows: what is taken in, and how it is given back."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from sqlalchemy import select
+
+from irtwin.errors import InputError
+from irtwin.robot import description
+from irtwin.robot.urdf import parse_urdf
+from irtwin.signals import log
+from irtwin.signals.samples import Signals
+from irtwin.storage.database import Outcome, Workspace
+from irtwin.storage.schema import Joint, Robot, Run
+
+_INDIVIDUALS = "https://w3id.org/irtwin/id/"
+# signal of a run -> prefix of its columns in the log format
+_PER_JOINT = {"q": "q", "dq": "dq", "ddq": "ddq", "torque": "tau", "current": "i", "temperature": "temp"}
+
+
+def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
+    """Take a data set into the workspace, all of it or nothing; say whether it was new."""
+    robot_id = identifier(data_set.robot.name)
+    now = datetime.now(UTC)
+    runs = [_run_row(robot_id, run, now) for run in data_set.runs]
+    taken = {row.run_id for row in runs}
+    if len(taken) < len(runs):
+        raise InputError(f"{data_set.folder}: two runs have names that differ in punctuation alone; rename one")
+    series = {
+        row.run_id: signals_table(run.signals, data_set.robot) for row, run in zip(runs, data_set.runs, strict=True)
+    }
+    joints = [_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)]
+    return workspace.ingest(_robot_row(robot_id, data_set), joints, runs, series)
+
+
+def identifier(name: str) -> str:
+    """Return a name as it stands in IRIs and keys: letters, digits, "_" and "-"."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", name)
+
+
+def robot_iri(robot_id: str) -> str:
+    """Return the IRI of a robot's individual."""
+    return f"{_INDIVIDUALS}robot/{robot_id}"
+
+
+def run_iri(run_id: str) -> str:
+    """Return the IRI of a run's individual."""
+    return f"{_INDIVIDUALS}run/{run_id}"
+
+
+def twin_iri(twin_id: str) -> str:
+    """Return the IRI of a twin's individual."""
+    return f"{_INDIVIDUALS}twin/{twin_id}"
+
+
+def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
+    """Give back a robot with its data sheet."""
+    with workspace.reading() as session:
+        row = session.get_one(Robot, robot_id)
+        sheets = {joint.name: joint for joint in session.scalars(select(Joint).where(Joint.robot_id == robot_id))}
+    bare = parse_urdf(row.urdf, source=f"URDF of {row.name}")
+    joints = tuple(
+        description.Joint(
+            name=joint.name,
+            kind=joint.kind,
+            lower=joint.lower,
+            upper=joint.upper,
+            velocity=joint.velocity,
+            effort=joint.effort,
+            gear_ratio=sheets[joint.name].gear_ratio,
+            rotor_inertia=sheets[joint.name].rotor_inertia_kg_m2,
+            torque_constant=sheets[joint.name].torque_constant_nm_a,
+            winding_resistance=sheets[joint.name].winding_resistance_ohm,
+        )
+        for joint in bare.joints
+    )
+    return description.Robot(row.name, joints, bare.links, bare.urdf, row.manufacturer, row.type, row.weight_kg)
+
+
+def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log.Run:
+    """Give back a run with its measured signals."""
+    with workspace.reading() as session:
+        row = session.get_one(Run, run_id)
+    return log.Run(
+        name=row.name,
+        file=Path(row.file),
+        sha256=row.sha256,
+        role=row.role,
+        payload_mass=row.payload_kg,
+        payload_com=(row.payload_com_x_m, row.payload_com_y_m, row.payload_com_z_m),
+        repeat_of=None if row.repeat_of is None else row.repeat_of.removeprefix(f"{row.robot_id}."),
+        started=row.start_time,
+        notes={},
+        signals=table_signals(workspace.read_series(run_id), robot),
+    )
+
+
+def signals_table(signals: Signals, robot: description.Robot) -> pa.Table:
+    """Return signals as a table in the log format's columns."""
+    columns: dict[str, np.ndarray] = {"time": signals.time}
+    for name, prefix in _PER_JOINT.items():
+        values = getattr(signals, name)
+        if values is not None:
+            columns |= {f"{prefix}_{joint}": values[:, place] for place, joint in enumerate(robot.joint_names)}
+    if signals.power is not None:
+        columns["power"] = signals.power
+    return pa.table(columns)
+
+
+def table_signals(table: pa.Table, robot: description.Robot) -> Signals:
+    """Return the signals of a table in the log format's columns: the inverse of `signals_table`."""
+
+    def column(name: str) -> np.ndarray | None:
+        return np.array(table.column(name)) if name in table.column_names else None
+
+    def stack(prefix: str) -> np.ndarray | None:
+        columns = [column(f"{prefix}_{joint}") for joint in robot.joint_names]
+        return None if columns[0] is None else np.column_stack(columns)  # type: ignore[arg-type]
+
+    read: Callable[[str], np.ndarray | None] = stack
+    signals = {name: read(prefix) for name, prefix in _PER_JOINT.items() if name != "q"}
+    q, time = stack("q"), column("time")
+    assert q is not None
+    assert time is not None
+    return Signals(time=time, q=q, power=column("power"), **signals)
+
+
+def _robot_row(robot_id: str, data_set: log.DataSet) -> Robot:
+    robot, notes = data_set.robot, data_set.notes
+    rated, arm = notes.get("rated_payload"), notes.get("arm_movement_type")
+    return Robot(
+        robot_id=robot_id,
+        name=robot.name,
+        type=robot.type,
+        manufacturer=robot.manufacturer,
+        weight_kg=robot.weight,
+        controlled_axes=len(robot.joints),
+        arm_movement_type=arm if isinstance(arm, str) else _movement(robot),
+        rated_payload_kg=float(rated) if isinstance(rated, int | float) else None,
+        ambient_temperature_degc=data_set.ambient_temperature,
+        power_measured_at=data_set.power_at,
+        simulated=data_set.simulated,
+        urdf=robot.urdf,
+        urdf_sha256=hashlib.sha256(robot.urdf.encode()).hexdigest(),
+        twin_effects=None if data_set.effects is None else ",".join(data_set.effects),
+        notes=json.dumps(dict(data_set.notes), default=str, sort_keys=True),
+    )
+
+
+def _movement(robot: description.Robot) -> str:
+    """The kinematic chain in the usual letters: "RRRRRR" for six revolute joints."""
+    return "".join("P" if joint.kind == "prismatic" else "R" for joint in robot.joints)
+
+
+def _joint_row(robot_id: str, place: int, joint: description.Joint) -> Joint:
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return Joint(
+        robot_id=robot_id,
+        name=joint.name,
+        position=place,
+        kind=joint.kind,
+        lower_limit_rad=finite(joint.lower),
+        upper_limit_rad=finite(joint.upper),
+        speed_limit_rad_s=finite(joint.velocity),
+        torque_limit_nm=finite(joint.effort),
+        gear_ratio=joint.gear_ratio,
+        rotor_inertia_kg_m2=joint.rotor_inertia,
+        torque_constant_nm_a=joint.torque_constant,
+        winding_resistance_ohm=joint.winding_resistance,
+    )
+
+
+def _run_row(robot_id: str, run: log.Run, now: datetime) -> Run:
+    time = run.signals.time
+    duration = float(time[-1] - time[0])
+    x, y, z = run.payload_com
+    return Run(
+        run_id=f"{robot_id}.{identifier(run.name)}",
+        robot_id=robot_id,
+        name=run.name,
+        role=run.role,
+        payload_kg=run.payload_mass,
+        payload_com_x_m=x,
+        payload_com_y_m=y,
+        payload_com_z_m=z,
+        repeat_of=None if run.repeat_of is None else f"{robot_id}.{identifier(run.repeat_of)}",
+        start_time=run.started or now,
+        start_time_from="log" if run.started else "ingest",
+        run_time_s=duration,
+        sample_count=len(time),
+        sample_rate_hz=(len(time) - 1) / duration,
+        file=run.file.name,
+        sha256=run.sha256,
+    )

@@ -1,0 +1,50 @@
+"""The provider of a run's state: how much of it passed idle, and where it ended."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from irtwin.providers.provider import Made
+from irtwin.providers.records import load_robot, load_run, run_iri
+from irtwin.signals.conditioning import condition
+from irtwin.signals.motion import Motion
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import JointState, Run, RunState
+
+# A joint stands still below this share of its fastest speed in the run, or below a speed that no task needs.
+_STILL_SHARE, _STILL_SPEED = 0.005, 1e-3
+
+
+def provide(workspace: Workspace, run_id: str) -> Made:
+    """Make a run's RunState and the JointState of each joint at its last sample."""
+    with workspace.reading() as session:
+        robot_id = session.get_one(Run, run_id).robot_id
+    robot = load_robot(workspace, robot_id)
+    run = load_run(workspace, robot, run_id)
+    motion = condition(run, robot)
+    still = standstill(motion)
+    state = RunState(
+        run_id=run_id,
+        current_state="standstill" if still[-1] else "moving",
+        idle_share=float(still.mean()),
+    )
+    joints = [
+        JointState(
+            run_id=run_id,
+            joint=joint.name,
+            robot_id=robot_id,
+            joint_position_rad=float(motion.q[-1, place]),
+            joint_speed_rad_s=float(motion.dq[-1, place]),
+            joint_acc_rad_s2=float(motion.ddq[-1, place]),
+            joint_torque_nm=None if motion.torque is None else float(motion.torque[-1, place]),
+            joint_temperature_degc=None if motion.temperature is None else float(motion.temperature[-1, place]),
+        )
+        for place, joint in enumerate(robot.joints)
+    ]
+    return Made(robot_id, [run_iri(run_id)], [state, *joints])
+
+
+def standstill(motion: Motion) -> np.ndarray:
+    """Return where no joint moves, (N,) bool."""
+    speed = np.abs(motion.dq)
+    return np.asarray((speed < np.maximum(_STILL_SPEED, _STILL_SHARE * speed.max(axis=0))).all(axis=1))
