@@ -10,9 +10,10 @@ from scipy.optimize import lsq_linear
 
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
+from irtwin.identification.uncertainty import covariance
 
 _REWEIGHTINGS = 4
-_LEAST_NOISE = 1e-9  # of the measurement's size: exact data still have finite weights
+_LEAST_NOISE = 1e-6  # of the measurement's size: exact data still have finite weights
 
 
 @dataclass(frozen=True)
@@ -36,22 +37,20 @@ def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]
     they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Bounds hold
     (`lowest`). The covariance is explained in `uncertainty`.
     """
-    from irtwin.identification.uncertainty import covariance
-
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
-    rows = sum(block.rows for block in blocks)
+    count = sum(block.rows for block in blocks)
     expected = np.array([term.expected for term in terms])
     prior = 1 / np.array([term.spread for term in terms])
     lowest = np.array([term.lowest for term in terms])
-    sizes = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(rows)
+    sizes = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
     noise = np.maximum(sizes, np.finfo(float).tiny)
     values = expected
     for _ in range(_REWEIGHTINGS):
         values = _solve(factors, noise, expected, prior, lowest)
         residual = [np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors]
-        noise = np.maximum(np.array(residual) / np.sqrt(rows), np.maximum(_LEAST_NOISE * sizes, np.finfo(float).tiny))
-    spread = covariance(blocks, pattern, values, noise, prior)
-    return Estimate(values, spread, noise, len(blocks))
+        noise = np.maximum(np.array(residual) / np.sqrt(count), np.maximum(_LEAST_NOISE * sizes, np.finfo(float).tiny))
+    rows = np.concatenate([factor[:, :-1] / level for factor, level in zip(factors, noise, strict=True)])
+    return Estimate(values, covariance(blocks, pattern, rows, values, noise, 1 / prior), noise, len(blocks))
 
 
 def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str] = B
         cutoff=max((motion.cutoff for motion in motions if motion.cutoff), default=None),
         unidentified=tuple(effect for effect in effects if effect not in stack.ids),
         base_parameters=fit.base if fit else (),
-        condition_number=fit.condition if fit else None,
+        condition_number=fit.condition if fit and np.isfinite(fit.condition) else None,
         fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
     )
 
@@ -134,12 +134,13 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
 def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Parameter]:
     """Fit the coefficients of torque and power together to measured power, which torque carries into it.
 
-    Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from the expected values.
+    Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from no torque, where the first
+    step is that of a robot without such losses.
     """
     real = [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
     free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
     fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
-    torque_values, power_values = _expected(stack.torque_terms), _expected(stack.power_terms)
+    torque_values, power_values = np.zeros(len(stack.torque_terms)), _expected(stack.power_terms)
     spread = np.array([term.spread for _, term in (*real, *free)])
     before = np.full(len(spread), np.inf)
     for _ in range(_STEPS):

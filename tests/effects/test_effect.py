@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irtwin.effects.effect import BASELINE, catalogue
+from irtwin.effects.rigid_body import NAMES
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.robot.urdf import parse_urdf
+from synthetic import arm, rigid_torque, swing, truth, with_constants
+
+CONTRACT = Path(__file__).parents[3] / "shared/contract/effects.toml"
+
+
+@pytest.mark.system
+@pytest.mark.skipif(not CONTRACT.exists(), reason="the shared contract is not here")
+def test_effects_are_as_the_contract_says():
+    contract = tomllib.loads(CONTRACT.read_text())
+    robot = with_constants(arm(3))
+    assert tuple(name for name, entry in contract.items() if entry.get("baseline")) == BASELINE
+    for name, effect in catalogue().items():
+        entry = contract[name]
+        assert effect.channel == entry["channel"]
+        if name == "rigid_body":  # its ten per link are beyond the table
+            continue
+        terms = [term for term in effect.terms(robot) if not term.fixed]
+        names = {term.name: term.unit.replace("N m", "Nm") for term in terms}
+        assert names == {key: value[0] for key, value in entry.get("parameters", {}).items()}
+        per_joint = all(term.joint for term in effect.terms(robot))
+        assert per_joint == (entry["per"] == "joint" or name == "mechanical_power")
+
+
+def test_ids_and_keys_agree():
+    assert all(effect.id == name for name, effect in catalogue().items())
+
+
+@pytest.mark.parametrize("robot", [arm(4), arm(6), arm(7), arm(3, slides=(1,))], ids=["4", "6", "7", "slide"])
+def test_torque_is_that_of_inverse_dynamics(robot):
+    motion = swing(robot, 1, seconds=2)
+    stack = Stack(robot, ["rigid_body"])
+    nominal = np.array([term.expected for _, term in stack.torque_terms])
+    np.testing.assert_allclose(stack.torque_columns(motion) @ nominal, rigid_torque(robot, motion), atol=1e-10)
+
+
+def test_torque_is_that_of_mujoco():
+    mujoco = pytest.importorskip("mujoco")
+    robot = arm(6)
+    motion = swing(robot, 2, seconds=1)
+    model = mujoco.MjModel.from_xml_string(robot.urdf)
+    model.dof_armature[:] = truth(robot)["Ia"]
+    data = mujoco.MjData(model)
+    expected = []
+    for state in zip(motion.q, motion.dq, motion.ddq, strict=True):
+        data.qpos[:], data.qvel[:], data.qacc[:] = state
+        mujoco.mj_inverse(model, data)
+        expected.append(data.qfrc_inverse - data.qfrc_passive)
+    stack = Stack(robot, ["rigid_body", "rotor_inertia"])
+    values = np.array([term.expected for _, term in stack.torque_terms])
+    values[-6:] = truth(robot)["Ia"]
+    np.testing.assert_allclose(stack.torque_columns(motion) @ values, expected, atol=1e-8)
+
+
+def test_friction_opposes_motion_and_rests_at_standstill():
+    robot = arm(2)
+    motion = swing(robot, 3, seconds=1)
+    motion.dq[:3] = [[0.0, 1e-5], [0.5, -0.5], [-2.0, 2.0]]
+    coulomb, viscous = catalogue()["coulomb_friction"], catalogue()["viscous_friction"]
+    signs = np.einsum("tjj->tj", coulomb.columns(robot, motion))
+    assert signs[:3].tolist() == [[0, 0], [1, -1], [-1, 1]]
+    np.testing.assert_allclose(np.einsum("tjj->tj", viscous.columns(robot, motion)), motion.dq)
+
+
+def test_payload_is_a_point_mass_on_the_last_link():
+    robot = arm(4)
+    motion = swing(robot, 4, seconds=1)
+    loaded = replace(motion, payload_mass=3.0, payload_com=(0.05, -0.02, 0.1))
+    stack = Stack(robot, ["rigid_body"])
+    nominal = np.array([term.expected for _, term in stack.torque_terms])
+    # independent: the same robot with a ball in its URDF
+    ball = '<inertial><origin xyz="0.05 -0.02 0.1"/><mass value="3"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" '
+    ball += 'izz="0"/></inertial>'
+    urdf = robot.urdf.replace('<link name="flange"/>', f'<link name="flange">{ball}</link>')
+    expected = rigid_torque(parse_urdf(urdf), motion)
+    np.testing.assert_allclose(
+        stack.torque_columns(loaded) @ (nominal + stack.shift(loaded)), expected, rtol=1e-9, atol=1e-9
+    )
+
+
+def test_units_of_a_sliding_joint_are_those_of_force():
+    robot = arm(3, slides=(1,))
+    units = {(effect.id, term.joint): term.unit for effect, term in Stack(robot, BASELINE).torque_terms}
+    assert units["viscous_friction", "joint_2"] == "N s/m"
+    assert units["viscous_friction", "joint_1"] == "N m s/rad"
+    assert units["rotor_inertia", "joint_2"] == "kg"
+    assert units["coulomb_friction", "joint_2"] == units["torque_offset", "joint_2"] == "N"
+
+
+def test_offset_shows_in_the_measurement_but_is_no_torque():
+    robot = arm(2)
+    stack = Stack(robot, ["viscous_friction", "torque_offset"])
+    assert stack.real.tolist() == [True, True, False, False]
+    motion = swing(robot, 1, seconds=1)
+    np.testing.assert_allclose(stack.real_torque(motion, np.array([2.0, 3.0, 50.0, 60.0])), motion.dq * [2, 3])
+
+
+def test_copper_loss_takes_current_where_the_torque_constant_is_known():
+    robot = arm(2)
+    motion = swing(robot, 1, seconds=1)
+    torque = np.ones((100, 2)) * [4.0, 6.0]
+    copper = catalogue()["copper_loss"]
+    assert [term.unit for term in copper.terms(robot)] == ["W/(N m)^2"] * 2
+    np.testing.assert_allclose(copper.columns(robot, motion, torque)[0], [16, 36])
+    known = with_constants(robot, 2.0)
+    assert [term.unit for term in copper.terms(known)] == ["ohm"] * 2
+    np.testing.assert_allclose(copper.columns(known, motion, torque)[0], [4, 9])
+
+
+def test_a_joint_feels_the_links_that_it_carries():
+    robot = arm(3)
+    pattern = Stack(robot, ["rigid_body"]).pattern.reshape(3, 3, len(NAMES)).any(axis=2)
+    assert (pattern == np.triu(np.ones((3, 3), dtype=bool))).all()
+
+
+@pytest.mark.parametrize(
+    "effects, message",
+    [
+        (["rigid_body", "magic"], 'there is no effect "magic"; use some of rigid_body'),
+        (["rigid_body", "rigid_body"], 'effect "rigid_body" stands there twice; name it once'),
+    ],
+)
+def test_wrong_lists_of_effects(effects, message):
+    with pytest.raises(InputError) as error:
+        Stack(arm(2), effects)
+    assert str(error.value).startswith(message)

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from irtwin.effects.effect import BASELINE
+from irtwin.effects.stack import Stack
+from irtwin.identification import accumulate as room
+from irtwin.identification.accumulate import accumulate
+from irtwin.identification.estimators import combine
+from irtwin.signals.filter import decimate, decimation, kernel
+from synthetic import arm, measure, swing
+
+ROBOT = arm(3)
+STACK = Stack(ROBOT, BASELINE)
+
+
+def equations(motion):
+    columns = STACK.torque_columns(motion)
+    return columns, columns @ STACK.shift(motion), motion.torque
+
+
+def products(motion, step=1, taps=None):
+    """What the factors must reproduce: the inner products of all columns, from all samples at once."""
+    taps = np.ones(1) if taps is None else taps
+    half = len(taps) // 2
+    columns = decimate(STACK.torque_columns(motion), taps, step)
+    measured = motion.torque[half : len(motion.time) - half : step]
+    rows = np.concatenate([columns, measured[:, :, None]], axis=2)
+    return np.einsum("tja,tjb->jab", rows, rows)
+
+
+def reduced(motions):
+    blocks = accumulate(motions, equations, STACK.pattern)
+    factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(STACK.pattern)]
+    return blocks, np.array([factor.T @ factor for factor in factors])
+
+
+def test_factors_hold_every_inner_product():
+    motion = measure(ROBOT, swing(ROBOT, 1))
+    blocks, found = reduced([motion])
+    np.testing.assert_allclose(found, products(motion), rtol=1e-9, atol=1e-6)
+    assert sum(block.rows for block in blocks) == len(motion.time)
+    assert {block.run for block in blocks} == {"swing_1"}
+
+
+def test_chunks_join_without_a_seam(monkeypatch):
+    motion = measure(ROBOT, swing(ROBOT, 2))
+    whole = reduced([motion])[1]
+    monkeypatch.setattr(room, "_CHUNK", 17)
+    np.testing.assert_allclose(reduced([motion])[1], whole, rtol=1e-9, atol=1e-6)
+
+
+def test_columns_are_filtered_as_the_measurement_was(monkeypatch):
+    monkeypatch.setattr(room, "_BLOCKS", 1)
+    motion = replace(measure(ROBOT, swing(ROBOT, 3)), cutoff=4.0)
+    expected = products(motion, decimation(100, 4.0), kernel(100, 4.0))
+    np.testing.assert_allclose(reduced([motion])[1], expected, rtol=1e-9, atol=1e-6)
+
+
+def test_blocks_are_long_enough_to_be_independent():
+    motion = replace(measure(ROBOT, swing(ROBOT, 4)), cutoff=1.0)
+    blocks, _ = reduced([motion])
+    assert all(block.stop - block.start > 3.5 for block in blocks)
+    assert len(reduced([replace(motion, cutoff=20.0)])[0]) == 40
+
+
+def test_a_run_shorter_than_the_filter_gives_nothing():
+    motion = replace(measure(ROBOT, swing(ROBOT, 5, seconds=0.5)), cutoff=1.0)
+    assert reduced([measure(ROBOT, swing(ROBOT, 5)), motion])[0][-1].run == "swing_5"
+    assert accumulate([motion], equations, STACK.pattern) == []
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_factor_is_small_however_long_the_run(count):
+    blocks, _ = reduced([measure(ROBOT, swing(ROBOT, k, seconds=30)) for k in range(count)])
+    assert max(factor.shape[0] for block in blocks for factor in block.factors) <= len(STACK.torque_terms) + 1

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from irtwin.errors import InputError
+from irtwin.signals.conditioning import choose_cutoff, condition, differentiate
+from synthetic import arm, as_run, measure, swing
+
+ROBOT = arm(3)
+
+
+def relative(found, expected):
+    return np.sqrt(np.mean((found - expected) ** 2)) / np.sqrt(np.mean(expected**2))
+
+
+@pytest.mark.parametrize("rate", [25.0, 30.0, 83.33, 125.0, 1000.0])
+def test_derivatives_at_every_rate_that_robots_log_at(rate):
+    motion = swing(ROBOT, 1, rate=rate)
+    found = condition(as_run(motion), ROBOT)
+    assert found.rate == pytest.approx(rate)
+    assert found.cutoff <= 0.4 * rate + 1e-9
+    inner = slice(int(rate), -int(rate))
+    assert relative(found.q[inner], motion.q[inner]) < 1e-3
+    assert relative(found.dq[inner], motion.dq[inner]) < 5e-3
+    assert relative(found.ddq[inner], motion.ddq[inner]) < 0.02
+
+
+def test_derivatives_hold_up_to_the_ends():
+    motion = swing(ROBOT, 2)
+    found = condition(as_run(motion), ROBOT)
+    for part in (slice(0, 50), slice(-50, None)):
+        assert relative(found.dq[part], motion.dq[part]) < 0.1
+        assert np.abs(found.ddq[part]).max() < 2 * np.abs(motion.ddq).max()
+
+
+def test_noise_of_encoders_does_not_drown_the_acceleration():
+    motion = swing(ROBOT, 3, rate=1000.0)
+    noisy = replace(motion, q=np.round(motion.q / 1e-5) * 1e-5)
+    found = condition(as_run(noisy), ROBOT)
+    inner = slice(500, -500)
+    assert relative(found.ddq[inner], motion.ddq[inner]) < 0.02
+
+
+@settings(max_examples=10, deadline=None)
+@given(jitter=st.floats(0, 0.3), seed=st.integers(0, 100))
+def test_jitter_of_sampling_is_evened_out(jitter, seed):
+    rng = np.random.default_rng(seed)
+    motion = swing(ROBOT, 4, seconds=10)
+    dense = swing(ROBOT, 4, seconds=10, rate=10000.0)
+    rows = np.round(np.arange(1000) * 100 + 100 * jitter * rng.uniform(-1, 1, 1000)).astype(int).clip(0, 99999)
+    run = as_run(replace(dense, time=dense.time[rows], q=dense.q[rows]))
+    found = condition(run, ROBOT)
+    assert np.ptp(np.diff(found.time)) < 1e-9
+    expected = np.column_stack([np.interp(found.time, motion.time, column) for column in motion.dq.T])
+    assert relative(found.dq[100:-100], expected[100:-100]) < 0.02
+
+
+def test_cutoff_follows_the_band_of_the_motion_and_not_its_noise():
+    motion = swing(ROBOT, 5, rate=200.0)
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(motion.q.shape)
+    clean, noisy = choose_cutoff([as_run(motion)]), choose_cutoff([as_run(replace(motion, q=motion.q + noise))])
+    assert 3 < clean < 8  # sines up to 0.6 Hz
+    assert noisy == pytest.approx(clean, rel=0.2)
+    fast = replace(motion, time=motion.time / 3)
+    assert choose_cutoff([as_run(fast)]) == pytest.approx(3 * clean, rel=0.2)
+    assert choose_cutoff([as_run(fast), as_run(motion)]) == choose_cutoff([as_run(fast)])
+
+
+def test_a_robot_that_rests_can_be_conditioned():
+    motion = swing(ROBOT, 6)
+    rest = replace(motion, q=np.full_like(motion.q, 0.3))
+    found = condition(as_run(rest), ROBOT)
+    np.testing.assert_allclose(found.q, 0.3)
+    assert np.abs(found.dq).max() < 1e-9
+
+
+def test_logged_speed_is_taken_where_it_agrees_with_the_positions():
+    motion = swing(ROBOT, 7, rate=25.0)
+    good = condition(as_run(motion, dq=motion.dq), ROBOT)
+    degrees = condition(as_run(motion, dq=np.rad2deg(motion.dq)), ROBOT)
+    alone = condition(as_run(motion), ROBOT)
+    assert relative(good.dq[25:-25], motion.dq[25:-25]) < 1e-3
+    np.testing.assert_array_equal(degrees.dq, alone.dq)
+    np.testing.assert_allclose(good.ddq, differentiate(good.dq, good.rate))
+
+
+def test_every_measurement_passes_the_same_filter():
+    motion = measure(ROBOT, swing(ROBOT, 8))
+    found = condition(as_run(motion, torque=motion.q, temperature=motion.q), ROBOT, cutoff=3.0)
+    assert found.cutoff == 3.0
+    np.testing.assert_allclose(found.torque, found.q, atol=1e-12)
+    np.testing.assert_allclose(found.temperature, found.q, atol=1e-12)
+    assert found.power.shape == (len(found.time),)
+    assert found.current.shape == found.q.shape
+
+
+@pytest.mark.parametrize("cutoff", [0.0, -1.0, float("nan")])
+def test_wrong_cutoffs(cutoff):
+    with pytest.raises(InputError, match="give a positive frequency"):
+        condition(as_run(swing(ROBOT, 9)), ROBOT, cutoff)
+
+
+def test_too_short_a_run():
+    with pytest.raises(InputError, match=r"swing_1.csv: has 10 samples; a run needs at least 20"):
+        condition(as_run(swing(ROBOT, 1, seconds=0.1)), ROBOT)

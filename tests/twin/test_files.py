@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from irtwin.errors import InputError
+from irtwin.twin.files import load, save
+from irtwin.twin.identify import identify
+from synthetic import arm, measure, swing
+
+ROBOT = arm(3)
+MOTION = measure(ROBOT, swing(ROBOT, 1), noise=0.3)
+# from currents: the robot then carries torque constants that its URDF lacks
+TWIN = identify(
+    ROBOT, [type(MOTION)(**{**vars(MOTION), "torque": None})], ("rigid_body", "copper_loss", "torque_offset")
+)
+
+
+def test_a_saved_twin_is_the_same_twin(tmp_path):
+    save(TWIN, tmp_path / "twin.json")
+    again = load(tmp_path / "twin.json")
+    for name in ("effects", "parameters", "base_parameters", "cutoff", "unidentified", "condition_number", "fitted"):
+        assert getattr(again, name) == getattr(TWIN, name)
+    assert again.robot.joints == TWIN.robot.joints
+    np.testing.assert_array_equal(again.torque(MOTION), TWIN.torque(MOTION))
+    np.testing.assert_array_equal(again.power(MOTION), TWIN.power(MOTION))
+    save(again, tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_text() == (tmp_path / "twin.json").read_text()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again.json", "twin.json"]
+
+
+def spoil(document, *keys, value=None, drop=False):
+    *way, last = keys
+    for key in way:
+        document = document[key]
+    if drop:
+        del document[last]
+    else:
+        document[last] = value
+
+
+@pytest.mark.parametrize(
+    "keys, change, message",
+    [
+        (("format",), {"value": "gcode"}, '"format" is not "irtwin twin"; name a twin that irtwin saved'),
+        (("version",), {"value": 9}, '"version" is not 1; identify the twin again'),
+        (("effects",), {"drop": True}, '"effects" is missing'),
+        (("effects",), {"value": ["rigid_body", "magic"]}, 'there is no effect "magic"'),
+        (("effects",), {"value": [3]}, '"effects" holds something that is no text'),
+        (("cutoff",), {"value": "fast"}, '"cutoff" is no float'),
+        (("robot",), {"value": []}, '"robot" is no dict'),
+        (("robot", "urdf"), {"value": "<robot"}, "URDF in it, line 1"),
+        (("robot", "joints", "joint_2"), {"drop": True}, 'in "joints": "joint_2" is missing'),
+        (("parameters", 3, "value"), {"value": None}, 'in "parameters", entry 4: "value" is no float'),
+        (("parameters", 3, "value"), {"value": float("nan")}, 'entry 4: "value" is not a finite number'),
+        (("parameters", 0), {"value": 5}, 'in "parameters", entry 1: '),
+        (("parameters", 0), {"drop": True}, 'parameter m of effect "rigid_body" on link_1 is missing'),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_named(tmp_path, keys, change, message):
+    path = tmp_path / "twin.json"
+    save(TWIN, path)
+    document = json.loads(path.read_text())
+    spoil(document, *keys, **change)
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError) as error:
+        load(path)
+    assert message in str(error.value)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff\xfe"])
+def test_files_that_are_no_twin(tmp_path, content):
+    path = tmp_path / "twin.json"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"twin\.json.*name a twin that irtwin saved"):
+        load(path)
+    with pytest.raises(InputError, match=r"none\.json: cannot be read"):
+        load(tmp_path / "none.json")

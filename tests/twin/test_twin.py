@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from irtwin.effects.effect import BASELINE
+from irtwin.twin import twin as room
+from irtwin.twin.identify import identify
+from synthetic import arm, measure, swing, with_constants
+
+ALL = (*BASELINE, "copper_loss")
+ROBOT = with_constants(arm(3))
+TWIN = identify(ROBOT, [measure(ROBOT, swing(ROBOT, seed), noise=0.2) for seed in range(2)], ALL)
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 1000), payload=st.floats(0, 10), count=st.integers(1, 1500))
+def test_ledger_sums_to_the_energy(seed, payload, count):
+    motion = replace(swing(ROBOT, seed, seconds=15), payload_mass=payload).part(0, count)
+    total = sum(entry.energy for entry in TWIN.ledger(motion))
+    assert total == pytest.approx(TWIN.energy(motion), rel=1e-10, abs=1e-9)
+
+
+def test_ledger_names_who_took_what():
+    motion = swing(ROBOT, 3)
+    entries = {(entry.effect, entry.joint): entry.energy for entry in TWIN.ledger(motion)}
+    assert entries["standby_power", None] == pytest.approx(TWIN._values["standby_power", None, None, "P0"] * 19.99)
+    for effect in ("viscous_friction", "coulomb_friction", "copper_loss"):
+        assert all(entries[effect, joint] > 0 for joint in ROBOT.joint_names)
+    # what measurement adds takes no energy, and mechanical power is entered under what takes it
+    assert {effect for effect, _ in entries}.isdisjoint({"torque_offset", "mechanical_power"})
+
+
+@settings(max_examples=10, deadline=None)
+@given(factor=st.floats(-3, 3))
+def test_torque_is_linear_in_the_parameters(factor):
+    motion = swing(ROBOT, 4, seconds=1)
+    scaled = [replace(parameter, value=factor * parameter.value) for parameter in TWIN.parameters]
+    np.testing.assert_allclose(
+        replace(TWIN, parameters=tuple(scaled)).torque(motion), factor * TWIN.torque(motion), atol=1e-8
+    )
+
+
+def test_long_motions_are_worked_in_pieces(monkeypatch):
+    motion = swing(ROBOT, 5, seconds=5)
+    whole = TWIN.torque(motion), TWIN.power(motion), TWIN.ledger(motion)
+    monkeypatch.setattr(room, "_PIECE", 37)
+    np.testing.assert_allclose(TWIN.torque(motion), whole[0])
+    np.testing.assert_allclose(TWIN.power(motion), whole[1])
+    for entry, expected in zip(TWIN.ledger(motion), whole[2], strict=True):
+        assert entry.energy == pytest.approx(expected.energy, abs=1e-9)
+
+
+def test_power_without_an_effect_of_power_is_none():
+    twin = identify(ROBOT, [measure(ROBOT, swing(ROBOT, 1))], ["rigid_body", "viscous_friction"])
+    assert not twin.power(swing(ROBOT, 2)).any()
+    assert twin.ledger(swing(ROBOT, 2)) == ()
+
+
+def test_a_twin_cannot_be_changed():
+    with pytest.raises(FrozenInstanceError):
+        TWIN.cutoff = 3.0
+
+
+def test_measured_torque_is_current_times_constant_where_no_torque_was_logged():
+    motion = measure(ROBOT, swing(ROBOT, 1))
+    np.testing.assert_array_equal(TWIN.measured_torque(motion), motion.torque)
+    np.testing.assert_allclose(TWIN.measured_torque(replace(motion, torque=None)), motion.current * 8.0)
+    assert TWIN.measured_torque(swing(ROBOT, 1)) is None
+    assert replace(TWIN, robot=arm(3)).measured_torque(replace(motion, torque=None)) is None
