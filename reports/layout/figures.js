@@ -98,6 +98,35 @@
     }
   }
 
+  // While the 3-D scene plays the run that is shown, a line in each panel says where it is; a click sends it there.
+  function moveCursors(figure, time) {
+    const layout = figure._fullLayout;
+    let cursors = [...figure.querySelectorAll(".cursor")];
+    const plots = Object.values(layout._plots);
+    while (cursors.length < plots.length) cursors.push(figure.appendChild(Object.assign(document.createElement("i"), { className: "cursor" })));
+    cursors.forEach(function (cursor, index) {
+      const plot = plots[index], inside = plot && time >= plot.xaxis.range[0] && time <= plot.xaxis.range[1];
+      cursor.hidden = !inside;
+      if (!inside) return;
+      cursor.style.cssText = "top:" + plot.yaxis._offset + "px;height:" + plot.yaxis._length + "px;" +
+        "transform:translateX(" + (plot.xaxis._offset + plot.xaxis.l2p(time)) + "px)";
+    });
+  }
+
+  function followScene(choice) {
+    const drawn = ["figure-torque", "figure-power"].map((id) => document.getElementById(id)).filter((figure) => figure);
+    const shown = () => Number(choice.value) === page.explorer.opens;
+    let now = -1;
+    const update = () => drawn.forEach((figure) => moveCursors(figure, shown() ? now : -1));
+    document.addEventListener("irtwin:time", (event) => { now = event.detail.time; update(); });
+    drawn.forEach(function (figure) {
+      figure.on("plotly_afterplot", update);
+      figure.on("plotly_click", function (event) {
+        if (shown()) document.dispatchEvent(new CustomEvent("irtwin:time", { detail: { time: event.points[0].x, source: figure } }));
+      });
+    });
+  }
+
   // Torque and power share their time axis across the two figures.
   function link(first, second) {
     if (!first || !second) return;
@@ -129,6 +158,7 @@
     drawRun(Number(choice.value));
     choice.addEventListener("change", () => drawRun(Number(choice.value)));
     link(document.getElementById("figure-torque"), document.getElementById("figure-power"));
+    if (document.querySelector(".scene")) followScene(choice);
   }
 
   // On paper a chart is as wide as the page, and closed tables stand open.

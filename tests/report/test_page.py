@@ -100,6 +100,24 @@ def test_another_run_can_be_chosen(page: Page):
     assert page.evaluate("document.getElementById('figure-torque').data[0].y.slice(0, 50)") != before
 
 
+def test_the_scene_and_the_charts_show_the_same_moment(page: Page):
+    page.locator("#figure-torque").scroll_into_view_if_needed()
+    page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time: 5, source: null}}))")
+    cursors = page.locator("#figure-torque .cursor")
+    assert cursors.count() == 6
+    left = cursors.first.bounding_box()
+    panel = page.locator("#figure-torque .nsewdrag").first.bounding_box()
+    assert left and panel
+    assert left["x"] == pytest.approx(panel["x"] + panel["width"] / 4, abs=2)
+    page.evaluate("document.addEventListener('irtwin:time', (event) => { window.told = event.detail.time; })")
+    page.mouse.move(panel["x"] + panel["width"] / 2 - 3, panel["y"] + panel["height"] / 2)
+    page.mouse.click(panel["x"] + panel["width"] / 2, panel["y"] + panel["height"] / 2)
+    assert page.evaluate("window.told") == pytest.approx(10.0, abs=0.3)
+    page.select_option("#run-choice", label="exciting_1")  # another run than the scene's
+    page.wait_for_timeout(300)
+    assert cursors.first.is_hidden()
+
+
 @pytest.mark.parametrize("width", [1440, 1024])
 def test_nothing_sticks_out(page: Page, width: int):
     page.set_viewport_size({"width": width, "height": 900})

@@ -111,6 +111,11 @@ def test_what_is_missing_is_said(
     assert "These logs are simulated" not in page
 
 
+def test_a_run_without_energy_does_not_hide_the_others(graph: KnowledgeGraph, page_of: PageOf):
+    factory = Factory("R", "R").robot().run("known").run("unknown").twin(["known"], []).into(graph)
+    assert re.search(r"8.82 kJ</b>\s*<span>energy taken</span>\s*<small>2 runs, 40.0 s", text(page_of(factory)))
+
+
 def test_a_robot_without_twin_or_runs_has_a_page(graph: KnowledgeGraph, page_of: PageOf):
     page = text(page_of(Factory("NEW", "NEW").robot(facts=False).into(graph)))
     assert "No twin of this robot has been identified yet" in page

@@ -60,12 +60,12 @@ def energy_error(answer: Answer) -> Figure | None:
     if not rows:
         return None
     kinds: tuple[tuple[str, bool, dict[str, Any]], ...] = (
-        ("run held out of the fit", True, {"color": PALETTE[0]}),
-        ("run that took part in the fit", False, _HATCHED),
+        ("held out of the fit", True, {"color": PALETTE[0]}),
+        ("took part in the fit", False, _HATCHED),
     )
     data = []
     for name, is_held_out, marker in kinds:
-        of_part = [row for row in rows if (row["part"] == "held_out") is is_held_out]
+        of_part = [row for row in rows if (row["part"] in ("held_out", "both")) is is_held_out]
         if of_part:
             bars = _bars(name, _labels(of_part, "run_name"), _column(of_part, "error_percent"), "%", "")
             data.append({**bars, "marker": marker})

@@ -14,18 +14,17 @@ SEED_ENERGY_ERROR = 6.54  # %, Yan 2018, equation (15)
 _TORQUE_PARTS = (("held_out", "on data it never saw"), ("fit", "on the data it was fitted to"))
 _ENERGY_PARTS = (
     ("held_out", "of runs it never saw"),
-    ("both", "of runs of which it saw a part"),
+    ("both", "of the part of a run that it never saw"),
     ("fit", "of the runs it was fitted to"),
 )
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A summary row, and in words the data it was judged on; `held_out` where no sample of them was fitted."""
+    """A summary row, and in words the data it was judged on."""
 
     row: Row
     on: str
-    held_out: bool
 
 
 def torque(answers: Answers) -> Judged | None:
@@ -64,4 +63,4 @@ def _misses(judged: Judged) -> str:
 
 def _best(rows: Sequence[Row], parts: Sequence[tuple[str, str]]) -> Judged | None:
     by_part = {row["part"]: row for row in rows}
-    return next((Judged(by_part[part], on, part == "held_out") for part, on in parts if part in by_part), None)
+    return next((Judged(by_part[part], on) for part, on in parts if part in by_part), None)

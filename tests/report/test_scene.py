@@ -1,0 +1,24 @@
+import pyarrow as pa
+import pytest
+
+from irtwin.report.explorer import Columns
+from irtwin.report.scene import draw_scene
+from irtwin.robot.urdf import parse_urdf
+
+ARM = """<robot name="arm"><link name="base"/><link name="mid"/><link name="tip"><inertial><mass value="1"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="a" type="revolute"><parent link="base"/><child link="mid"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+<joint name="b" type="revolute"><parent link="mid"/><child link="tip"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+SERIES = {"time": [5.0, 6.0, 7.0], "q_a": [0.0, 0.1, 0.2], "energy_model": [0.0, 50.0, 99.0], "power_model": [50.0] * 3}
+
+
+def test_the_scene_performs_the_modelled_series_from_its_start():
+    series = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1]}))
+    assert '"start":0.0' in draw_scene(parse_urdf(ARM, source="arm"), series)
+
+
+def test_a_series_without_a_joint_is_a_bug():
+    with pytest.raises(KeyError, match="q_b"):
+        draw_scene(parse_urdf(ARM, source="arm"), Columns.of(pa.table(SERIES)))
