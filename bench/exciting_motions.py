@@ -1,17 +1,31 @@
 """Design the exciting motions that the plant's campaign runs, by `irtwin excite`'s search, one a seed.
 
-plant/README.md gives the command.
+The search knows the floor but not the robot's own body: `--within` gives narrower limits (deg) that keep the arm off
+it. plant/README.md gives the command.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from math import radians
 from pathlib import Path
 
 import numpy as np
 
 from irtwin.identification.excitation import Excitation, excite
+from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
+
+
+def within(robot: Robot, limits: Sequence[str]) -> Robot:
+    """Return the robot with narrower position limits, given as "joint:lower:upper" in deg."""
+    joints = {joint.name: joint for joint in robot.joints}
+    for limit in limits:
+        name, lower, upper = limit.split(":")
+        joints[name] = replace(joints[name], lower=radians(float(lower)), upper=radians(float(upper)))
+    return replace(robot, joints=tuple(joints.values()))
 
 
 def as_toml(motion: Excitation, seed: int) -> str:
@@ -41,8 +55,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
+    parser.add_argument("--within", nargs="+", default=[], metavar="JOINT:LOWER:UPPER")
     arguments = parser.parse_args()
-    robot = read_urdf(arguments.urdf)
+    robot = within(read_urdf(arguments.urdf), arguments.within)
     for number, seed in enumerate(arguments.seeds, start=1):
         motion = excite(robot, arguments.seconds, seed=seed)
         print(f"exciting_{number}: seed {seed}, condition number {motion.condition_number:.1f}", flush=True)

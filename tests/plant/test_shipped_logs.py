@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -51,6 +52,23 @@ def test_stays_within_what_the_robot_can_do(data_set: DataSet, drawings: Drawing
         assert signals.torque is not None and signals.power is not None and signals.temperature is not None
         assert (np.abs(signals.torque) < 1.05 * drawings.drive.maximum_torque).all(), run.name
         assert 95 < signals.power.min() < 130 and signals.power.max() < 2000, run.name
+
+
+def test_no_motion_touches_the_floor_or_the_arm_itself(drawings: Drawings) -> None:
+    show = '<mujoco><compiler discardvisual="false" fusestatic="false"/></mujoco>'
+    spec = mujoco.MjSpec.from_string(drawings.urdf.replace("</robot>", f"{show}</robot>"))
+    for shape in spec.geoms:
+        shape.contype = shape.conaffinity = 1
+    model = spec.compile()
+    data, body = mujoco.MjData(model), model.geom_bodyid
+    campaign = read_campaign("kuka_kr6_r700")
+    for name, entry in campaign.motions.items():
+        for q in motion_of(entry, drawings).q[::100]:
+            data.qpos[:] = q
+            mujoco.mj_fwdPosition(model, data)
+            touching = [tuple(body[contact.geom]) for contact in data.contact]
+            assert all(abs(int(a) - int(b)) <= 1 for a, b in touching), name  # neighbours overlap at their joint
+            assert data.body("tool0").xpos[2] > 0.1, name
 
 
 def test_warms_up(data_set: DataSet) -> None:
