@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 from arms import kr6, two_joints
 
-from irtwin.identification.base_condition import BaseRegressor, independent_columns
+from irtwin.effects.stack import Stack
+from irtwin.identification.base_condition import BaseRegressor
+from irtwin.signals.motion import Motion
 
 
 def motion(n: int, samples: int = 40) -> list[np.ndarray]:
@@ -15,10 +17,12 @@ def test_a_six_axis_arm_has_its_known_number_of_base_columns() -> None:
     assert len(BaseRegressor(kr6()).columns) == 36 + 4 + 18
 
 
-def test_independent_columns_leave_out_what_others_make() -> None:
-    random = np.random.default_rng(0).normal(size=(30, 4))
-    matrix = np.column_stack([random, random @ [1, 2, 3, 4], np.zeros(30)])
-    assert len(independent_columns(matrix)) == 4
+def test_its_columns_are_those_of_the_effects() -> None:
+    robot = kr6()
+    regressor, stack = BaseRegressor(robot), Stack(robot, BaseRegressor.EFFECTS)
+    q, dq, ddq = motion(6)
+    columns = stack.torque_columns(Motion("run", np.arange(len(q)), q, dq, ddq))[:, :, regressor.columns]
+    np.testing.assert_allclose(regressor.matrix(q, dq, ddq), columns.reshape(-1, len(regressor.columns)), atol=1e-9)
 
 
 @pytest.mark.parametrize("robot", [kr6(), two_joints(kind="prismatic")])

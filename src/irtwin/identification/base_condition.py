@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg import qr
 
+from irtwin.effects.stack import Stack
+from irtwin.identification.base_parameters import base_parameters
 from irtwin.robot.description import Robot
 
 _SHARPNESS = 4  # of the smooth maximum and minimum of the eigenvalues
@@ -24,19 +25,18 @@ class MotionGradient:
 
 
 class BaseRegressor:
-    """Columns that torque can tell apart: rigid body, rotor inertia, viscous and Coulomb friction, torque offset.
+    """The columns of the effects that torque shows on every robot, and of these the base columns.
 
-    Of these 10 n + 4 n columns the base columns are chosen once, by QR with pivoting on random motion.
+    Rows and columns are those of `effects.stack`, here with their derivatives: 10 n of the rigid bodies, then n each.
     """
+
+    EFFECTS = ("rigid_body", "rotor_inertia", "viscous_friction", "coulomb_friction", "torque_offset")
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
         self._data = robot.model.createData()
         self._n = len(robot.joints)
-        random = np.random.default_rng(0)
-        q = random.uniform(-2, 2, (60 + 20 * self._n, self._n))
-        dq, ddq = random.normal(size=q.shape), random.normal(size=q.shape)
-        self.columns = independent_columns(self._all(q, dq, ddq, np.sign(dq)))
+        self.columns = base_parameters(Stack(robot, self.EFFECTS)).independent
 
     def matrix(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the base regressor W of a motion, (N n, p): joint torque = W times base parameters."""
@@ -84,15 +84,6 @@ class BaseRegressor:
         each_joint = [_diagonals(ddq), _diagonals(dq), _diagonals(sign), _diagonals(np.ones_like(dq))]
         stack = np.concatenate([self._rigid(q, dq, ddq), *each_joint], axis=2)
         return stack.reshape(-1, stack.shape[2])
-
-
-def independent_columns(matrix: np.ndarray, tolerance: float = 1e-8) -> np.ndarray:
-    """Return the indices, rising, of a largest well-conditioned set of independent columns of `matrix`."""
-    length = np.linalg.norm(matrix, axis=0)
-    alive = np.flatnonzero(length > tolerance * length.max())
-    triangle, order = qr(matrix[:, alive] / length[alive], mode="r", pivoting=True)
-    diagonal = np.abs(np.diag(triangle))
-    return np.sort(alive[order[: np.count_nonzero(diagonal > tolerance * diagonal[0])]])
 
 
 def _diagonals(values: np.ndarray) -> np.ndarray:
