@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from irtwin.effects.effect import Term
+from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.estimators import combine, estimate
 from irtwin.identification.uncertainty import half_widths
@@ -28,6 +29,11 @@ def test_known_truth_is_found():
     terms = [Term("a", "", spread=10), Term("b", "", spread=1), Term("c", "", spread=1e5)]
     found = estimate(blocks_of(columns, columns @ truth), all_used(columns), terms)
     np.testing.assert_allclose(found.values, truth, rtol=1e-5)
+
+
+def test_nothing_to_fit():
+    with pytest.raises(InputError, match="every run is shorter than the filter's kernel; log longer runs"):
+        estimate([], np.ones((1, 1), dtype=bool), [Term("a", "")])
 
 
 def test_noisy_equations_count_less():

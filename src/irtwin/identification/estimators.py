@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from irtwin.effects.effect import Term
+from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.uncertainty import covariance
 
@@ -35,8 +36,10 @@ def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]
     Each equation is weighted by its residual's inverse RMS, found by iteration. The prior of each term (mean
     `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that
     they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Bounds hold
-    (`lowest`). The covariance is explained in `uncertainty`.
+    (`lowest`). The covariance is explained in `uncertainty`. Raises InputError where there is no block at all.
     """
+    if not blocks:
+        raise InputError("every run is shorter than the filter's kernel; log longer runs or take a higher cutoff")
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
     count = sum(block.rows for block in blocks)
     expected = np.array([term.expected for term in terms])
