@@ -45,6 +45,11 @@ class Stack:
         return np.array([effect.channel == "torque" for effect, _ in self.torque_terms], dtype=bool)
 
     @cached_property
+    def fixed(self) -> np.ndarray:
+        """(L,) whether the coefficient of power is known, not estimated."""
+        return np.array([term.fixed for _, term in self.power_terms], dtype=bool)
+
+    @cached_property
     def pattern(self) -> np.ndarray:
         """(n, K) whether the coefficient can act on the joint's torque, found at a few random states."""
         rng = np.random.default_rng(0)

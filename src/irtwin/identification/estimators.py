@@ -43,17 +43,17 @@ def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
     count = sum(block.rows for block in blocks)
     expected = np.array([term.expected for term in terms])
-    prior = 1 / np.array([term.spread for term in terms])
+    spread = np.array([term.spread for term in terms])
     lowest = np.array([term.lowest for term in terms])
     sizes = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
     noise = np.maximum(sizes, np.finfo(float).tiny)
     values = expected
     for _ in range(_REWEIGHTINGS):
-        values = _solve(factors, noise, expected, prior, lowest)
+        values = _solve(factors, noise, expected, spread, lowest)
         residual = [np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors]
         noise = np.maximum(np.array(residual) / np.sqrt(count), np.maximum(_LEAST_NOISE * sizes, np.finfo(float).tiny))
     rows = np.concatenate([factor[:, :-1] / level for factor, level in zip(factors, noise, strict=True)])
-    return Estimate(values, covariance(blocks, pattern, rows, values, noise, 1 / prior), noise, len(blocks))
+    return Estimate(values, covariance(blocks, pattern, rows, values, noise, spread), noise, len(blocks))
 
 
 def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:
@@ -65,17 +65,17 @@ def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:
 
 
 def _solve(
-    factors: Sequence[np.ndarray], noise: np.ndarray, expected: np.ndarray, prior: np.ndarray, lowest: np.ndarray
+    factors: Sequence[np.ndarray], noise: np.ndarray, expected: np.ndarray, spread: np.ndarray, lowest: np.ndarray
 ) -> np.ndarray:
     """Solve in the coefficients' deviation from expectation, in units of their spread: well scaled."""
     rows = np.concatenate([factor / level for factor, level in zip(factors, noise, strict=True)])
     target = rows[:, -1] - rows[:, :-1] @ expected
-    scaled = np.concatenate([rows[:, :-1] / prior, np.eye(len(expected))])
+    scaled = np.concatenate([rows[:, :-1] * spread, np.eye(len(expected))])
     target = np.concatenate([target, np.zeros(len(expected))])
     factor = triangle(np.column_stack([scaled, target]))
     left, right = factor[:-1, :-1], factor[:-1, -1]
     deviation = np.linalg.solve(left, right)
-    bounds = (lowest - expected) * prior
+    bounds = (lowest - expected) / spread
     if np.any(deviation < bounds):
-        deviation = lsq_linear(left, right, bounds=(bounds - 1e-12, np.inf), method="bvls").x
-    return np.asarray(np.maximum(expected + deviation / prior, lowest))
+        deviation = lsq_linear(left, right, bounds=(bounds, np.inf), method="bvls").x
+    return np.asarray(np.maximum(expected + deviation * spread, lowest))

@@ -50,6 +50,6 @@ def half_widths(covariance: np.ndarray, spread: np.ndarray, blocks: int) -> np.n
 
     `spread`: (K,) the prior's standard deviations; `blocks`: how many the covariance rests on (Student's t).
     """
-    deviation = np.sqrt(np.diag(covariance))
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))  # a sure sum of unsure terms may round below
     factor = float(student.ppf((1 + _LEVEL) / 2, max(blocks - 1, 1)))
     return np.where(deviation < _LEARNT * spread, factor * deviation, np.nan)

@@ -79,7 +79,8 @@ def _visible(robot: Robot, effects: Sequence[str], *, torque: bool, power: bool)
     """Return the effects that can be told from what was measured, or that hold nothing to be told."""
     whole = Stack(robot, effects)
     seen = {effect.id for effect, term in whole.power_terms if power or term.fixed}
-    seen |= {effect.id for effect, _ in whole.torque_terms if torque or effect.channel == "torque"}
+    carried = "mechanical_power" in effects
+    seen |= {effect.id for effect, _ in whole.torque_terms if torque or (carried and effect.channel == "torque")}
     return Stack(robot, [effect for effect in effects if effect in seen])
 
 
@@ -116,7 +117,6 @@ def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
 def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> list[Parameter]:
     """Fit the coefficients of power on top of the torque that was found."""
     free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
-    fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
     if not free:
         return []
 
@@ -124,8 +124,8 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
         assert motion.power is not None
         torque = stack.real_torque(motion, torque_values)
         columns = stack.power_columns(motion, torque)
-        known = columns[:, fixed] @ _expected(stack.power_terms)[fixed]
-        return columns[:, None, ~fixed], known[:, None], motion.power[:, None]
+        known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+        return columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None]
 
     found = _estimate(motions, equations, free)
     return _parameters(free, found)
@@ -139,14 +139,13 @@ def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Paramete
     """
     real = [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
     free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
-    fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
     torque_values, power_values = np.zeros(len(stack.torque_terms)), _expected(stack.power_terms)
     spread = np.array([term.spread for _, term in (*real, *free)])
     before = np.full(len(spread), np.inf)
     for _ in range(_STEPS):
         equations = _linearised(stack, torque_values.copy(), power_values.copy())
         found = _estimate(motions, equations, [*real, *free])
-        torque_values[stack.real], power_values[~fixed] = np.split(found.values, [len(real)])
+        torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
         if np.all(np.abs(found.values - before) < _CONVERGED * spread):
             break
         before = found.values
@@ -155,7 +154,6 @@ def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Paramete
 
 def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
     """Return the equation of power, linear in the deviation of the torque coefficients from `torque_values`."""
-    fixed = np.array([term.fixed for _, term in stack.power_terms], dtype=bool)
 
     def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         assert motion.power is not None
@@ -169,8 +167,8 @@ def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarra
             rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
             slope[:, joint] = rise @ power_values / (2 * _TORQUE_STEP)
         carried = np.einsum("tj,tjk->tk", slope, columns)
-        known = power[:, fixed].sum(axis=1) - carried @ torque_values[stack.real]
-        return np.concatenate([carried, power[:, ~fixed]], axis=1)[:, None], known[:, None], motion.power[:, None]
+        known = power[:, stack.fixed] @ power_values[stack.fixed] - carried @ torque_values[stack.real]
+        return np.concatenate([carried, power[:, ~stack.fixed]], axis=1)[:, None], known[:, None], motion.power[:, None]
 
     return equations
 
