@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,16 @@ def test_the_joints_stand_where_the_kinematics_say(browser: Any, tmp_path: Path,
         links = [robot.links[1 + joint].name for joint in range(len(robot.joints))]
         for place, link in zip(answer["places"], links, strict=True):
             np.testing.assert_allclose(np.linalg.solve(world, np.array(place).reshape(4, 4).T), known[link], atol=1e-5)
+
+
+def test_a_joint_beyond_its_limits_is_marked(browser: Any, tmp_path: Path) -> None:
+    robot = bare()
+    narrow = replace(robot, joints=(robot.joints[0], replace(robot.joints[1], lower=-0.5, upper=0.5)))
+    page, _ = open_page(browser, tmp_path, narrow)
+    outside = "Array.from(document.querySelectorAll('.is-range i'), (dot) => dot.classList.contains('is-outside'))"
+    assert page.evaluate(outside) == [False, False]
+    page.evaluate(SEEK, 4.0)
+    assert page.evaluate(outside) == [False, True]
 
 
 def test_it_plays_tells_the_time_and_stops_at_the_end(browser: Any, tmp_path: Path) -> None:

@@ -220,6 +220,7 @@
     return (positions) => positions.forEach((position, j) => {
       const { lower, upper, unit } = joints[j];
       rows[j].value.textContent = unit === "m" ? position.toFixed(3) + " m" : ((180 / Math.PI) * position).toFixed(1) + "°";
+      rows[j].dot.classList.toggle("is-outside", position < lower || position > upper);
       rows[j].dot.style.left = Math.min(Math.max((100 * (position - lower)) / (upper - lower), 0), 100) + "%";
     });
   }
