@@ -174,3 +174,23 @@ def test_broken_turtle_names_file_and_line(tmp_path: Path) -> None:
     file.write_text("@prefix ex: <https://example.org/> .\nex:a ex:b .\n")
     with pytest.raises(InputError, match=r"broken\.ttl, line 2"):
         list(read_turtle(file))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "SELECT ?run WHERE { ?robot irt:has_RunProcess ?run }",
+        "SELECT ?run { ?robot irt:has_RunProcess ?run }",
+        "SELECT ?robot ?run WHERE { OPTIONAL { ?robot irt:has_RunProcess ?run } }",
+        "SELECT ?run # WHERE {\n WHERE { { SELECT ?run ?arm WHERE { ?run irt:run_of ?arm } } FILTER(?arm = ?robot) }",
+        "CONSTRUCT { ?run a ?robot } WHERE { ?robot irt:has_RunProcess ?run }",
+    ],
+)
+def test_binding_restricts_a_variable_that_need_not_be_asked_for(graph: KnowledgeGraph, text: str) -> None:
+    assert len(graph.query(text, {"robot": individual("robot", "Arm_A")})) == 3
+    assert len(graph.query(text, {"robot": individual("robot", "Arm_B")})) == 2
+
+
+def test_binding_that_is_no_iri_is_a_bug(graph: KnowledgeGraph) -> None:
+    with pytest.raises(ValueError, match="IRI"):
+        graph.query("SELECT * { ?robot ?p ?o }", {"robot": "x> } INSERT"})

@@ -20,7 +20,6 @@ from pyoxigraph import (
     RdfFormat,
     Store,
     Triple,
-    Variable,
     parse,
 )
 
@@ -39,6 +38,9 @@ _HARMLESS = re.compile(
     r"""<[^<>"{}|^`\\\s]*>|\"\"\".*?\"\"\"|'''.*?'''|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*'|\#[^\n]*|[?$]\w+|:[\w.%-]*""",
     re.DOTALL,
 )
+
+
+_OUTERMOST_GROUP = re.compile(r"\b(?:SELECT|ASK)\b[^{]*\{|\bWHERE\s*\{", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -135,11 +137,7 @@ class KnowledgeGraph:
         if "service" in _HARMLESS.sub(" ", text).lower():
             raise InputError("SERVICE asks another server, which is not allowed here: ask this graph alone")
         try:
-            return self._store.query(
-                text,
-                prefixes=PREFIXES,
-                substitutions={Variable(name): NamedNode(iri) for name, iri in bindings.items()},
-            )
+            return self._store.query(_bound(text, bindings), prefixes=PREFIXES)
         except SyntaxError as error:
             raise InputError(f"not a SPARQL query: {error}") from error
 
@@ -153,9 +151,9 @@ def read_turtle(file: Path) -> Iterator[Triple]:
         raise InputError(f"{file}, line {error.lineno}: {error.msg}") from error
 
 
-def in_graph(triples: Iterable[Triple], name: str) -> Iterator[Quad]:
-    """Say of each triple that it belongs into the named graph."""
-    graph = NamedNode(name)
+def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
+    """Say of each triple that it belongs into the named graph, or into the default graph."""
+    graph = DefaultGraph() if name is None else NamedNode(name)
     return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
 
 
@@ -205,6 +203,15 @@ def _replacement(name: str, triples: set[Triple]) -> str:
     }} ;
     DROP SILENT GRAPH <{name}> ;
     INSERT DATA {{ {text} GRAPH <{name}> {{ {text} }} }}"""
+
+
+def _bound(text: str, bindings: Mapping[str, str]) -> str:
+    """Let the variables of a query's outermost group have the given IRIs as their only values."""
+    group = _OUTERMOST_GROUP.search(_HARMLESS.sub(lambda match: " " * len(match[0]), text))
+    if not bindings or group is None:
+        return text
+    values = " ".join(f"VALUES ?{name} {{ {NamedNode(iri)} }}" for name, iri in bindings.items())
+    return f"{text[: group.end()]} {values} {text[group.end() :]}"
 
 
 def _counted(answers: Iterable[Any]) -> Iterator[Any]:
