@@ -1,0 +1,187 @@
+"""The ontology as an ontologist would review it."""
+
+import re
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+import rdflib
+from rdflib.namespace import OWL, RDF, RDFS, SKOS
+
+from irtwin.resources import folder
+
+IRT = rdflib.Namespace("https://w3id.org/irtwin#")
+EFFECT = "https://w3id.org/irtwin/effect/"
+QUDT = rdflib.Namespace("http://qudt.org/schema/qudt/")
+MODULES = ["irtwin", "units", "robot", "energy", "effects", "gap", "providers", "alignment"]
+KINDS = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.AnnotationProperty, OWL.NamedIndividual]
+UNIT_IS_BESIDE = {"Parameter_Value", "Interval_Lower", "Interval_Upper", "Range_Lower", "Range_Upper"}
+SHARED = Path(__file__).parents[2] / "../shared"
+
+
+@pytest.fixture(scope="module")
+def ontology() -> rdflib.Graph:
+    graph = rdflib.Graph()
+    for module in MODULES:
+        graph.parse(folder("ontology") / f"{module}.ttl")
+    return graph
+
+
+def own_terms(ontology: rdflib.Graph) -> set[rdflib.URIRef]:
+    return {term for kind in KINDS for term in ontology.subjects(RDF.type, kind) if str(term).startswith(IRT[""][:-1])}
+
+
+def local(terms) -> set[str]:
+    return {str(term).removeprefix(str(IRT)) for term in terms}
+
+
+def test_seed_terms_keep_their_names(ontology: rdflib.Graph) -> None:
+    seed = """Industrial_Robot IR_Information IR_RunProcess IR_Name IR_ID IR_Type Manufacturer IR_Weight Controlled_Axes
+        Arm_Movement_Type Current_State Joint_Position Joint_Speed Joint_Acc Joint_Torque Payload Run_Power
+        Energy_Consumption Run_Time"""
+    assert set(seed.split()) <= local(own_terms(ontology))
+
+
+def test_every_term_has_label_and_definition(ontology: rdflib.Graph) -> None:
+    terms = own_terms(ontology)
+    assert len(terms) > 200
+    assert [term for term in terms if (term, RDFS.label, None) not in ontology] == []
+    assert [term for term in terms if (term, SKOS.definition, None) not in ontology] == []
+
+
+def test_every_property_has_domain_and_range(ontology: rdflib.Graph) -> None:
+    properties = {
+        term
+        for kind in (OWL.ObjectProperty, OWL.DatatypeProperty)
+        for term in ontology.subjects(RDF.type, kind)
+        if str(term).startswith(str(IRT))
+    }
+    assert local(term for term in properties if (term, RDFS.domain, None) not in ontology) == set()
+    assert local(term for term in properties if (term, RDFS.range, None) not in ontology) == set()
+
+
+def test_every_number_has_a_declared_unit(ontology: rdflib.Graph) -> None:
+    numbers = {term for kind in (rdflib.XSD.double, rdflib.XSD.integer) for term in ontology.subjects(RDFS.range, kind)}
+    without = local(term for term in numbers if (term, QUDT.hasUnit, None) not in ontology)
+    assert without == UNIT_IS_BESIDE
+    used = set(ontology.objects(None, QUDT.hasUnit))
+    assert used <= set(ontology.subjects(RDF.type, QUDT.Unit))
+
+
+def test_no_term_is_two_kinds_of_thing(ontology: rdflib.Graph) -> None:
+    kinds = [set(ontology.subjects(RDF.type, kind)) for kind in KINDS]
+    for place, one in enumerate(kinds):
+        for other in kinds[place + 1 :]:
+            assert one & other == set()
+
+
+def test_every_term_that_is_used_is_declared(ontology: rdflib.Graph) -> None:
+    declared = local(own_terms(ontology))
+    texts = [
+        *Path(folder("ontology")).glob("**/*.ttl"),
+        *folder("rules").glob("*"),
+        *(Path(__file__).parents[2] / "src/irtwin/knowledge/questions").glob("*.rq"),
+        *Path(__file__).parent.glob("data/*.trig"),
+    ]
+    for file in texts:
+        used = set(re.findall(r"\birt:(\w+)", file.read_text(encoding="utf-8")))
+        assert used - declared == set(), file.name
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_module_says_what_it_is(module: str) -> None:
+    graph = rdflib.Graph().parse(folder("ontology") / f"{module}.ttl")
+    (header,) = graph.subjects(RDF.type, OWL.Ontology)
+    for annotation in (
+        OWL.versionIRI,
+        OWL.versionInfo,
+        *(rdflib.DCTERMS[name] for name in ("title", "creator", "license")),
+    ):
+        assert (header, annotation, None) in graph
+
+
+@pytest.mark.parametrize("catalogue", ["catalog-v001.xml", "robots/catalog-v001.xml"])
+def test_catalogue_finds_every_import(catalogue: str) -> None:
+    file = folder("ontology") / catalogue
+    found = {}
+    for element in ElementTree.parse(file).getroot():
+        target = file.parent / (element.get("uri") or element.get("catalog") or "")
+        assert target.is_file()
+        found[element.get("name")] = target
+    if catalogue.startswith("robots"):
+        return
+    for target in found.values():
+        for imported in rdflib.Graph().parse(target).objects(None, OWL.imports):
+            assert str(imported) in found
+
+
+def test_effects_are_linked_to_effects(ontology: rdflib.Graph) -> None:
+    effects = set(ontology.subjects(RDF.type, IRT.Effect))
+    assert all(str(effect).startswith(EFFECT) for effect in effects)
+    for effect in effects:
+        assert set(ontology.objects(effect, IRT.confused_with)) <= effects - {effect}
+        for name in ("Equation", "has_Channel", "Acts_Per", "Where_Seen", "Baseline"):
+            assert len(list(ontology.objects(effect, IRT[name]))) == 1
+    for parameter in ontology.subjects(RDF.type, IRT.Effect_Parameter):
+        low, high = (float(ontology.value(parameter, IRT[name])) for name in ("Range_Lower", "Range_Upper"))
+        assert low < high
+        assert ontology.value(predicate=IRT.has_Effect_Parameter, object=parameter) in effects
+
+
+@pytest.mark.system
+@pytest.mark.skipif(not (SHARED / "contract/effects.toml").exists(), reason="the shared list of effects is absent")
+def test_effects_are_those_of_the_contract(ontology: rdflib.Graph) -> None:
+    contract = tomllib.loads((SHARED / "contract/effects.toml").read_text(encoding="utf-8"))
+    symbols = {"Nm": "N m", "Nm s/rad": "N m s/rad", "Nm/rad": "N m/rad", "Nm/s": "N m/s"}
+    assert {str(effect).removeprefix(EFFECT) for effect in ontology.subjects(RDF.type, IRT.Effect)} == set(contract)
+    for name, said in contract.items():
+        effect = rdflib.URIRef(EFFECT + name)
+        assert str(ontology.value(effect, IRT.Equation)) == said["equation"]
+        assert str(ontology.value(effect, IRT.has_Channel)).endswith("/" + said["channel"])
+        assert str(ontology.value(effect, IRT.Acts_Per)) == said["per"]
+        assert str(ontology.value(effect, IRT.Where_Seen)) == said["where"]
+        assert ontology.value(effect, IRT.Baseline).toPython() == said.get("baseline", False)
+        rivals = {str(other).removeprefix(EFFECT) for other in ontology.objects(effect, IRT.confused_with)}
+        assert rivals == set(said.get("confused_with", []))
+        parameters = {}
+        for parameter in ontology.objects(effect, IRT.has_Effect_Parameter):
+            unit = str(ontology.value(ontology.value(parameter, QUDT.hasUnit), QUDT.symbol))
+            ends = [float(ontology.value(parameter, IRT[end])) for end in ("Range_Lower", "Range_Upper")]
+            parameters[str(ontology.value(parameter, IRT.Parameter_Name))] = [unit, *ends]
+        expected = {key: [symbols.get(unit, unit), *ends] for key, (unit, *ends) in said.get("parameters", {}).items()}
+        assert parameters == expected
+
+
+def test_kr6_sheet_says_what_its_urdf_says() -> None:
+    robots = folder("ontology") / "robots"
+    sheet = rdflib.Graph().parse(robots / "kuka_kr6_r700.ttl")
+    robot = rdflib.URIRef("https://w3id.org/irtwin/id/robot/KUKA_KR6_R700")
+    information = sheet.value(robot, IRT.has_Information)
+    said = {
+        name: sheet.value(information, IRT[name]).toPython()
+        for name in ("Controlled_Axes", "IR_Weight", "Rated_Payload")
+    }
+    assert said == {"Controlled_Axes": 6, "IR_Weight": 50.0, "Rated_Payload": 6.0}
+    joints = [
+        joint
+        for joint in ElementTree.parse(robots / "kuka_kr6_r700.urdf").iter("joint")
+        if joint.get("type") != "fixed"
+    ]
+    assert len(joints) == len(list(sheet.objects(robot, IRT.has_Joint))) == 6
+    for number, joint in enumerate(joints, start=1):
+        individual = rdflib.URIRef(f"https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/{joint.get('name')}")
+        limit = joint.find("limit")
+        assert limit is not None
+        assert sheet.value(individual, IRT.Joint_Number).toPython() == number
+        pairs = {"lower": "Lower_Limit", "upper": "Upper_Limit", "velocity": "Speed_Limit", "effort": "Torque_Limit"}
+        for attribute, name in pairs.items():
+            assert sheet.value(individual, IRT[name]).toPython() == float(limit.get(attribute, "nan"))
+
+
+def test_every_implemented_effect_has_an_individual(ontology: rdflib.Graph) -> None:
+    effect = pytest.importorskip("irtwin.effects.effect")
+    ids = {str(one).removeprefix(EFFECT) for one in ontology.subjects(RDF.type, IRT.Effect)}
+    assert set(effect.catalogue()) <= ids
+    baseline = {str(one).removeprefix(EFFECT) for one in ontology.subjects(IRT.Baseline, rdflib.Literal(True))}
+    assert set(effect.BASELINE) == baseline
