@@ -1,0 +1,167 @@
+"""SWRL by Pellet, SHACL rules by SPARQL, and HermiT: they agree with each other and with pySHACL."""
+
+from pathlib import Path
+
+import pyshacl
+import pytest
+import rdflib
+from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
+
+from irtwin.errors import InputError
+from irtwin.knowledge import owl_dl, shacl_rules
+from irtwin.knowledge.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.reasoning import check_consistency, reason
+from irtwin.knowledge.vocabulary import (
+    GRAPH_INFERRED,
+    GRAPH_ONTOLOGY,
+    GRAPH_OWL_RL,
+    GRAPH_SHACL,
+    GRAPH_SOURCE,
+    GRAPH_SWRL,
+    RDF,
+    individual,
+    shorten,
+    term,
+)
+from irtwin.resources import folder
+
+TYPE = RDF + "type"
+RUN = "Arm_A.idle_1"
+CONCLUSIONS = {
+    ("id:twin/Arm_A.t1", "rdf:type", "irt:Twin_To_Reidentify"),
+    ("id:twin/Arm_A.t1", "irt:fails_on", "id:run/Arm_A.check_1"),
+    ("id:run/Arm_A.idle_1", "rdf:type", "irt:Idle_Heavy_Run"),
+    ("id:run/Arm_B.work_2", "rdf:type", "irt:Regenerating_Run"),
+}
+DOMINANT = {
+    ("id:run/Arm_A.fit_1", "irt:dominant_Joint", "id:joint/Arm_A/j1"),
+    ("id:run/Arm_A.check_1", "irt:dominant_Joint", "id:joint/Arm_A/j2"),
+    ("id:run/Arm_A.idle_1", "irt:dominant_Joint", "id:joint/Arm_A/j1"),
+    ("id:run/Arm_B.work_1", "irt:dominant_Joint", "id:joint/Arm_B/j1"),
+    ("id:run/Arm_B.work_2", "irt:dominant_Joint", "id:joint/Arm_B/j2"),
+}
+
+
+def short(triples: set[Triple]) -> set[tuple[str, ...]]:
+    return {
+        tuple(shorten(one.value) for one in (triple.subject, triple.predicate, triple.object)) for triple in triples
+    }
+
+
+@pytest.fixture(scope="module")
+def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    graph.replace(two_robots, GRAPH_SOURCE, "https://w3id.org/irtwin/graph/activity/")
+    reason(graph)
+    return graph
+
+
+def test_swrl_and_shacl_rules_conclude_the_same(reasoned: KnowledgeGraph) -> None:
+    assert short(reasoned.triples(GRAPH_SWRL)) == CONCLUSIONS
+    assert short(reasoned.triples(GRAPH_SHACL)) == CONCLUSIONS | DOMINANT
+
+
+def test_closure_types_what_rules_concluded(reasoned: KnowledgeGraph) -> None:
+    closed = short(reasoned.triples(GRAPH_OWL_RL))
+    assert ("id:run/Arm_A.fit_1", "irt:has_Joint_State", "id:joint_state/Arm_A.fit_1/j1") not in closed  # asserted
+    assert ("id:twin/Arm_A.t1", "prov:wasDerivedFrom", "id:run/Arm_A.fit_1") in closed
+    assert ("id:joint/Arm_A/j1", "irt:joint_of", "id:robot/Arm_A") in closed
+
+
+def test_reasoning_again_changes_nothing(reasoned: KnowledgeGraph) -> None:
+    before = {name: reasoned.triples(name) for name in reasoned.graphs(GRAPH_INFERRED)}
+    reason(reasoned)
+    assert {name: reasoned.triples(name) for name in reasoned.graphs(GRAPH_INFERRED)} == before
+
+
+def test_changed_limit_changes_the_conclusions(graph: KnowledgeGraph) -> None:
+    limit = NamedNode(term("Idle_Share_Limit"))
+    ontology = [
+        Quad(
+            one.subject,
+            one.predicate,
+            Literal(0.15) if one.predicate == limit else one.object,
+            NamedNode(GRAPH_ONTOLOGY),
+        )
+        for one in graph.triples(GRAPH_ONTOLOGY)
+    ]
+    graph.replace(ontology, GRAPH_ONTOLOGY)
+    reason(graph)
+    for name in (GRAPH_SWRL, GRAPH_SHACL):
+        idle = {subject for subject, _, kind in short(graph.triples(name)) if kind == "irt:Idle_Heavy_Run"}
+        assert idle == {"id:run/Arm_A.idle_1", "id:run/Arm_A.check_1"}
+
+
+def test_conclusion_goes_with_its_premise(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
+    reason(graph)
+    kept = [quad for quad in two_robots if quad.predicate.value != term("Idle_Share")]
+    graph.replace(kept, GRAPH_SOURCE, "https://w3id.org/irtwin/graph/activity/")
+    reason(graph)
+    assert "irt:Idle_Heavy_Run" not in {kind for _, _, kind in short(graph.triples(GRAPH_INFERRED))}
+
+
+def test_set_wise_rules_give_what_pyshacl_gives(graph: KnowledgeGraph) -> None:
+    before = graph.triples()
+    data = rdflib.Graph().parse(data=serialize(before, format=RdfFormat.N_TRIPLES), format="nt")
+    pyshacl.validate(data, shacl_graph=rdflib.Graph().parse(folder("rules") / "rules.ttl"), advanced=True, inplace=True)
+    text = "\n".join(line for line in data.serialize(format="nt").splitlines() if "_:" not in line)
+    expected = {quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)} - before
+    shacl_rules.infer(graph)
+    ours = {one for one in graph.triples(GRAPH_SHACL) if one not in before}
+    assert (
+        short(ours) == short({one for one in expected if not isinstance(one.object, Literal)}) == CONCLUSIONS | DOMINANT
+    )
+
+
+def test_rule_without_a_target_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "rules.ttl"
+    file.write_text(
+        "@prefix sh: <http://www.w3.org/ns/shacl#> . "
+        '<https://example.org/s> sh:rule [ sh:construct "CONSTRUCT { $this a $this } WHERE { }" ] .'
+    )
+    with pytest.raises(InputError, match="no sh:targetClass"):
+        shacl_rules.read_rules(file)
+
+
+def test_rules_have_the_same_names_in_both_languages() -> None:
+    label = NamedNode("http://www.w3.org/2000/01/rdf-schema#label")
+    swrl = {one.object.value for one in read_turtle(folder("rules") / "judgement.swrl.ttl") if one.predicate == label}
+    shacl = {one.object.value for one in read_turtle(folder("rules") / "rules.ttl") if one.predicate == label}
+    assert shacl - swrl == {"dominant joint"}
+    assert swrl <= shacl
+
+
+def test_hermit_finds_two_robots_consistent(graph: KnowledgeGraph) -> None:
+    check_consistency(graph)
+
+
+def test_hermit_finds_the_kr6_sheet_consistent(graph: KnowledgeGraph) -> None:
+    sheet = set(read_turtle(folder("ontology") / "robots" / "kuka_kr6_r700.ttl"))
+    owl_dl.check_consistency(graph.triples(GRAPH_ONTOLOGY) | sheet)
+
+
+@pytest.mark.parametrize(
+    ("subject", "predicate", "value"),
+    [
+        (individual("run", RUN), TYPE, NamedNode(term("Industrial_Robot"))),
+        (individual("run", RUN), term("Energy_Consumption"), Literal(7.0)),
+        (individual("run", RUN), term("Run_Time"), Literal("long")),
+        (
+            "https://w3id.org/irtwin/effect/copper_loss",
+            term("has_Channel"),
+            NamedNode("https://w3id.org/irtwin/channel/torque"),
+        ),
+    ],
+)
+def test_hermit_finds_a_contradiction(graph: KnowledgeGraph, subject: str, predicate: str, value) -> None:
+    wrong = Triple(NamedNode(subject), NamedNode(predicate), value)
+    with pytest.raises(InputError, match="contradicts the ontology"):
+        owl_dl.check_consistency(graph.triples() | {wrong})
+
+
+def test_hermit_names_a_class_that_nothing_can_belong_to(graph: KnowledgeGraph) -> None:
+    subclass = NamedNode("http://www.w3.org/2000/01/rdf-schema#subClassOf")
+    wrong = Triple(NamedNode(term("Idle_Heavy_Run")), subclass, NamedNode(term("Series")))
+    with pytest.raises(InputError, match="irtwin#Idle_Heavy_Run"):
+        owl_dl.check_consistency(graph.triples(GRAPH_ONTOLOGY) | {wrong})
