@@ -1,0 +1,73 @@
+import pytest
+from pyoxigraph import Literal, NamedNode, Quad
+
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.validation import validate
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, individual, term
+
+RUN = individual("run", "Arm_A.fit_1")
+JOINT = individual("joint", "Arm_A", "j1")
+PARAMETER = individual("parameter", "Arm_A.t1.coulomb_friction.j1.Fc")
+SHARE = ID + "energy_share/Arm_A.fit_1/standby_power/robot"
+FIT = ID + "torque_fit/Arm_A.t1/Arm_A.fit_1/j1/fit"
+
+
+def changed(quads: list[Quad], subject: str, name: str, value) -> list[Quad]:
+    """Return the quads with another value of a property, or without any where it is None."""
+    same = [quad for quad in quads if (quad.subject.value, quad.predicate.value) == (subject, term(name))]
+    rest = [quad for quad in quads if quad not in same]
+    new = [] if value is None else [Quad(NamedNode(subject), NamedNode(term(name)), value, same[0].graph_name)]
+    return rest + new
+
+
+def test_two_robots_keep_every_constraint(graph: KnowledgeGraph) -> None:
+    assert validate(graph) == ()
+    report = graph.query(
+        "PREFIX sh: <http://www.w3.org/ns/shacl#> SELECT ?ok { ?r a sh:ValidationReport ; sh:conforms ?ok }"
+    )
+    assert report.rows == ({"ok": True},)
+
+
+@pytest.mark.parametrize(
+    ("subject", "name", "value", "message"),
+    [
+        (RUN, "Run_Time", Literal(0.0), "a run lasts longer than 0 s (irt:Run_Time is 0"),
+        (RUN, "Run_Time", None, "a run lasts longer than 0 s (irt:Run_Time is absent)"),
+        (RUN, "run_of", None, "a run is of one robot (irt:run_of is absent)"),
+        (RUN, "run_of", NamedNode(JOINT), "a run is of one robot"),
+        (RUN, "Energy_Consumption", Literal(float("nan")), "a run's energy consumption is one finite number"),
+        (RUN, "Modelled_Energy", Literal(float("inf")), "a run's modelled energy is one finite number"),
+        (RUN, "Returned_Energy", Literal(-1.0), "a run's returned energy is one finite number, 0 J or more"),
+        (RUN, "Measured_Energy", None, "a run with an energy error has a measured energy to err from"),
+        (RUN, "Idle_Share", Literal(1.5), "a run's idle share is one number between 0 and 1 (irt:Idle_Share is 1.5)"),
+        (RUN, "Part_In_Twin", Literal("half"), 'a run\'s part in its twin is "fit", "held_out" or "both"'),
+        (RUN, "Payload", Literal("heavy"), "a run's payload is one number, 0 kg or more (irt:Payload is heavy)"),
+        (JOINT, "Lower_Limit", Literal(4.0), "a joint's lower limit is one number below its upper limit"),
+        (JOINT, "Joint_Name", None, "a joint has one name"),
+        (PARAMETER, "Interval_Lower", Literal(4.05), "a parameter's interval begins at its value or below"),
+        (PARAMETER, "Interval_Upper", Literal(3.95), "a parameter's interval ends at its value or above"),
+        (PARAMETER, "of_Effect", NamedNode("https://w3id.org/irtwin/effect/magic"), "one effect of the catalogue"),
+        (SHARE, "Energy", None, "an energy share has one finite energy"),
+        (FIT, "R_Squared", Literal(1.2), "a torque fit's R squared is at most 1"),
+        (individual("twin", "Arm_A.t1"), "twin_of", None, "a twin is of one robot"),
+    ],
+)
+def test_broken_constraint_is_said_in_words(
+    two_robots: list[Quad], subject: str, name: str, value, message: str
+) -> None:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    graph.replace(changed(two_robots, subject, name, value), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    violations = validate(graph)
+    assert [str(one) for one in violations if message in str(one)] != []
+    assert {one.node for one in violations} == {subject}
+    kept = graph.query("PREFIX sh: <http://www.w3.org/ns/shacl#> SELECT ?node { ?r sh:result / sh:focusNode ?node }")
+    assert {row["node"] for row in kept} == {subject}
+
+
+def test_report_is_replaced_not_gathered(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
+    graph.replace(changed(two_robots, RUN, "Run_Time", None), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    assert len(validate(graph)) == 1
+    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    assert validate(graph) == ()
+    assert len(graph.triples(GRAPH_VALIDATION)) == 2
