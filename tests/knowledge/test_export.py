@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import owlready2
+import pytest
+import rdflib
+from rdflib.namespace import OWL, RDF
+
+from irtwin.knowledge import owl_dl  # noqa: F401  tells owlready2 where Java is
+from irtwin.knowledge.export import export_owl
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.validation import validate
+
+IRT = rdflib.Namespace("https://w3id.org/irtwin#")
+
+
+@pytest.fixture
+def exported(graph: KnowledgeGraph, tmp_path: Path) -> Path:
+    reason(graph)
+    validate(graph)
+    file = tmp_path / "deep" / "irtwin.owl"
+    export_owl(graph, file)
+    return file
+
+
+def test_owlready2_opens_it_and_hermit_finds_it_consistent(exported: Path) -> None:
+    world = owlready2.World()
+    ontology = world.get_ontology(exported.as_uri()).load()
+    assert world["https://w3id.org/irtwin#Idle_Heavy_Run"].instances()[0].Run_Name == "idle_1"
+    assert {"Arm_A.fit_1", "Arm_B.work_2"} <= {one.name.rpartition("/")[2] for one in ontology.individuals()}
+    owlready2.sync_reasoner_hermit(world, debug=0)
+    assert list(world.inconsistent_classes()) == []
+
+
+def test_it_is_one_ontology_that_imports_nothing(exported: Path) -> None:
+    graph = rdflib.Graph().parse(exported, format="xml")
+    assert list(graph.subjects(RDF.type, OWL.Ontology)) == [rdflib.URIRef("https://w3id.org/irtwin")]
+    assert (None, OWL.imports, None) not in graph
+    assert "shacl" not in exported.read_text(encoding="utf-8")
+
+
+def test_everything_that_is_asserted_or_inferred_is_in_it(graph: KnowledgeGraph, exported: Path) -> None:
+    written = rdflib.Graph().parse(exported, format="xml")
+    runs = set(written.subjects(RDF.type, IRT.IR_RunProcess))
+    assert len(runs) == 5
+    assert all((run, RDF.type, OWL.NamedIndividual) in written for run in runs)
+    assert {str(joint) for joint in written.objects(None, IRT.dominant_Joint)} == {
+        f"https://w3id.org/irtwin/id/joint/Arm_{robot}/j{number}" for robot in "AB" for number in "12"
+    }
+    assert len(set(written.subjects(RDF.type, IRT.Effect))) == 36
+
+
+def test_failed_export_leaves_the_former_file(
+    graph: KnowledgeGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "irtwin.owl"
+    file.write_text("former")
+    monkeypatch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError):
+        export_owl(graph, file)
+    assert file.read_text() == "former"
