@@ -8,7 +8,7 @@ import pytest
 from irtwin.effects.effect import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.identification import accumulate as room
-from irtwin.identification.accumulate import accumulate
+from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.identification.estimators import combine
 from irtwin.signals.filter import decimate, decimation, kernel
 from synthetic import arm, measure, swing
@@ -19,7 +19,7 @@ STACK = Stack(ROBOT, BASELINE)
 
 def equations(motion):
     columns = STACK.torque_columns(motion)
-    return columns, columns @ STACK.shift(motion), motion.torque
+    return Rows(columns, columns @ STACK.shift(motion), motion.torque)
 
 
 def products(motion, step=1, taps=None):
@@ -42,7 +42,7 @@ def test_factors_hold_every_inner_product():
     motion = measure(ROBOT, swing(ROBOT, 1))
     blocks, found = reduced([motion])
     np.testing.assert_allclose(found, products(motion), rtol=1e-9, atol=1e-6)
-    assert sum(block.rows for block in blocks) == len(motion.time)
+    assert sum(block.rows for block in blocks).tolist() == [len(motion.time)] * 3
     assert {block.run for block in blocks} == {"swing_1"}
 
 
@@ -65,6 +65,25 @@ def test_blocks_are_long_enough_to_be_independent():
     blocks, _ = reduced([motion])
     assert all(block.stop - block.start > 3.5 for block in blocks)
     assert len(reduced([replace(motion, cutoff=20.0)])[0]) == 40
+
+
+def test_undecided_samples_are_left_out():
+    motion = measure(ROBOT, swing(ROBOT, 6))
+    undecided = np.zeros((2000, 3), dtype=bool)
+    undecided[:500, 1] = True
+
+    def partly(piece):
+        first = round(piece.time[0] * 100)
+        rows = equations(piece)
+        return replace(rows, undecided=undecided[first : first + len(piece.time)])
+
+    blocks = accumulate([motion], partly, STACK.pattern)
+    assert sum(block.rows for block in blocks).tolist() == [2000, 1500, 2000]
+    factor = combine([block.factors[1] for block in blocks], STACK.pattern[1])
+    np.testing.assert_allclose(factor.T @ factor, products(motion.part(500, 2000))[1], rtol=1e-9, atol=1e-6)
+    filtered = accumulate([replace(motion, cutoff=10.0)], partly, STACK.pattern)
+    share = sum(block.rows for block in filtered)
+    assert 0.7 < share[1] / share[0] < 0.76
 
 
 def test_a_run_shorter_than_the_filter_gives_nothing():

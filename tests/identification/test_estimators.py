@@ -14,7 +14,8 @@ def blocks_of(columns, measured, count=20):
     """One equation a sample, cut into blocks."""
     rows = np.column_stack([columns, measured])
     return [
-        Block("run", 0.0, 1.0, len(part), (triangle(part),)) for part in np.array_split(rows, min(count, len(rows)))
+        Block("run", 0.0, 1.0, np.array([len(part)]), (triangle(part),))
+        for part in np.array_split(rows, min(count, len(rows)))
     ]
 
 
@@ -43,7 +44,7 @@ def test_noisy_equations_count_less():
     noisy = columns @ truth + 10 * rng.standard_normal(1000)
     clean = columns @ truth + 0.01 * rng.standard_normal(1000)
     factors = tuple(triangle(np.column_stack([columns, measured])) for measured in (noisy, clean))
-    block = Block("run", 0.0, 1.0, 1000, factors)
+    block = Block("run", 0.0, 1.0, np.array([1000, 1000]), factors)
     found = estimate([block], np.ones((2, 2), dtype=bool), [Term("a", "", spread=10), Term("b", "", spread=10)])
     np.testing.assert_allclose(found.values, truth, atol=2e-3)
     np.testing.assert_allclose(found.noise, [10, 0.01], rtol=0.1)

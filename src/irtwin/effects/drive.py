@@ -1,4 +1,7 @@
-"""The drives: rotors that turn with the joints, and windings that heat."""
+"""The drives: rotors that turn with the joints, and windings that heat.
+
+What a data sheet says of them is taken to be as unsure as it is large: it leaves out gears, phases and warmth.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +22,8 @@ class RotorInertia(JointEffect):
 
     def term(self, joint: Joint) -> Term:
         """Return Ia, expected as the data sheet says."""
-        expected = joint.rotor_inertia or 0.0
-        return Term("Ia", inertia_unit(joint), joint=joint.name, expected=expected, spread=5.0, lowest=0.0)
+        known = joint.rotor_inertia
+        return Term("Ia", inertia_unit(joint), joint.name, expected=known or 0.0, spread=known or 5.0, lowest=0.0)
 
     def column(self, motion: Motion) -> np.ndarray:
         """Return ddq."""
@@ -39,10 +42,11 @@ class CopperLoss(Effect):
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return R per joint, expected as the data sheet says."""
         return tuple(
-            Term("R", "ohm", joint=joint.name, expected=joint.winding_resistance or 0.0, spread=20.0, lowest=0.0)
+            Term("R", "ohm", joint.name, expected=known or 0.0, spread=known or 20.0, lowest=0.0)
             if joint.torque_constant
-            else Term("R", f"W/({force_unit(joint)})^2", joint=joint.name, spread=1.0, lowest=0.0)
+            else Term("R", f"W/({force_unit(joint)})^2", joint.name, spread=1.0, lowest=0.0)
             for joint in robot.joints
+            for known in [joint.winding_resistance]
         )
 
     def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:

@@ -53,6 +53,10 @@ class Effect(ABC):
         For a power effect: (N, k), W per unit, built from the *predicted* real joint `torque`, (N, n) N m.
         """
 
+    def undecided(self, motion: Motion) -> np.ndarray | None:
+        """Return (N, n) where the effect cannot say the joint's torque, so that a fit leaves these samples out."""
+        return None
+
     def shift(self, robot: Robot, motion: Motion) -> np.ndarray | float:
         """Return what is known to be added to the (k,) coefficients in this motion: a payload, for one."""
         return 0.0

@@ -14,7 +14,7 @@ _STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
 class CoulombFriction(JointEffect):
-    """Fc sign(dq), none at standstill."""
+    """Fc sign(dq). At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none."""
 
     id: ClassVar[str] = "coulomb_friction"
     channel: ClassVar[str] = "torque"
@@ -25,7 +25,11 @@ class CoulombFriction(JointEffect):
 
     def column(self, motion: Motion) -> np.ndarray:
         """Return sign(dq)."""
-        return np.where(np.abs(motion.dq) < _STANDSTILL, 0.0, np.sign(motion.dq))
+        return np.where(self.undecided(motion), 0.0, np.sign(motion.dq))
+
+    def undecided(self, motion: Motion) -> np.ndarray:
+        """Return where a joint stands still."""
+        return np.asarray(np.abs(motion.dq) < _STANDSTILL)
 
 
 class ViscousFriction(JointEffect):

@@ -63,6 +63,14 @@ class Stack:
         parts = [effect.columns(self.robot, motion) for effect in self._torque]
         return np.concatenate([np.zeros((*motion.dq.shape, 0)), *parts], axis=2)
 
+    def undecided(self, motion: Motion) -> np.ndarray:
+        """Return (N, n) where some effect cannot say the joint's torque."""
+        undecided = np.zeros(motion.dq.shape, dtype=bool)
+        for effect in self._torque:
+            part = effect.undecided(motion)
+            undecided |= False if part is None else part
+        return undecided
+
     def real_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients."""
         return np.asarray(self.torque_columns(motion) @ np.where(self.real, values + self.shift(motion), 0.0))

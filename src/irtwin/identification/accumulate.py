@@ -14,25 +14,40 @@ import numpy as np
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
 
-# g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g)
-Equations = Callable[[Motion], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+@dataclass(frozen=True)
+class Rows:
+    """g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g).
+
+    Where `undecided` (N, g) the equation does not hold, and is left out.
+    """
+
+    columns: np.ndarray
+    known: np.ndarray
+    measured: np.ndarray
+    undecided: np.ndarray | None = None
+
+
+Equations = Callable[[Motion], Rows]
 
 _CHUNK = 4096  # samples whose columns are held at once
 _BLOCKS = 40  # at least, over all motions: enough for intervals
+_UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
 
 
 @dataclass(frozen=True)
 class Block:
-    """A stretch of a run, reduced. `factors[e]` is the triangular factor of equation e's rows of
+    """A stretch of a run, reduced.
 
-    [columns | measurement], (r, k_e + 1) with r <= k_e + 1; `rows` is how many rows an equation had.
+    `factors[e]` is the triangular factor of equation e's rows of [columns | measurement], (r, k_e + 1) with
+    r <= k_e + 1; `rows` (g,) is how many each equation had.
     """
 
     run: str
     start: float  # s
     stop: float  # s
-    rows: int
+    rows: np.ndarray
     factors: tuple[np.ndarray, ...]
 
 
@@ -48,7 +63,7 @@ def accumulate(motions: Sequence[Motion], equations: Equations, pattern: np.ndar
     for motion in motions:
         for start, stop in _stretches(motion, total):
             blocks.append(_reduce(motion, start, stop, equations, pattern))
-    return [block for block in blocks if block.rows]
+    return [block for block in blocks if block.rows.any()]
 
 
 def triangle(rows: np.ndarray) -> np.ndarray:
@@ -70,15 +85,19 @@ def _reduce(motion: Motion, start: int, stop: int, equations: Equations, pattern
     step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
     half = len(taps) // 2
     factors = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
-    rows = 0
+    rows = np.zeros(len(pattern), dtype=int)
     size = max(step, _CHUNK // step * step)
     for first in range(max(start, half), min(stop, len(motion.time) - half), size):
         last = min(first + size, stop, len(motion.time) - half)
-        columns, known, measured = equations(motion.part(first - half, last + half))
-        columns = decimate(columns, taps, step)
-        measured = measured[half : len(measured) - half : step] - decimate(known, taps, step)
-        rows += len(measured)
+        sample = equations(motion.part(first - half, last + half))
+        columns = decimate(sample.columns, taps, step)
+        measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
+        keep = np.ones(measured.shape, dtype=bool)
+        if sample.undecided is not None:
+            keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
+        rows += keep.sum(axis=0)
         for equation, used in enumerate(pattern):
-            part = np.column_stack([columns[:, equation, used], measured[:, equation]])
+            chosen = keep[:, equation]
+            part = np.column_stack([columns[chosen, equation][:, used], measured[chosen, equation]])
             factors[equation] = triangle(np.concatenate([factors[equation], part]))
     return Block(motion.run, float(motion.time[start]), float(motion.time[stop - 1]), rows, tuple(factors))

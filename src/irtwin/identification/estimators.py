@@ -35,25 +35,28 @@ def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]
 
     Each equation is weighted by its residual's inverse RMS, found by iteration. The prior of each term (mean
     `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that
-    they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Bounds hold
-    (`lowest`). The covariance is explained in `uncertainty`. Raises InputError where there is no block at all.
+    they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). As samples
+    depend on each other, they count against it by their design effect only. Bounds hold (`lowest`). The covariance
+    is explained in `uncertainty`. Raises InputError where there is no block at all.
     """
     if not blocks:
         raise InputError("every run is shorter than the filter's kernel; log longer runs or take a higher cutoff")
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
-    count = sum(block.rows for block in blocks)
+    count = np.maximum(sum(block.rows for block in blocks), 1)
     expected = np.array([term.expected for term in terms])
     spread = np.array([term.spread for term in terms])
     lowest = np.array([term.lowest for term in terms])
-    sizes = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
-    noise = np.maximum(sizes, np.finfo(float).tiny)
-    values = expected
+    least = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
+    noise = np.maximum(least, np.finfo(float).tiny)
     for _ in range(_REWEIGHTINGS):
         values = _solve(factors, noise, expected, spread, lowest)
-        residual = [np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors]
-        noise = np.maximum(np.array(residual) / np.sqrt(count), np.maximum(_LEAST_NOISE * sizes, np.finfo(float).tiny))
-    rows = np.concatenate([factor[:, :-1] / level for factor, level in zip(factors, noise, strict=True)])
-    return Estimate(values, covariance(blocks, pattern, rows, values, noise, spread), noise, len(blocks))
+        residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
+        noise = np.maximum(residual / np.sqrt(count), np.maximum(_LEAST_NOISE * least, np.finfo(float).tiny))
+    _, effect = covariance(blocks, pattern, factors, values, noise, spread)
+    level = noise * np.sqrt(effect)
+    values = _solve(factors, level, expected, spread, lowest)
+    sureness, _ = covariance(blocks, pattern, factors, values, level, spread)
+    return Estimate(values, sureness, noise, len(blocks))
 
 
 def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:

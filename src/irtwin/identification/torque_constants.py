@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.effects.effect import Effect, Term, catalogue, force_unit
-from irtwin.identification.accumulate import accumulate
+from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -48,13 +48,13 @@ def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants
 
 
 def _balance(motions: Sequence[Motion], terms: Sequence[Term], *, pooled: bool) -> Estimate:
-    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def equations(motion: Motion) -> Rows:
         assert motion.current is not None and motion.power is not None
         parts = [motion.current * motion.dq, motion.current**2]
         if pooled:
             parts = [part.sum(axis=1, keepdims=True) for part in parts]
         columns = np.column_stack([np.ones(len(motion.time)), *parts])
-        return columns[:, None], np.zeros((len(columns), 1)), motion.power[:, None]
+        return Rows(columns[:, None], np.zeros((len(columns), 1)), motion.power[:, None])
 
     pattern = np.ones((1, len(terms)), dtype=bool)
     return estimate(accumulate(motions, equations, pattern), pattern, terms)

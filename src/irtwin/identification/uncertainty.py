@@ -17,14 +17,17 @@ _LEARNT = 0.5  # of the prior's standard deviation: an estimate less sure than t
 def covariance(
     blocks: Sequence[Block],
     pattern: np.ndarray,
-    rows: np.ndarray,
+    factors: Sequence[np.ndarray],
     values: np.ndarray,
     noise: np.ndarray,
     spread: np.ndarray,
-) -> np.ndarray:
-    """Return the (K, K) covariance of weighted least squares under a prior of standard deviations `spread`.
+) -> tuple[np.ndarray, float]:
+    """Return the (K, K) covariance of weighted least squares, and the design effect.
 
-    rows: (r, K) columns of all equations, weighted, as triangular factors; noise: (g,) that they were weighted by.
+    The design effect (Kish 1965) is how many rows carry what one independent row would, at least 1; `spread` are the
+    standard deviations of the prior.
+
+    factors: each equation's over all blocks, (r, K + 1); noise: (g,) by which they are weighted.
 
     Samples of a run are not independent, so the scatter is taken between blocks of time (a cluster-robust sandwich,
     Liang and Zeger 1986), never below what independent rows would give; what the prior decides adds the prior's own.
@@ -35,14 +38,18 @@ def covariance(
         for number, block in enumerate(blocks):
             factor = block.factors[equation] / noise[equation]
             scores[number, used] += factor[:, :-1].T @ (factor @ extended)
+    rows = np.concatenate([factor[:, :-1] / level for factor, level in zip(factors, noise, strict=True)])
     # in units of the spread; through a triangle, as normal equations would lose what the prior alone decides
     root = solve_triangular(triangle(np.concatenate([rows * spread, np.eye(len(values))])), np.eye(len(values)))
     groups = max(len(blocks), 2)
     between = (scores * spread) @ root
     middle = between.T @ between * groups / (groups - 1) + root.T @ root
     sandwich, independent = root @ middle @ root.T, root @ root.T
-    grown = np.sqrt(np.maximum(1.0, np.diag(independent) / np.diag(sandwich))) * spread
-    return np.asarray(sandwich * np.outer(grown, grown))
+    ratio = np.diag(sandwich) / np.diag(independent)
+    learnt = np.diag(independent) < _LEARNT**2
+    effect = float(np.median(ratio[learnt])) if learnt.any() else 1.0
+    grown = np.sqrt(np.maximum(1.0, 1 / ratio)) * spread
+    return sandwich * np.outer(grown, grown), max(1.0, effect)
 
 
 def half_widths(covariance: np.ndarray, spread: np.ndarray, blocks: int) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from irtwin.effects.effect import BASELINE, Effect, Term
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.identification.accumulate import Equations, accumulate
+from irtwin.identification.accumulate import Equations, Rows, accumulate
 from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
 from irtwin.identification.estimators import Estimate, combine, estimate
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
@@ -102,10 +102,10 @@ def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot
 
 
 def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
-    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
         columns = stack.torque_columns(motion)
-        return columns, columns @ stack.shift(motion), motion.torque
+        return Rows(columns, columns @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, equations, stack.pattern)
     found = estimate(blocks, stack.pattern, [term for _, term in stack.torque_terms])
@@ -120,12 +120,12 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
     if not free:
         return []
 
-    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def equations(motion: Motion) -> Rows:
         assert motion.power is not None
         torque = stack.real_torque(motion, torque_values)
         columns = stack.power_columns(motion, torque)
         known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
-        return columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None]
+        return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
 
     found = _estimate(motions, equations, free)
     return _parameters(free, found)
@@ -155,7 +155,7 @@ def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Paramete
 def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
     """Return the equation of power, linear in the deviation of the torque coefficients from `torque_values`."""
 
-    def equations(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def equations(motion: Motion) -> Rows:
         assert motion.power is not None
         columns = stack.torque_columns(motion)[:, :, stack.real]
         torque = stack.real_torque(motion, torque_values)
@@ -168,7 +168,8 @@ def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarra
             slope[:, joint] = rise @ power_values / (2 * _TORQUE_STEP)
         carried = np.einsum("tj,tjk->tk", slope, columns)
         known = power[:, stack.fixed] @ power_values[stack.fixed] - carried @ torque_values[stack.real]
-        return np.concatenate([carried, power[:, ~stack.fixed]], axis=1)[:, None], known[:, None], motion.power[:, None]
+        columns = np.concatenate([carried, power[:, ~stack.fixed]], axis=1)
+        return Rows(columns[:, None], known[:, None], motion.power[:, None])
 
     return equations
 
