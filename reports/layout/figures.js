@@ -151,6 +151,7 @@
       const several = figure.data.length > 1, bars = new Set(figure.data.flatMap((trace) => trace.x)).size;
       const layout = base(Object.assign({ showlegend: several, bargap: Math.max(0.3, 1 - 0.14 * bars) }, figure.layout));
       if (!several) layout.margin.t = 8;
+      if (bars > 8) layout.xaxis.tickangle = -35;
       Plotly.newPlot(holder, figure.data, layout, CONFIG);
     }
     if (!page.explorer) return;
@@ -167,7 +168,10 @@
       if (yes) { long.dataset.was = long.open; long.open = true; } else long.open = long.dataset.was === "true";
     }
     for (const plot of document.querySelectorAll(".js-plotly-plot")) {
-      Plotly.relayout(plot, yes ? { width: PAPER_WIDTH } : { width: null, autosize: true });
+      if (yes) plot.dataset.height = plot._fullLayout.height;
+      const height = Number(plot.dataset.height);
+      Plotly.relayout(plot, yes ? { width: PAPER_WIDTH, height: 0.8 * height } : { width: null, height: height, autosize: true });
+      plot.style.height = (yes ? 0.8 * height : height) + "px";
     }
   }
 

@@ -84,6 +84,7 @@ class Factory:
         self.say(
             f"<{self.iri}> irt:has_RunProcess {run} . {run} a irt:IR_RunProcess ; {repeat} irt:Run_Name {_text(name)} ;"
             f' irt:Run_Role "{role}" ; irt:Payload 3.0e0 ; irt:Run_Time 20.0e0 ; irt:Sample_Rate 100.0e0 ;'
+            " irt:Sample_Count 2000 ;"
             f' irt:Start_Time "2026-03-{day:02}T08:00:00Z"^^xsd:dateTime ; irt:Start_Time_From "log" ;'
             f" irt:Idle_Share 0.25e0 ; irt:has_Series <{run[1:-1]}/measured> ."
             f'<{run[1:-1]}/measured> a irt:Series ; irt:Series_Kind "measured" ; irt:File "series/m_{name}.parquet" ;'
@@ -148,7 +149,8 @@ class Factory:
             )
         self.say(
             f'{run} irt:modelled_by {self._twin} ; irt:Part_In_Twin "{part}" ; irt:Modelled_Energy {modelled}e0 ;'
-            f" irt:Energy_Consumption {measured if self.power else modelled:.2f}e0 ; irt:Run_Power 450.0e0 ;"
+            f" irt:Energy_Consumption {measured if self.power else modelled:.2f}e0 ;"
+            f' irt:Energy_From "{"measured" if self.power else "mechanical"}" ; irt:Run_Power 450.0e0 ;'
             " irt:Peak_Power 1210.0e0 ; irt:Standby_Energy 3000.0e0 ; irt:Standby_Share 0.3333e0 ; irt:Returned_Energy"
             f" 120.0e0 ; irt:has_Series <{run[1:-1]}/modelled> ."
             f'<{run[1:-1]}/modelled> a irt:Series ; irt:Series_Kind "modelled" ; irt:File "series/{name}.parquet" ;'

@@ -13,11 +13,14 @@ def sentence(found: Answers) -> str:
 def test_the_twin_is_judged_on_what_it_never_saw(graph: KnowledgeGraph):
     found = answers(graph, six_axis(graph))  # held out: R² 0.965 to 0.915, errors 2 % and 3 %
     assert sentence(found) == (
-        "The twin explains 94 % of joint-torque variance on data it never saw and misses the energy of runs it never "
+        "The twin explains 96 % of joint-torque variance on data it never saw and misses the energy of runs it never "
         "saw by 2.5 %; the seed paper (Yan et al., 2018) reached 6.54 %."
     )
+    errors = [(8.0 / k) ** 2 for k in range(1, 7)]
+    variances = [error / (0.035 + 0.01 * k) for k, error in enumerate(errors)]
+    pooled = 1 - sum(errors) / sum(variances)
     torque, energy = verdict.torque(found), verdict.energy(found)
-    assert torque and torque.row["r_squared"] == pytest.approx(0.94)
+    assert torque and torque.row["r_squared"] == pytest.approx(pooled)
     assert energy and energy.row["runs"] == 2
 
 
@@ -30,9 +33,19 @@ def test_a_run_cut_in_time_is_said_to_be_so(graph: KnowledgeGraph):
 def test_without_power_energy_is_not_checked(graph: KnowledgeGraph):
     factory = Factory("TX40", "TX40", power=False).robot().run("a").twin([], [], both=["a"]).into(graph)
     text = sentence(answers(graph, factory))
-    assert text.startswith("The twin explains 94 % of joint-torque variance on data it never saw. No electrical power")
+    assert text.startswith("The twin explains 96 % of joint-torque variance on data it never saw. No electrical power")
 
 
 def test_a_robot_without_twin(graph: KnowledgeGraph):
     factory = Factory("NEW", "NEW").robot().run("a").into(graph)
     assert sentence(answers(graph, factory, twin=False)).startswith("No twin of this robot has been identified yet")
+
+
+def test_a_joint_that_the_twin_does_not_follow_is_named(graph: KnowledgeGraph):
+    factory = six_axis(graph)
+    factory.say(
+        f"[] a irt:Torque_Fit ; irt:fit_of {factory._twin} ; irt:of_Run {factory._run('cycle_6')} ; irt:Fit_Part"
+        f' "held_out" ; irt:of_Joint {factory._joint(6)} ; irt:R_Squared -5.0e0 ; irt:Torque_RMSE 9.0e0 .'
+    )
+    text = sentence(answers(graph, factory.into(graph)))
+    assert "on data it never saw, though little of joint_6, and misses" in text

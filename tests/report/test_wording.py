@@ -70,6 +70,7 @@ def test_an_interval_says_how_many_decimals_make_sense(numbers: tuple[float, flo
 def test_units_are_printed_with_real_powers():
     assert wording.unit_symbol("kg m^2") == "kg m²"
     assert wording.unit_symbol("N m s^-1") == "N m s⁻¹"
+    assert wording.unit_symbol("ohm") == "Ω"
     assert wording.unit_symbol("1") == wording.unit_symbol(None) == ""
 
 
@@ -82,3 +83,8 @@ def test_moments_are_utc():
 def test_notes_are_names_and_text():
     assert wording.notes('{"supply": "400 V", "axes": [1, 2]}') == {"supply": "400 V", "axes": "[1, 2]"}
     assert wording.notes(None) == wording.notes("") == {}
+
+
+def test_names_are_listed_as_in_a_sentence():
+    assert wording.listed(["a"]) == "a"
+    assert wording.listed(["a", "b", "c"]) == "a, b and c"

@@ -55,12 +55,12 @@ class Columns:
 
 
 def opening_run(answers: Answers) -> Row | None:
-    """Return the row of the modelled series to show first: the held-out run with the largest energy error."""
-    errors = {row["run"]: abs(row["error_percent"] or 0.0) for row in answers["energy_per_run"].rows}
+    """Return the row of the modelled series to show first: of the held-out runs, that which takes the most energy."""
+    energies = {row["run"]: row["modelled_j"] for row in answers["energy_per_run"].rows}
     rank = {"held_out": 2, "both": 1}
     return max(
         answers["modelled_series"].rows,
-        key=lambda row: (rank.get(row["part"], 0), errors.get(row["run"], 0.0)),
+        key=lambda row: (rank.get(row["part"], 0), energies.get(row["run"], 0.0)),
         default=None,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -82,19 +83,27 @@ def energy_error(answer: Answer) -> Figure | None:
 
 
 def energy_per_joint(answer: Answer) -> Figure | None:
-    """Draw the energy (J) of each joint, stacked, run by run."""
-    return _stack(answer.rows, "run_name", _by_joint, _palette(_by_joint(row) for row in answer.rows))
+    """Draw the energy (J) of each joint, stacked, run by run; None for one run, which the other figure shows."""
+    return (
+        None
+        if _one_run(answer)
+        else _stack(answer.rows, "run_name", _by_joint, _palette(_by_joint(row) for row in answer.rows))
+    )
 
 
 def energy_per_effect(answer: Answer, colours: dict[str, str]) -> Figure | None:
-    """Draw the energy (J) of each effect, stacked, run by run."""
-    return _stack(answer.rows, "run_name", _by_effect, colours)
+    """Draw the energy (J) of each effect, stacked, run by run; None for one run, which the other figure shows."""
+    return None if _one_run(answer) else _stack(answer.rows, "run_name", _by_effect, colours)
 
 
 def energy_per_joint_and_effect(answer: Answer, colours: dict[str, str]) -> Figure | None:
     """Draw the energy (J) of all runs: a bar for each joint and one for the whole robot, stacked by effect."""
     rows = sorted(answer.rows, key=lambda row: row["joint"] is None)  # effects of the whole robot come last
     return _stack([{**row, "joint": row["joint"] or ROBOT_WIDE} for row in rows], "joint", _by_effect, colours)
+
+
+def _one_run(answer: Answer) -> bool:
+    return len({row["run_name"] for row in answer.rows}) < 2
 
 
 def plain(text: str) -> str:
@@ -112,7 +121,10 @@ _HATCHED = {
 def _stack(rows: Sequence[Row], category: str, series: Callable[[Row], str], colours: dict[str, str]) -> Figure | None:
     if not rows:
         return None
-    size, unit = wording.energy_unit(row["energy_j"] for row in rows)
+    totals: dict[str, float] = defaultdict(float)
+    for row in rows:
+        totals[row[category]] += max(row["energy_j"], 0.0)
+    size, unit = wording.energy_unit(totals.values())
     data = []
     present = {series(row) for row in rows}
     for name in (name for name in colours if name in present):

@@ -10,6 +10,8 @@ from irtwin.report.questions import Answers, Row
 
 SEED_ENERGY_ERROR = 6.54  # %, Yan 2018, equation (15)
 
+_POORLY = 0.5  # a joint of which less is explained is named
+
 # A twin is judged on data that it never saw; failing that, on what there is, and the page says so.
 _TORQUE_PARTS = (("held_out", "on data it never saw"), ("fit", "on the data it was fitted to"))
 _ENERGY_PARTS = (
@@ -43,16 +45,23 @@ def sentence(answers: Answers) -> str:
         return "No twin of this robot has been identified yet: this page shows what was recorded."
     explained, missed = torque(answers), energy(answers)
     if explained and missed:
-        return f"The twin {_explains(explained)} and {_misses(missed)}."
+        return f"The twin {_explains(explained, answers)} and {_misses(missed)}."
     if explained:
-        return f"The twin {_explains(explained)}. No electrical power was measured, so its energy is not checked."
+        explains = _explains(explained, answers).rstrip(",")
+        return f"The twin {explains}. No electrical power was measured, so its energy is not checked."
     if missed:
         return f"The twin {_misses(missed)}. No joint torque was measured, so its torque is not checked."
     return "The twin was identified, but nothing that was measured can check it."
 
 
-def _explains(judged: Judged) -> str:
-    return f"explains {wording.share(judged.row['r_squared'])} of joint-torque variance {judged.on}"
+def _explains(judged: Judged, answers: Answers) -> str:
+    weak = [
+        row["joint"]
+        for row in answers["torque_fit_per_joint"].rows
+        if row["part"] == judged.row["part"] and row["r_squared"] < _POORLY
+    ]
+    but = f", though little of {wording.listed(weak)}," if weak else ""
+    return f"explains {wording.share(judged.row['r_squared'])} of joint-torque variance {judged.on}{but}"
 
 
 def _misses(judged: Judged) -> str:

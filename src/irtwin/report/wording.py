@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -27,12 +27,14 @@ def number(value: float | int | None, digits: int = 3) -> str:
     if not -4 <= exponent < 7:
         mantissa = f"{value / 10.0**exponent:.{digits - 1}f}"
         return f"{mantissa}{_SPACE}×{_SPACE}10{_superscript(exponent)}".replace("-", _MINUS)
-    return fixed(value, max(digits - 1 - exponent, 0))
+    return decimals(value, max(digits - 1 - exponent, 0))
 
 
-def fixed(value: float, decimals: int = 0) -> str:
+def decimals(value: float | None, count: int = 0) -> str:
     """Write a number with so many decimals: 12345.6 -> "12 346"."""
-    return f"{value:,.{decimals}f}".replace(",", _THIN).replace("-", _MINUS)
+    if value is None or not math.isfinite(value):
+        return NONE
+    return f"{value:,.{count}f}".replace(",", _THIN).replace("-", _MINUS)
 
 
 def given(value: float | None, unit: str = "") -> str:
@@ -101,18 +103,23 @@ def angular_speed(speed: float | None, kind: str | None) -> str:
 
 
 def unit_symbol(unit: str | None) -> str:
-    """Write a unit's symbol as it is printed: "kg m^2" -> "kg m²", "1" for a number without unit -> ""."""
+    """Write a unit's symbol as it is printed: "kg m^2" -> "kg m²", "ohm" -> "Ω", "1" (no unit) -> ""."""
     if unit is None or unit == "1":
         return ""
-    return _POWER.sub(lambda power: _superscript(int(power[1])), unit)
+    return _POWER.sub(lambda power: _superscript(int(power[1])), unit).replace("ohm", "Ω")
 
 
-def moment(time: datetime | None) -> str:
-    """Write a point in time to the minute; it is UTC's."""
+def moment(time: datetime | None, seconds: bool = False) -> str:
+    """Write a point in time to the minute or second; it is UTC's."""
     if time is None:
         return NONE
     aware = time if time.tzinfo else time.replace(tzinfo=UTC)
-    return f"{aware.astimezone(UTC):%Y-%m-%d %H:%M}"
+    return aware.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S" if seconds else "%Y-%m-%d %H:%M")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Write names as a sentence does: "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
 def local_name(iri: str) -> str:
@@ -138,10 +145,10 @@ def interval(value: float, lower: float, upper: float) -> tuple[str, str]:
     half = (upper - lower) / 2
     if not (math.isfinite(half) and half > 0):
         return number(value), f"{number(lower)} … {number(upper)}"
-    decimals = max(1 - math.floor(math.log10(float(f"{half:.1e}"))), 0)
-    if decimals > 6:
+    count = max(1 - math.floor(math.log10(float(f"{half:.1e}"))), 0)
+    if count > 6:
         return number(value), f"{number(lower)} … {number(upper)}"
-    return fixed(value, decimals), f"{fixed(lower, decimals)} … {fixed(upper, decimals)}"
+    return decimals(value, count), f"{decimals(lower, count)} … {decimals(upper, count)}"
 
 
 def _superscript(exponent: int) -> str:
