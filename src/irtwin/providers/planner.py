@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from graphlib import CycleError, TopologicalSorter
+from importlib.metadata import version
 
-from irtwin import __version__
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.providers.provider import load_provider
@@ -62,7 +62,7 @@ def populate(
                 subject=subject,
                 started=started,
                 ended=datetime.now(UTC),
-                software=f"irtwin {__version__}",
+                software=f"irtwin {version('irtwin')}",
             )
             workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
         refresh()

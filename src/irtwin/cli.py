@@ -1,0 +1,178 @@
+"""The command line: arguments in, one call, its result shown."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import click
+
+from irtwin import __version__
+from irtwin.errors import InputError
+
+_WORKSPACE = Path("irtwin-workspace")
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line on standard error and exit status 2."""
+    try:
+        cli.main(standalone_mode=False)
+    except InputError as error:
+        click.echo(f"irtwin: {error}", err=True)
+        sys.exit(2)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("irtwin: stopped", err=True)
+        sys.exit(130)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="irtwin")
+def cli() -> None:
+    """A digital twin of an industrial robot's energy, held in a knowledge graph.
+
+    Start with `irtwin demo`: it takes the simulated logs of a KUKA KR6 R700 to a twin, a graph and a report.
+    """
+
+
+_workspace = click.option(
+    "--workspace",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=_WORKSPACE,
+    show_default=True,
+    help="Folder that holds database, series, graph and reports.",
+)
+_database = click.option(
+    "--database", metavar="URL", envvar="IRTWIN_DATABASE", help="SQLAlchemy URL; SQLite in the workspace if not given."
+)
+
+
+@cli.command()
+@click.argument("dataset", type=click.Path(path_type=Path))
+@_workspace
+@_database
+@click.option("--repair", is_flag=True, help="Drop bad samples, and say how many and which.")
+def run(dataset: Path, workspace: Path, database: str | None, repair: bool) -> None:
+    """Take a data set to a twin, a graph and a report.
+
+    DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file for each run.
+    """
+    from irtwin.workflow import run as run_all
+
+    report = run_all(dataset, workspace, database=database, repair=repair, announce=_say)
+    click.echo(report)
+
+
+@cli.command()
+@_workspace
+def demo(workspace: Path) -> None:
+    """Do the same on the KUKA KR6 R700 that ships with irtwin."""
+    from irtwin.workflow import run as run_all
+    from irtwin.workflow import unpack_demo
+
+    data_set = unpack_demo(workspace)
+    click.echo(f"The data set lies in {data_set}: take it as a pattern for your own.", err=True)
+    report = run_all(data_set, workspace, announce=_say)
+    click.echo(f"\nOpen the report in a browser: {report.resolve()}")
+    click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
+
+
+@cli.command()
+@click.argument("question", required=False)
+@_workspace
+@_database
+@click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True)
+def query(question: str | None, workspace: Path, database: str | None, form: str) -> None:
+    """Ask the graph a named QUESTION, or one in SPARQL; without one, list those that have names."""
+    from irtwin import workflow
+    from irtwin.knowledge.queries import to_csv, to_json
+
+    answer = workflow.questions() if question is None else workflow.ask(question, workspace, database=database)
+    if form == "table":
+        from irtwin.report.terminal import show
+
+        show(answer)
+    else:
+        click.echo(to_json(answer) if form == "json" else to_csv(answer), nl=form == "json")
+
+
+@cli.command()
+@_workspace
+@_database
+@click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
+def export(workspace: Path, database: str | None, owl: Path) -> None:
+    """Write ontology, individuals and inferences as one OWL file that Protégé opens."""
+    from irtwin import workflow
+
+    workflow.export(owl, workspace, database=database)
+    click.echo(owl)
+
+
+@cli.command()
+@click.argument("urdf", type=click.Path(path_type=Path))
+@click.option("--seconds", type=click.FloatRange(min=1.0), required=True, help="Length of the motion.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV file to write.")
+@click.option("--rate", type=click.FloatRange(min=1.0), default=100.0, show_default=True, help="Samples per second.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Other seeds give other motions.")
+@click.option(
+    "--box",
+    type=(float, float, float, float, float, float),
+    metavar="X Y Z X Y Z",
+    help="Two corners, m, in the base frame, between which flange and links stay; else they stay above the floor.",
+)
+def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
+    """Design a motion that excites every base parameter of a robot.
+
+    A finite Fourier series that starts and ends at rest and keeps the limits of the joints, between the samples too.
+    Ctrl-C keeps the best motion so far.
+    """
+    from irtwin.identification import excitation
+    from irtwin.identification.motion_limits import Box
+    from irtwin.robot.urdf import read_urdf
+
+    robot = read_urdf(urdf)
+    within = None if box is None else Box(_corner(box[:3], box[3:], min), _corner(box[:3], box[3:], max))
+    motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
+    motion.write_csv(out)
+    click.echo("\nStopped: this is the best so far." if motion.interrupted else "", err=True)
+    click.echo(
+        f"{out}: condition number {motion.condition_number:.1f}, "
+        f"{motion.limit_margin:.1%} of the joint limits to spare, {motion.clearance:.3f} m to the nearest wall"
+    )
+
+
+@cli.command("map")
+@click.argument("mapping", type=click.Path(path_type=Path))
+@click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
+def map_database(mapping: Path, database: str, out: Path) -> None:
+    """Turn the tables of any database into triples by an R2RML document."""
+    from irtwin.knowledge.mapping import map_to_file
+
+    map_to_file(mapping, database, out)
+
+
+def _say(line: str) -> None:
+    click.echo(line, err=True)
+
+
+def _corner(one: Sequence[float], other: Sequence[float], choose: Callable[[float, float], float]) -> tuple[float, ...]:
+    return tuple(choose(a, b) for a, b in zip(one, other, strict=True))
+
+
+def _excitation_progress() -> Callable[[int, float, float], None]:
+    """Return a progress line that is rewritten in a terminal, and said every few seconds in a log."""
+    shown = [-5.0]
+
+    def progress(iteration: int, condition: float, elapsed: float) -> None:
+        line = f"{elapsed:5.0f} s  step {iteration:4d}  condition number {condition:8.1f}"
+        if sys.stderr.isatty():
+            click.echo(f"\r{line}", err=True, nl=False)
+        elif elapsed - shown[0] >= 5.0:
+            shown[0] = elapsed
+            click.echo(line, err=True)
+
+    return progress

@@ -1,0 +1,127 @@
+"""The main job, end to end: a data set in; a twin, a graph and a report out."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from irtwin import resources
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.knowledge import graph as knowledge
+from irtwin.knowledge import queries
+from irtwin.knowledge.export import export_owl
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.validation import validate
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.providers.planner import populate
+from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
+from irtwin.report.explorer import Columns
+from irtwin.report.render import render
+from irtwin.signals.log import DataSet, read_data_set
+from irtwin.storage.database import Workspace
+from irtwin.virtual.scene import scene_html
+
+Announce = Callable[[str], None]
+WORKSPACE = Path("irtwin-workspace")
+
+
+def run(
+    dataset: Path | str,
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    repair: bool = False,
+    announce: Announce = lambda line: None,
+) -> Path:
+    """Take a data set to a twin, a knowledge graph and a report; return the report's path.
+
+    `database` is an SQLAlchemy URL, SQLite in the workspace if None; `announce` is told each step as it ends.
+    Raises InputError on bad input, before anything is written.
+    """
+    announce = _clocked(announce)
+    announce("Reading the data set")
+    data_set = read_data_set(Path(dataset), repair=repair)
+    _check_effects(data_set)
+    for line in data_set.repairs:
+        announce(f"  {line}")
+    with Workspace(Path(workspace), database) as place:
+        announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
+        outcome = ingest(place, data_set)
+        announce(f"  {outcome}")
+        graph = KnowledgeGraph(place.graph_folder)
+        graph.load_ontology()
+        _map(place, graph)
+        announce("Populating what the graph lacks")
+        populate(place, graph, lambda: _map(place, graph), announce)
+        announce("Reasoning")
+        inferred = reason(graph)
+        announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
+        for violation in validate(graph):
+            announce(f"  {violation}")
+        announce("Writing the report")
+        return _report(place, graph, identifier(data_set.robot.name))
+
+
+def ask(question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> knowledge.Table:
+    """Answer a named question, or one in SPARQL, from a workspace's graph."""
+    with Workspace.existing(Path(workspace), database) as place:
+        return queries.ask(KnowledgeGraph(place.graph_folder), question)
+
+
+def questions() -> knowledge.Table:
+    """Return the questions that have a name."""
+    known = queries.named_questions().values()
+    return knowledge.Table(("name", "question"), tuple({"name": q.name, "question": q.question} for q in known))
+
+
+def export(owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> None:
+    """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
+    with Workspace.existing(Path(workspace), database) as place:
+        export_owl(KnowledgeGraph(place.graph_folder), owl)
+
+
+def unpack_demo(workspace: Path) -> Path:
+    """Put the KUKA KR6 R700 data set that ships with the package into a workspace; return the data set's folder."""
+    data_set = workspace / "kuka_kr6_r700"
+    shutil.copytree(resources.folder("demo") / "kuka_kr6_r700", data_set, dirs_exist_ok=True)
+    shutil.copyfile(resources.folder("ontology") / "robots" / "kuka_kr6_r700.urdf", data_set / "robot.urdf")
+    return data_set
+
+
+def _check_effects(data_set: DataSet) -> None:
+    try:
+        Stack(data_set.robot, data_set.effects or ())
+    except InputError as error:
+        raise InputError(f"{data_set.folder / 'dataset.toml'}: [twin] effects: {error}") from error
+
+
+def _map(place: Workspace, graph: KnowledgeGraph) -> None:
+    """Bring the individuals up to date with the database."""
+    documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+    graph.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+
+
+def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
+    robot = load_robot(place, robot_id)
+    out = place.report_path(robot_id)
+
+    def draw_scene(series: Columns) -> str:
+        q = np.column_stack([series[f"q_{joint}"] for joint in robot.joint_names])
+        suffix = "_model" if series.get("power") is None else ""
+        return scene_html(robot, series["time"], q, series[f"energy{suffix}"], series[f"power{suffix}"])
+
+    render(graph, robot_iri(robot_id), place.read_file, out, draw_scene)
+    return out
+
+
+def _clocked(announce: Announce) -> Announce:
+    """Put the seconds since now before each line."""
+    began = time.monotonic()
+    return lambda line: announce(f"{time.monotonic() - began:5.1f} s  {line}")
