@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -119,9 +119,10 @@ def export(workspace: Path, database: str | None, owl: Path) -> None:
 @click.option("--seed", type=int, default=0, show_default=True, help="Other seeds give other motions.")
 @click.option(
     "--box",
-    type=(float, float, float, float, float, float),
+    type=float,
+    nargs=6,
     metavar="X Y Z X Y Z",
-    help="Two corners, m, in the base frame, between which flange and links stay; else they stay above the floor.",
+    help="Two corners, m in the base frame, between which the flange stays; links stay above the floor anyway.",
 )
 def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
     """Design a motion that excites every base parameter of a robot.
@@ -134,7 +135,13 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     from irtwin.robot.urdf import read_urdf
 
     robot = read_urdf(urdf)
-    within = None if box is None else Box(_corner(box[:3], box[3:], min), _corner(box[:3], box[3:], max))
+    within = None
+    if box is not None:
+        x, y, z, *other = box
+        within = Box(
+            lower=(min(x, other[0]), min(y, other[1]), min(z, other[2])),
+            upper=(max(x, other[0]), max(y, other[1]), max(z, other[2])),
+        )
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
     click.echo("\nStopped: this is the best so far." if motion.interrupted else "", err=True)
@@ -157,10 +164,6 @@ def map_database(mapping: Path, database: str, out: Path) -> None:
 
 def _say(line: str) -> None:
     click.echo(line, err=True)
-
-
-def _corner(one: Sequence[float], other: Sequence[float], choose: Callable[[float, float], float]) -> tuple[float, ...]:
-    return tuple(choose(a, b) for a, b in zip(one, other, strict=True))
 
 
 def _excitation_progress() -> Callable[[int, float, float], None]:

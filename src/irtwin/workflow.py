@@ -5,9 +5,8 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-
-import numpy as np
 
 from irtwin import resources
 from irtwin.effects.stack import Stack
@@ -22,11 +21,10 @@ from irtwin.knowledge.validation import validate
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.planner import populate
 from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
-from irtwin.report.explorer import Columns
 from irtwin.report.render import render
+from irtwin.report.scene import draw_scene
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
-from irtwin.virtual.scene import scene_html
 
 Announce = Callable[[str], None]
 WORKSPACE = Path("irtwin-workspace")
@@ -111,13 +109,7 @@ def _map(place: Workspace, graph: KnowledgeGraph) -> None:
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
     robot = load_robot(place, robot_id)
     out = place.report_path(robot_id)
-
-    def draw_scene(series: Columns) -> str:
-        q = np.column_stack([series[f"q_{joint}"] for joint in robot.joint_names])
-        suffix = "_model" if series.get("power") is None else ""
-        return scene_html(robot, series["time"], q, series[f"energy{suffix}"], series[f"power{suffix}"])
-
-    render(graph, robot_iri(robot_id), place.read_file, out, draw_scene)
+    render(graph, robot_iri(robot_id), place.read_file, out, partial(draw_scene, robot))
     return out
 
 
