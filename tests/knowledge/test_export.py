@@ -50,6 +50,13 @@ def test_everything_that_is_asserted_or_inferred_is_in_it(graph: KnowledgeGraph,
     assert len(set(written.subjects(RDF.type, IRT.Effect))) == 36
 
 
+def test_times_are_cut_to_what_hermit_reads(graph: KnowledgeGraph, exported: Path) -> None:
+    assert ".106403Z" in "".join(map(str, graph.triples()))
+    text = exported.read_text(encoding="utf-8")
+    assert "2026-03-05T12:00:01.106Z" in text
+    assert ".106403Z" not in text
+
+
 def test_failed_export_leaves_the_former_file(
     graph: KnowledgeGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from pyoxigraph import NamedNode, RdfFormat, Triple, serialize
 
 from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_INFERRED,
@@ -31,11 +32,13 @@ def export_owl(graph: KnowledgeGraph, path: Path) -> None:
     """Write RDF/XML; the file is there whole or not at all.
 
     The modules become one ontology that imports nothing, so that the file needs neither network nor catalogue.
-    The SHACL report stays out: it speaks about the graph, not about robots.
+    The SHACL report stays out: it speaks about the graph, not about robots. Times are cut to milliseconds.
     """
     triples = graph.triples(GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_ACTIVITY, GRAPH_INFERRED)
     modules = _of_type(triples, NamedNode(OWL + "Ontology")) - {_ONTOLOGY}
-    kept = {triple for triple in triples if triple.subject not in modules and triple.predicate != _IMPORTS}
+    kept = {
+        to_milliseconds(triple) for triple in triples if triple.subject not in modules and triple.predicate != _IMPORTS
+    }
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     serialize(sorted(kept | _declarations(triples), key=str), str(part), RdfFormat.RDF_XML, prefixes=PREFIXES)

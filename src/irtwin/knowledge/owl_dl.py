@@ -12,6 +12,7 @@ from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import read_turtle
+from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF
 from irtwin.resources import folder
 
@@ -65,7 +66,7 @@ def _declares(triple: Triple, terms: set[Any]) -> bool:
 def _world(triples: Iterable[Triple]) -> owlready2.World:
     world = owlready2.World()
     text = io.BytesIO()
-    kept = (triple for triple in triples if triple.predicate != _IMPORTS)
+    kept = (to_milliseconds(triple) for triple in triples if triple.predicate != _IMPORTS)
     serialize(kept, text, RdfFormat.N_TRIPLES)
     text.seek(0)
     world.get_ontology(ONTOLOGY).load(fileobj=text)
