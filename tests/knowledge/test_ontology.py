@@ -81,6 +81,8 @@ def test_every_term_that_is_used_is_declared(ontology: rdflib.Graph) -> None:
     texts = [
         *Path(folder("ontology")).glob("**/*.ttl"),
         *folder("rules").glob("*"),
+        *folder("mappings").glob("*.ttl"),
+        *folder("reports").glob("**/*.rq"),
         *(Path(__file__).parents[2] / "src/irtwin/knowledge/questions").glob("*.rq"),
         *Path(__file__).parent.glob("data/*.trig"),
     ]
