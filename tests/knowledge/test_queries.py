@@ -76,6 +76,10 @@ EXPECTED = {  # columns that are looked at, and their rows
             ("Arm_B", "work_2", "held_out", 800.0, 776.0, 3.0),
         ],
     ),
+    "base_parameters": (
+        "robot combination value unit lower upper",
+        [("Arm_A", "Ia j1 + Izz l1", 1.5, "kg m^2", 1.0, 2.0)],
+    ),
     "parameters": (
         "robot effect joint parameter value unit lower upper",
         [
@@ -161,7 +165,7 @@ def test_named_question_has_its_answer(graph: KnowledgeGraph, name: str) -> None
 def test_provenance_names_provider_and_what_it_made(graph: KnowledgeGraph) -> None:
     table = ask(graph, "provenance")
     made = {(row["made"], row["count"]) for row in table if row["activity"].endswith("identification.Arm_A")}
-    assert made == {("energy twin", 1), ("twin parameter", 3), ("torque fit", 4)}
+    assert made == {("energy twin", 1), ("twin parameter", 3), ("base parameter", 1), ("torque fit", 4)}
     assert {row["provider"] for row in table} == {"run state", "identification", "energy"}
     assert {row["software"] for row in table} == {"irtwin 0.1.0"}
 
@@ -180,7 +184,7 @@ def test_sparql_is_asked_as_it_is(graph: KnowledgeGraph) -> None:
 def test_unknown_name_is_met_with_the_nearest(graph: KnowledgeGraph) -> None:
     with pytest.raises(InputError, match=r"'energy_per_runs'.*did you mean energy_per_run\?"):
         ask(graph, "energy_per_runs")
-    with pytest.raises(InputError, match="known are dominant_joint, "):
+    with pytest.raises(InputError, match="known are base_parameters, dominant_joint, "):
         ask(graph, "xyzzy")
 
 

@@ -17,6 +17,7 @@ from irtwin.knowledge.mapping.document import RR
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import (
     Base,
+    BaseParameter,
     EnergyShare,
     JointEnergy,
     JointState,
@@ -79,6 +80,15 @@ def twin_parts() -> list[Base]:
             lower=7.0,
             upper=7.5,
         ),
+        BaseParameter(
+            twin_id=TWIN,
+            number=1,
+            combination="Ia joint_a1 + Izz link_1",
+            value=1.5,
+            unit="kg m^2",
+            lower=1.0,
+            upper=2.0,
+        ),
         Parameter(
             parameter_id=f"{TWIN}.standby_power.robot.P0",
             twin_id=TWIN,
@@ -115,7 +125,7 @@ def test_every_individual_of_a_provider_says_who_made_it(workspace: Workspace) -
     quads = list(map_database(workspace.engine, MAPPINGS))
     generated = {quad.subject for quad in quads if quad.predicate.value.endswith("#wasGeneratedBy")}
     made = {quad.subject for quad in quads if is_made(quad)}
-    assert len(made) == 9
+    assert len(made) == 10
     assert made <= generated
 
 

@@ -74,9 +74,9 @@ def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
     columns: dict[str, np.ndarray] = {"time": motion.time, "held_out": judged}
     names = twin.robot.joint_names
     columns |= {f"q_{name}": motion.q[:, place] for place, name in enumerate(names)}
-    if motion.torque is not None:
-        columns |= {f"tau_{name}": motion.torque[:, place] for place, name in enumerate(names)}
-    torque = twin.torque(motion)
+    measured, torque = twin.measured_torque(motion), twin.torque(motion)
+    if measured is not None:
+        columns |= {f"tau_{name}": measured[:, place] for place, name in enumerate(names)}
     columns |= {f"tau_{name}_model": torque[:, place] for place, name in enumerate(names)}
     for suffix, power in (("", motion.power), ("_model", twin.power(motion))):
         if power is not None:

@@ -57,6 +57,7 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
             *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effects),
             *_runs(twin_id, keys, parts),
             *_parameters(twin_id, robot_id, twin),
+            *_base_parameters(twin_id, twin),
             *_torque_fits(twin_id, robot_id, keys, twin, parts),
         ],
         documents={row.file: document},
@@ -81,6 +82,19 @@ def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[schema.Para
             effect=parameter.effect,
             joint=parameter.joint,
             name=parameter.name if parameter.link is None else f"{parameter.name} of {parameter.link}",
+            value=parameter.value,
+            unit=parameter.unit,
+            lower=parameter.lower,
+            upper=parameter.upper,
+        )
+
+
+def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]:
+    for number, parameter in enumerate(twin.base_parameters, start=1):
+        yield schema.BaseParameter(
+            twin_id=twin_id,
+            number=number,
+            combination=parameter.name,
             value=parameter.value,
             unit=parameter.unit,
             lower=parameter.lower,

@@ -231,6 +231,21 @@ class Parameter(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+class BaseParameter(Base):
+    """A combination of torque coefficients that the measured torque shows, with its 95 % interval."""
+
+    __tablename__ = "base_parameter"
+
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    combination: Mapped[str]
+    value: Mapped[float]
+    unit: Mapped[str]
+    lower: Mapped[float]
+    upper: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
 class TorqueFit(Base):
     """How well a twin's torque follows the measured one, per run, joint and part."""
 
