@@ -70,6 +70,15 @@ def test_graph_on_disk_outlives_its_process_object(tmp_path: Path, two_robots: l
     assert len(KnowledgeGraph(tmp_path / "graph").triples()) == count > 600
 
 
+def test_closed_graph_can_be_opened_again_while_somebody_holds_it(tmp_path: Path, two_robots: list[Quad]) -> None:
+    with KnowledgeGraph(tmp_path / "graph") as held:
+        held.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
+        count = len(held.triples())
+    with KnowledgeGraph(tmp_path / "graph") as again:
+        assert len(again.triples()) == count
+    assert held.graphs() == []
+
+
 def test_open_graph_cannot_be_opened_again(tmp_path: Path) -> None:
     first = KnowledgeGraph(tmp_path / "graph")
     with pytest.raises(InputError, match="cannot be opened"):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Self, overload
 
 from pyoxigraph import (
     BlankNode,
@@ -77,6 +77,17 @@ class KnowledgeGraph:
             self._store = Store() if path is None else Store(str(path))
         except OSError as error:
             raise InputError(f"{path}: the graph cannot be opened: {error}") from error
+
+    def __enter__(self) -> Self:
+        """Return the graph; leaving the block closes it."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
+        self._store = Store()
 
     def load_ontology(self) -> None:
         """Put the modules of `ontology/` into the ontology's graph."""
