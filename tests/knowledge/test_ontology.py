@@ -181,6 +181,20 @@ def test_kr6_sheet_says_what_its_urdf_says() -> None:
             assert sheet.value(individual, IRT[name]).toPython() == float(limit.get(attribute, "nan"))
 
 
+def test_kr6_sheet_says_what_the_shipped_data_set_says() -> None:
+    sheet = rdflib.Graph().parse(folder("ontology") / "robots" / "kuka_kr6_r700.ttl")
+    robot = tomllib.loads((folder("demo") / "kuka_kr6_r700" / "dataset.toml").read_text(encoding="utf-8"))["robot"]
+    keys = {
+        "IR_Name": "name",
+        "IR_Type": "type",
+        "Manufacturer": "manufacturer",
+        "IR_Weight": "weight",
+        "Rated_Payload": "rated_payload",
+    }
+    for name, key in keys.items():
+        assert [value.toPython() for value in sheet.objects(None, IRT[name])] == [robot[key]]
+
+
 def test_every_implemented_effect_has_an_individual(ontology: rdflib.Graph) -> None:
     effect = pytest.importorskip("irtwin.effects.effect")
     ids = {str(one).removeprefix(EFFECT) for one in ontology.subjects(RDF.type, IRT.Effect)}
