@@ -49,11 +49,10 @@ def run(
     _check_effects(data_set)
     for line in data_set.repairs:
         announce(f"  {line}")
-    with Workspace(Path(workspace), database) as place:
+    with Workspace(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
         announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
         outcome = ingest(place, data_set)
         announce(f"  {outcome}")
-        graph = KnowledgeGraph(place.graph_folder)
         graph.load_ontology()
         _map(place, graph)
         announce("Populating what the graph lacks")
@@ -69,8 +68,8 @@ def run(
 
 def ask(question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> knowledge.Table:
     """Answer a named question, or one in SPARQL, from a workspace's graph."""
-    with Workspace.existing(Path(workspace), database) as place:
-        return queries.ask(KnowledgeGraph(place.graph_folder), question)
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+        return queries.ask(graph, question)
 
 
 def questions() -> knowledge.Table:
@@ -81,8 +80,8 @@ def questions() -> knowledge.Table:
 
 def export(owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> None:
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
-    with Workspace.existing(Path(workspace), database) as place:
-        export_owl(KnowledgeGraph(place.graph_folder), owl)
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+        export_owl(graph, owl)
 
 
 def unpack_demo(workspace: Path) -> Path:
