@@ -69,7 +69,7 @@ def run(dataset: Path, workspace: Path, database: str | None, repair: bool) -> N
 @cli.command()
 @_workspace
 def demo(workspace: Path) -> None:
-    """Do the same on the KUKA KR6 R700 that ships with irtwin."""
+    """Do `run` on the KUKA KR6 R700 that ships with irtwin."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
@@ -86,7 +86,10 @@ def demo(workspace: Path) -> None:
 @_database
 @click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True)
 def query(question: str | None, workspace: Path, database: str | None, form: str) -> None:
-    """Ask the graph a named QUESTION, or one in SPARQL; without one, list those that have names."""
+    """Ask the graph a question, by its name or in SPARQL.
+
+    Without a QUESTION: list those that have names.
+    """
     from irtwin import workflow
     from irtwin.knowledge.queries import to_csv, to_json
 
@@ -104,7 +107,10 @@ def query(question: str | None, workspace: Path, database: str | None, form: str
 @_database
 @click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
 def export(workspace: Path, database: str | None, owl: Path) -> None:
-    """Write ontology, individuals and inferences as one OWL file that Protégé opens."""
+    """Write the whole graph as one OWL file for Protégé.
+
+    Ontology, individuals and inferences, in RDF/XML.
+    """
     from irtwin import workflow
 
     workflow.export(owl, workspace, database=database)
@@ -125,7 +131,7 @@ def export(workspace: Path, database: str | None, owl: Path) -> None:
     help="Two corners, m in the base frame, between which the flange stays; links stay above the floor anyway.",
 )
 def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
-    """Design a motion that excites every base parameter of a robot.
+    """Design a motion that shows every base parameter.
 
     A finite Fourier series that starts and ends at rest and keeps the limits of the joints, between the samples too.
     Ctrl-C keeps the best motion so far.
@@ -156,7 +162,10 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
 def map_database(mapping: Path, database: str, out: Path) -> None:
-    """Turn the tables of any database into triples by an R2RML document."""
+    """Turn a database into triples by an R2RML document.
+
+    Any document on any database that SQLAlchemy reaches.
+    """
     from irtwin.knowledge.mapping import map_to_file
 
     map_to_file(mapping, database, out)

@@ -192,8 +192,12 @@ def test_a_workspace_where_a_file_stands(tmp_path: Path) -> None:
         Workspace(tmp_path / "file")
 
 
-def test_a_workspace_of_another_version(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("change", "table"),
+    [("ALTER TABLE robot ADD COLUMN colour VARCHAR", "robot"), ("DROP TABLE base_parameter", "base_parameter")],
+)
+def test_a_workspace_of_another_version(tmp_path: Path, change: str, table: str) -> None:
     with Workspace(tmp_path) as workspace, workspace.engine.begin() as connection:
-        connection.execute(text("ALTER TABLE robot ADD COLUMN colour VARCHAR"))
-    with pytest.raises(InputError, match="table robot is of another irtwin version"):
+        connection.execute(text(change))
+    with pytest.raises(InputError, match=f"table {table} is of another irtwin version"):
         Workspace(tmp_path)

@@ -197,7 +197,8 @@ class Workspace:
                 Base.metadata.create_all(session.connection())
         inspector = inspect(self.engine)
         for table in tables:
-            if {column["name"] for column in inspector.get_columns(table.name)} != set(table.columns.keys()):
+            known = inspector.get_columns(table.name) if inspector.has_table(table.name) else []
+            if {column["name"] for column in known} != set(table.columns.keys()):
                 raise InputError(
                     f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
                     "choose a new workspace and ingest again"
