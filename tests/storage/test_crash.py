@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
-import rows
-from test_database import populate, state
 
+import rows
 from irtwin.storage.database import Workspace
+from test_database import populate, state
 
 # Each kills the process at one step of taking in a changed data set.
 KILLED = """

@@ -1,0 +1,95 @@
+"""The planner: what is run, in which order, and what never is."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.providers import planner, provider
+from irtwin.providers.planner import Declaration, declarations, in_order, lacking
+
+IRT = "https://w3id.org/irtwin#"
+
+
+def declare(name: str, requires: str, populates: str, applies_to: str = "IR_RunProcess") -> Declaration:
+    return Declaration(
+        name,
+        IRT + applies_to,
+        frozenset(IRT + r for r in requires.split()),
+        frozenset(IRT + p for p in populates.split()),
+    )
+
+
+@pytest.fixture
+def graph(tmp_path: Path) -> KnowledgeGraph:
+    """Two robots: A with a twin, B without; run A.1 has its energy, A.2 lacks it."""
+    from pyoxigraph import RdfFormat, parse
+
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    quads = """
+        @prefix irt: <https://w3id.org/irtwin#> . @prefix : <https://w3id.org/irtwin/id/> .
+        <https://w3id.org/irtwin/graph/source/x> {
+          :A a irt:Industrial_Robot ; irt:has_RunProcess :A.1, :A.2 ; irt:has_Twin :t .
+          :B a irt:Industrial_Robot ; irt:has_RunProcess :B.1 .
+          :A.1 a irt:IR_RunProcess ; irt:run_of :A ; irt:has_Series :s1 ; irt:Modelled_Energy 1.0e0 .
+          :A.2 a irt:IR_RunProcess ; irt:run_of :A ; irt:has_Series :s2 .
+          :B.1 a irt:IR_RunProcess ; irt:run_of :B ; irt:has_Series :s3 . }
+    """
+    graph.replace(parse(quads, format=RdfFormat.TRIG), "https://w3id.org/irtwin/graph/source/")
+    return graph
+
+
+def ends(iris: list[str]) -> list[str]:
+    return [iri.rpartition("/")[2] for iri in iris]
+
+
+def test_the_ontology_declares_what_the_package_registers(graph):
+    declared = {declaration.name for declaration in declarations(graph)}
+    assert declared == {point.name for point in provider.entry_points(group=provider.GROUP)}
+
+
+def test_providers_follow_those_whose_work_they_require(graph):
+    names = [declaration.name for declaration in in_order(declarations(graph))]
+    assert names.index("identification") < names.index("energy")
+
+
+def test_a_circle_is_named():
+    circle = [declare("hen", "egg", "hen"), declare("egg", "hen", "egg")]
+    with pytest.raises(InputError, match=r"require each other in a circle: (hen -> egg -> hen|egg -> hen -> egg)"):
+        in_order(circle)
+
+
+def test_only_what_lacks_the_result_and_has_the_premises_is_run(graph):
+    energy = declare("energy", "has_Series has_Twin", "Modelled_Energy Energy_Consumption")
+    assert ends(lacking(graph, energy)) == ["A.2"]  # A.1 has it, B has no twin
+    twin = declare("identification", "has_Series", "has_Twin", "Industrial_Robot")
+    assert ends(lacking(graph, twin)) == ["B"]
+
+
+def test_a_provider_that_nobody_offers_is_named():
+    with pytest.raises(InputError, match='provider "oracle" is declared in the ontology, but no installed package'):
+        provider.load_provider("oracle")
+
+
+def test_each_runs_once_and_the_graph_is_refreshed_after_it(graph, monkeypatch):
+    ran, kept, refreshed = [], [], []
+
+    def made_by(name: str):
+        def provide(workspace: object, key: str) -> provider.Made:
+            ran.append((name, key))
+            return provider.Made(key[0], [], [])
+
+        return provide
+
+    monkeypatch.setattr(planner, "load_provider", made_by)
+    workspace = SimpleNamespace(replace_activity=lambda activity, *_: kept.append(activity))
+    planner.populate(workspace, graph, lambda: refreshed.append(len(ran)), lambda line: None)
+    assert ran[:1] == [("identification", "B")]
+    assert ("energy", "A.2") in ran
+    assert ("energy", "A.1") not in ran
+    assert len(ran) == len(set(ran)) == len(kept)
+    assert all(activity.started <= activity.ended for activity in kept)
+    assert refreshed[-1] == len(ran)
