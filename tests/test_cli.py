@@ -145,6 +145,16 @@ def test_the_map_command_writes_quads(workspace, tmp_path):
     assert "https://w3id.org/irtwin#IR_Name" in out.read_text()
 
 
+@pytest.mark.system
+def test_any_database_serves(small_data_set, tmp_path, new_postgresql_database):
+    url = new_postgresql_database()
+    done = irtwin("run", small_data_set, "--workspace", tmp_path, "--database", url)
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "irtwin.db").exists()
+    asked = irtwin("query", "worst_run", "--workspace", tmp_path, "--database", url, "--format", "json")
+    assert json.loads(asked.stdout)[0]["robot"] == "KUKA_KR6_R700"
+
+
 @pytest.mark.slow
 def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
     owl = tmp_path / "robots.owl"
