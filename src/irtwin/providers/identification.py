@@ -28,8 +28,9 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
     robot = load_robot(workspace, robot_id)
     with workspace.reading() as session:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
-        run_ids = session.scalars(select(schema.Run.run_id).where(schema.Run.robot_id == robot_id)).all()
-    runs = {run_id: load_run(workspace, robot, run_id) for run_id in sorted(run_ids)}
+        in_order = select(schema.Run.run_id).order_by(schema.Run.start_time, schema.Run.run_id)
+        run_ids = session.scalars(in_order.where(schema.Run.robot_id == robot_id)).all()
+    runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     cutoff = choose_cutoff(runs.values())
     motions = [condition(run, robot, cutoff) for run in runs.values()]
     parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
