@@ -16,7 +16,11 @@ EFFECT = "https://w3id.org/irtwin/effect/"
 QUDT = rdflib.Namespace("http://qudt.org/schema/qudt/")
 MODULES = ["irtwin", "units", "robot", "energy", "effects", "gap", "providers", "alignment"]
 KINDS = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.AnnotationProperty, OWL.NamedIndividual]
-UNIT_IS_BESIDE = {"Parameter_Value", "Interval_Lower", "Interval_Upper", "Range_Lower", "Range_Upper"}
+UNIT_IS_BESIDE = {
+    *("Parameter_Value", "Interval_Lower", "Interval_Upper", "Range_Lower", "Range_Upper", "Gap_RMSE", "Noise_Floor"),
+    *("Cause_Parameter_Value", "Cause_Parameter_Lower", "Cause_Parameter_Upper"),
+    *("Change_Before", "Change_After", "Change_After_Lower", "Change_After_Upper"),
+}
 SHARED = Path(__file__).parents[2] / "../shared"
 
 

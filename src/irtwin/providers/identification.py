@@ -35,6 +35,12 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
     motions = [condition(run, robot, cutoff) for run in runs.values()]
     parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
     twin = identify(robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
+    keys = {run.name: run_id for run_id, run in runs.items()}
+    return twin_made(robot_id, twin, keys, parts)
+
+
+def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> Made:
+    """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id."""
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"
@@ -49,13 +55,12 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
         base_parameter_count=len(twin.base_parameters) or None,
         split=parts.rule,
     )
-    keys = {run.name: run_id for run_id, run in runs.items()}
     return Made(
         robot_id=robot_id,
-        used=[run_iri(run_id) for run_id in runs],
+        used=[run_iri(run_id) for run_id in keys.values()],
         rows=[
             row,
-            *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effects),
+            *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in dict.fromkeys(twin.effects)),
             *_runs(twin_id, keys, parts),
             *_parameters(twin_id, robot_id, twin),
             *_base_parameters(twin_id, twin),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,11 +14,12 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
+from irtwin.storage.gap_schema import GapDiagnosis
 from irtwin.storage.schema import Activity, ActivityUse, Base, Joint, Robot, Run, Series, Twin, in_utc
 from irtwin.storage.series import FOLDER, inside, read_series, write_series
 
 Outcome = Literal["new", "unchanged", "replaced"]
-TWINS = "twins"
+TWINS, DIAGNOSES = "twins", "diagnoses"
 
 
 class Workspace:
@@ -89,8 +91,9 @@ class Workspace:
         rows: Sequence[Base],
         series: Mapping[str, pa.Table] | None = None,
         documents: Mapping[str, bytes] | None = None,
+        instead_of: str | None = None,
     ) -> None:
-        """Keep what a provider made, in place of what it made of the same subject before.
+        """Keep what a provider made, in place of what it, or the provider `instead_of`, made of the same subject.
 
         used: IRIs of what the activity read; rows: of the tables with an `activity_id`, which is set here;
         series: modelled samples by `run_id`; documents: files by their path in the workspace (`twins/ID.json`).
@@ -101,7 +104,7 @@ class Workspace:
         uses = [ActivityUse(activity_id=activity.activity_id, entity=entity) for entity in sorted(set(used))]
         with self._writing() as session:
             same = select(Activity.activity_id).where(
-                Activity.provider == activity.provider, Activity.subject == activity.subject
+                Activity.provider.in_((activity.provider, instead_of)), Activity.subject == activity.subject
             )
             _drop_activities(session, _with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
@@ -130,11 +133,23 @@ class Workspace:
         """Read a series by the path and checksum that the graph says of it. Raises InputError as `read_series`."""
         return read_series(self.folder, path, checksum)
 
+    def read_document(self, path: str, checksum: str) -> bytes:
+        """Read a document by its path and SHA-256. Raises InputError where it is gone or another."""
+        try:
+            content = inside(self.folder, path).read_bytes()
+        except OSError as error:
+            raise InputError(f"{self.folder / path}: cannot be read: {error.strerror}; diagnose again") from None
+        if hashlib.sha256(content).hexdigest() != checksum:
+            raise InputError(f"{self.folder / path}: changed since it was written; diagnose again")
+        return content
+
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""
         with self._writing() as session:
             named = {*session.scalars(select(Series.path)), *session.scalars(select(Twin.file))}
-            for file in [*self._files(FOLDER), *self._files(TWINS)]:
+            for column in (GapDiagnosis.file, GapDiagnosis.evidence_file, GapDiagnosis.twin_file):
+                named |= {path for path in session.scalars(select(column)) if path is not None}
+            for file in [*self._files(FOLDER), *self._files(TWINS), *self._files(DIAGNOSES)]:
                 if file.relative_to(self.folder).as_posix() not in named:
                     file.unlink()
 

@@ -1,0 +1,196 @@
+"""The tables of a diagnosis: where the gap between twin and robot lies, what causes it, how far it shrinks.
+
+Joints, runs and effects are named as in the contract's JSON; ranks count from 1, the first being the foremost.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import ForeignKey
+from sqlalchemy.orm import Mapped, mapped_column
+
+from irtwin.storage.schema import Base
+
+
+class GapDiagnosis(Base):
+    """A diagnosis of a robot's gap, with the files that hold it, its curves and the twin with its causes added."""
+
+    __tablename__ = "gap_diagnosis"
+
+    diagnosis_id: Mapped[str] = mapped_column(primary_key=True)  # robot_id. and a hash of the diagnosis
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
+    verdict: Mapped[str]  # "no_gap", "attributed", "ambiguous" or "unexplained"
+    created: Mapped[datetime]
+    energy_error_percent: Mapped[float | None]  # before anything is added
+    noise_floor_from: Mapped[str | None]  # "repeats" or "out_of_band"
+    file: Mapped[str]
+    sha256: Mapped[str]
+    evidence_file: Mapped[str]
+    evidence_sha256: Mapped[str]
+    twin_file: Mapped[str | None]
+    twin_sha256: Mapped[str | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapSize(Base):
+    """The gap of one channel before anything is added: torque of a joint, or power."""
+
+    __tablename__ = "gap_size"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    channel: Mapped[str] = mapped_column(primary_key=True)  # "torque" or "power"
+    place: Mapped[str] = mapped_column(primary_key=True)  # the joint's name, "robot" for power
+    joint: Mapped[str | None]
+    robot_id: Mapped[str]
+    rmse: Mapped[float]
+    noise_floor: Mapped[float | None]
+    excess: Mapped[float | None]  # mean square over that of the floor, less 1
+    unit: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapLocation(Base):
+    """A place where part of the gap lies."""
+
+    __tablename__ = "gap_location"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    rank: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    channel: Mapped[str]
+    joint: Mapped[str | None]
+    regime: Mapped[str | None]
+    follows: Mapped[str | None]  # the variable that the residual goes with
+    share: Mapped[float]  # of the gap, 0 to 1
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapLocationRun(Base):
+    """A run in which a location was seen; none where all runs show it."""
+
+    __tablename__ = "gap_location_run"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    rank: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCause(Base):
+    """An effect held responsible for part of the gap."""
+
+    __tablename__ = "gap_cause"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    rank: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    effect: Mapped[str]
+    scope: Mapped[str]  # "missing" or "changed"
+    confidence: Mapped[float]
+    evidence: Mapped[str]  # JSON
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCauseJoint(Base):
+    """A joint that a cause acts on; none for an effect of the whole robot."""
+
+    __tablename__ = "gap_cause_joint"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    rank: Mapped[int] = mapped_column(primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCauseRival(Base):
+    """An effect that explains the data as well as a cause does."""
+
+    __tablename__ = "gap_cause_rival"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    rank: Mapped[int] = mapped_column(primary_key=True)
+    effect: Mapped[str] = mapped_column(primary_key=True)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCauseParameter(Base):
+    """A parameter of a cause with its 95 % interval."""
+
+    __tablename__ = "gap_cause_parameter"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    rank: Mapped[int] = mapped_column(primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    joint: Mapped[str | None]
+    name: Mapped[str]
+    value: Mapped[float]
+    unit: Mapped[str]
+    lower: Mapped[float | None]
+    upper: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapChange(Base):
+    """What all causes together change on runs outside the fit."""
+
+    __tablename__ = "gap_change"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    measure: Mapped[str] = mapped_column(primary_key=True)  # "torque_rmse", "power_rmse" or "energy_error_percent"
+    before: Mapped[float]
+    after: Mapped[float]
+    noise_floor: Mapped[float | None]
+    lower: Mapped[float | None]  # of what is left
+    upper: Mapped[float | None]
+    unit: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapShrinkage(Base):
+    """Share of the gap above the floor that closes: by all causes, by one alone, or by all but one."""
+
+    __tablename__ = "gap_shrinkage"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    part: Mapped[str] = mapped_column(primary_key=True)  # "together", "alone" or "without"
+    place: Mapped[int] = mapped_column(primary_key=True)  # the cause's rank, 0 for all of them
+    rank: Mapped[int | None]
+    closed_fraction: Mapped[float]
+    lower: Mapped[float | None]
+    upper: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapHeldOut(Base):
+    """A run on which the shrinkage was judged."""
+
+    __tablename__ = "gap_held_out"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapNotTestable(Base):
+    """An effect that the data cannot show, and why."""
+
+    __tablename__ = "gap_not_testable"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    effect: Mapped[str]
+    why: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapExperiment(Base):
+    """What to measure next, so that rivals come apart."""
+
+    __tablename__ = "gap_experiment"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    description: Mapped[str]  # JSON
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
