@@ -48,7 +48,7 @@ def spoil(document, *keys, value=None, drop=False):
         (("version",), {"value": 9}, '"version" is not 1; identify the twin again'),
         (("effects",), {"drop": True}, '"effects" is missing'),
         (("effects",), {"value": ["rigid_body", "magic"]}, 'there is no effect "magic"'),
-        (("effects",), {"value": [3]}, '"effects" holds something that is no text'),
+        (("effects",), {"value": [3]}, 'in "effects", entry 1: '),
         (("cutoff",), {"value": "fast"}, '"cutoff" is no float'),
         (("robot",), {"value": []}, '"robot" is no dict'),
         (("robot", "urdf"), {"value": "<robot"}, "URDF in it, line 1"),

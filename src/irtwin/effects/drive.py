@@ -1,36 +1,57 @@
-"""The drives: rotors that turn with the joints, and windings that heat.
+"""The drives: rotors that turn with the joints, and windings, iron and inverters that heat.
 
 What a data sheet says of them is taken to be as unsure as it is large: it leaves out gears, phases and warmth.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Term, force_unit, inertia_unit
+from irtwin.effects.effect import (
+    JointEffect,
+    Known,
+    Predicted,
+    Quantity,
+    Term,
+    force_unit,
+    inertia_unit,
+    quantity,
+    ratio,
+)
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
+COPPER = 0.0039  # 1/K: how resistance grows
 
+
+def currents(robot: Robot, predicted: Predicted | None) -> np.ndarray:
+    """Return (N, n) predicted currents, A; torques where no torque constant is known."""
+    assert predicted is not None
+    return np.asarray(predicted.torque / np.array([joint.torque_constant or 1.0 for joint in robot.joints]))
+
+
+@dataclass(frozen=True)
 class RotorInertia(JointEffect):
     """Ia ddq: rotor and gear, reflected to the joint."""
 
     id: ClassVar[str] = "rotor_inertia"
     channel: ClassVar[str] = "torque"
 
-    def term(self, joint: Joint) -> Term:
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Ia, expected as the data sheet says."""
         known = joint.rotor_inertia
-        return Term("Ia", inertia_unit(joint), joint.name, expected=known or 0.0, spread=known or 5.0, lowest=0.0)
+        return (Term("Ia", inertia_unit(joint), joint.name, expected=known or 0.0, spread=known or 5.0, lowest=0.0),)
 
-    def column(self, motion: Motion) -> np.ndarray:
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return ddq."""
-        return motion.ddq
+        return (motion.ddq,)
 
 
-class CopperLoss(Effect):
+@dataclass(frozen=True)
+class CopperLoss(JointEffect):
     """R i^2, the current i being predicted torque by torque constant.
 
     Where no torque constant is known the coefficient multiplies the torque squared, W/(N m)^2.
@@ -38,19 +59,95 @@ class CopperLoss(Effect):
 
     id: ClassVar[str] = "copper_loss"
     channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "torque"
 
-    def terms(self, robot: Robot) -> tuple[Term, ...]:
-        """Return R per joint, expected as the data sheet says."""
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return R, expected as the data sheet says."""
+        known = joint.winding_resistance
+        if joint.torque_constant:
+            return (Term("R", "ohm", joint.name, expected=known or 0.0, spread=known or 20.0, lowest=0.0),)
+        return (Term("R", f"W/({force_unit(joint)})^2", joint.name, spread=1.0, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return currents squared."""
+        return (currents(robot, predicted) ** 2,)
+
+
+@dataclass(frozen=True)
+class WindingTemperature(JointEffect):
+    """R 0.0039 (T - T0) i^2: copper that is warmer than its data sheet. The coefficient is R (T - T0), ohm K.
+
+    Where temperatures were measured, the rise of the winding goes with them, and the coefficient is that where the
+    measured one is `rise` above `T0`.
+    """
+
+    id: ClassVar[str] = "winding_temperature"
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "torque"
+
+    T0: float = 25.0  # degC
+    rise: float = 30.0  # K
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return R (T - T0)."""
+        unit = "ohm K" if joint.torque_constant else f"W K/({force_unit(joint)})^2"
+        return (Term("R T", unit, joint.name, spread=80.0 * (joint.winding_resistance or 20.0), lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return 0.0039 i^2, by the measured rise in units of `rise`."""
+        warmth = 1.0 if motion.temperature is None else (motion.temperature - self.T0) / self.rise
+        return (COPPER * warmth * currents(robot, predicted) ** 2,)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return T, the rise, relative to the joint's R; nothing where that is not known."""
         return tuple(
-            Term("R", "ohm", joint.name, expected=known or 0.0, spread=known or 20.0, lowest=0.0)
-            if joint.torque_constant
-            else Term("R", f"W/({force_unit(joint)})^2", joint.name, spread=1.0, lowest=0.0)
-            for joint in robot.joints
-            for known in [joint.winding_resistance]
+            quantity("T", joint.name, ratio(value, copper), "K", ratio(deviation, copper))
+            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
+            for copper in [(known or {}).get(("copper_loss", joint.name, "R"), joint.winding_resistance)]
+            if copper
         )
 
-    def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:
-        """Return (N, n) currents squared."""
-        assert torque is not None
-        constants = np.array([joint.torque_constant or 1.0 for joint in robot.joints])
-        return np.asarray((torque / constants) ** 2)
+
+@dataclass(frozen=True)
+class IronLoss(JointEffect):
+    """k1 |w| + k2 w^2: hysteresis and eddy currents; w is the motor's speed, the joint's where no gear is known."""
+
+    id: ClassVar[str] = "iron_loss"
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return k1 and k2."""
+        gear = joint.gear_ratio or 1.0
+        return (
+            Term("k1", f"W s/{joint.unit}", joint.name, spread=50.0 / gear, lowest=0.0),
+            Term("k2", f"W s^2/{joint.unit}^2", joint.name, spread=10.0 / gear**2, lowest=0.0),
+        )
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return |w| and w^2."""
+        speeds = motion.dq * np.array([joint.gear_ratio or 1.0 for joint in robot.joints])
+        return np.abs(speeds), speeds**2
+
+
+@dataclass(frozen=True)
+class InverterLoss(JointEffect):
+    """V0 |i|: the voltage that transistors and diodes drop."""
+
+    id: ClassVar[str] = "inverter_loss"
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "torque"
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return V0."""
+        unit = "V" if joint.torque_constant else f"W/({force_unit(joint)})"
+        return (Term("V0", unit, joint.name, spread=10.0, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return |i|."""
+        return (np.abs(currents(robot, predicted)),)

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
+
+Known = Mapping[tuple[str, str | None, str], float]
+"""Coefficients of other effects: (effect, joint, name) -> value."""
+
+_NORMAL = 1.96  # standard deviations in half a 95 % interval
+_REFERENCE = 1e-12  # below, a coefficient is none
 
 
 @dataclass(frozen=True)
@@ -31,27 +38,76 @@ class Term:
     fixed: bool = False
 
 
+@dataclass(frozen=True)
+class Predicted:
+    """What the effects before one predict, over the same N samples.
+
+    torque: (N, n) N m, real joint torque (for an effect of measurement: what is shown); power: (N,) W, all of it;
+    axes: (N,) W, the part that the joints' drives take from their bus; bodies: (10 n,) inertial parameters with
+    payload, None for those of the URDF.
+    """
+
+    torque: np.ndarray
+    power: np.ndarray | None = None
+    axes: np.ndarray | None = None
+    bodies: np.ndarray | None = None
+
+    def part(self, start: int, stop: int) -> Predicted:
+        """Return what is predicted for samples start..stop (exclusive)."""
+        cut = slice(start, stop)
+        return Predicted(
+            self.torque[cut],
+            None if self.power is None else self.power[cut],
+            None if self.axes is None else self.axes[cut],
+            self.bodies,
+        )
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter as engineers state it, with its 95 % interval; None where there is none."""
+
+    name: str
+    joint: str | None
+    value: float
+    unit: str
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True)
 class Effect(ABC):
-    """What adds `columns @ (coefficients + shift)` to its channel.
+    """What adds `columns @ (coefficients + shift)` to the torque or power that it shows in.
 
     `channel` is "torque" (a real torque: it drives or brakes, and carries mechanical power), "power" (electrical,
-    W) or "measurement" (what a torque sensor shows beside the torque; it carries no power). To teach the twin a new
-    effect, write a class and list it in `catalogue`.
+    W) or "measurement" (what a sensor shows beside the thing itself); `signal` is which measured signal the columns
+    add to. Columns of an effect that `needs` "torque" or "power" are built from what other effects predict, never
+    from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
+    computed over the whole motion that it is given, as it depends on what went before.
+
+    Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
+    `joints` are those that it acts on, `runs` those in which (None: all). To teach the twin a new effect, write a
+    class and list it in `catalogue`.
     """
 
     id: ClassVar[str]
     channel: ClassVar[str]
+    signal: ClassVar[str] = "torque"
+    needs: ClassVar[str | None] = None
+    stage: ClassVar[int] = 0
+    memory: ClassVar[bool] = False
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {}
+
+    joints: tuple[str, ...] | None = field(default=None, kw_only=True)
+    runs: tuple[str, ...] | None = field(default=None, kw_only=True)
 
     @abstractmethod
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return the k coefficients, in the order of the columns."""
 
     @abstractmethod
-    def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:
-        """Return the (N, n, k) columns of a torque or measurement effect, N m per unit of the coefficient.
-
-        For a power effect: (N, k), W per unit, built from the *predicted* real joint `torque`, (N, n) N m.
-        """
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return the columns per unit of the coefficients: (N, n, k) N m where `signal` is torque, else (N, k) W."""
 
     def undecided(self, motion: Motion) -> np.ndarray | None:
         """Return (N, n) where the effect cannot say the joint's torque, so that a fit leaves these samples out."""
@@ -61,29 +117,103 @@ class Effect(ABC):
         """Return what is known to be added to the (k,) coefficients in this motion: a payload, for one."""
         return 0.0
 
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return the effect in each shape that is worth trying; a robot's data sheet may add some."""
+        return (self,)
 
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return the catalogue's parameters that (k,) coefficients and their (k, k) covariance say.
+
+        `known`: coefficients of other effects, for parameters that are relative to one.
+        """
+        deviations = np.sqrt(np.diag(covariance))
+        return tuple(
+            quantity(term.name, term.joint, value, term.unit, deviation)
+            for term, value, deviation in zip(self.terms(robot), values, deviations, strict=True)
+        )
+
+    @property
+    def shape(self) -> dict[str, Any]:
+        """The fields that are the effect's shape, by name."""
+        names = [each.name for each in fields(self) if each.name not in ("joints", "runs")]
+        return {name: getattr(self, name) for name in names}
+
+    def on(self, *joints: str) -> Effect:
+        """Return the effect in these joints alone."""
+        return replace(self, joints=joints)
+
+    def acts_in(self, motion: Motion) -> bool:
+        """Return whether the effect acts in the motion's run."""
+        return self.runs is None or motion.run in self.runs
+
+    def acting(self, robot: Robot) -> tuple[Joint, ...]:
+        """Return the joints that the effect acts on, in the robot's order."""
+        return tuple(joint for joint in robot.joints if self.joints is None or joint.name in self.joints)
+
+    def variants(self, **shapes: tuple[Any, ...]) -> tuple[Effect, ...]:
+        """Return the effect with each value of one field."""
+        return tuple(replace(self, **{name: value}) for name, values in shapes.items() for value in values)
+
+
+@dataclass(frozen=True)
 class JointEffect(Effect):
-    """An effect that acts within each joint alone, by one coefficient and one column per joint."""
+    """An effect that acts within each joint alone, by m coefficients and columns per joint."""
 
     @abstractmethod
-    def term(self, joint: Joint) -> Term:
-        """Return the joint's coefficient."""
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return the joint's m coefficients."""
 
     @abstractmethod
-    def column(self, motion: Motion) -> np.ndarray:
-        """Return the (N, n) column of each joint."""
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return m columns, (N, n) each: that of each joint."""
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
-        """Return one coefficient per joint."""
-        return tuple(self.term(joint) for joint in robot.joints)
+        """Return m coefficients per joint, joint by joint."""
+        return tuple(term for joint in self.acting(robot) for term in self.joint_terms(joint))
 
-    def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:
-        """Return the (N, n, n) columns: each joint's own, zero elsewhere."""
-        column = self.column(motion)
-        count = column.shape[1]
-        columns = np.zeros((*column.shape, count))
-        columns[:, range(count), range(count)] = column
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, k): each joint's own, zero elsewhere; where the signal is power (N, k)."""
+        parts = self.samples(robot, motion, predicted)
+        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        if self.signal == "power":
+            stacked = np.stack([part[:, acting] for part in parts], axis=2)
+            return stacked.reshape(len(motion.time), len(acting) * len(parts))
+        columns = np.zeros((*motion.dq.shape, len(acting) * len(parts)))
+        for place, joint in enumerate(acting):
+            for number, part in enumerate(parts):
+                columns[:, joint, place * len(parts) + number] = part[:, joint]
         return columns
+
+
+def quantity(
+    name: str,
+    joint: str | None,
+    value: float,
+    unit: str,
+    deviation: float | None = None,
+    convert: Callable[[float], float] = float,
+) -> Quantity:
+    """Return `convert` (monotone) of a value and of the ends of its interval; no interval where one end has none."""
+    ends: list[float] = []
+    if deviation is not None and np.isfinite(deviation):
+        ends = sorted(convert(float(value + side * _NORMAL * deviation)) for side in (-1, 1))
+    if not ends or not np.all(np.isfinite(ends)):
+        return Quantity(name, joint, convert(float(value)), unit)
+    return Quantity(name, joint, convert(float(value)), unit, ends[0], ends[1])
+
+
+def ratio(numerator: float, denominator: float | None) -> float:
+    """Return the quotient; NaN where the denominator is unknown or nothing."""
+    return numerator / denominator if denominator is not None and abs(denominator) > _REFERENCE else float("nan")
+
+
+def size(values: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
+    """Return the length of a vector of coefficients, and its standard deviation."""
+    length = float(np.linalg.norm(values))
+    along = values / length if length > 0 else np.full(len(values), len(values) ** -0.5)
+    return length, float(np.sqrt(along @ covariance @ along))
 
 
 def force_unit(joint: Joint) -> str:
@@ -96,27 +226,6 @@ def inertia_unit(joint: Joint) -> str:
     return "kg" if joint.kind == "prismatic" else "kg m^2"
 
 
-def catalogue() -> dict[str, Effect]:
-    """Return every effect that the twin knows, by id."""
-    from irtwin.effects.drive import CopperLoss, RotorInertia
-    from irtwin.effects.friction import CoulombFriction, ViscousFriction
-    from irtwin.effects.rigid_body import RigidBody
-    from irtwin.effects.sensing import TorqueOffset
-    from irtwin.effects.supply import MechanicalPower, StandbyPower
-
-    effects: tuple[Effect, ...] = (
-        RigidBody(),
-        RotorInertia(),
-        CoulombFriction(),
-        ViscousFriction(),
-        TorqueOffset(),
-        MechanicalPower(),
-        StandbyPower(),
-        CopperLoss(),
-    )
-    return {effect.id: effect for effect in effects}
-
-
 BASELINE = (
     "rigid_body",
     "rotor_inertia",
@@ -126,3 +235,48 @@ BASELINE = (
     "mechanical_power",
     "standby_power",
 )
+
+
+def catalogue() -> dict[str, Effect]:
+    """Return every effect that the twin knows, by id, in its default shape."""
+    from irtwin.effects import drive, friction, load, rigid_body, sensing, supply, transmission
+
+    effects: tuple[Effect, ...] = (
+        rigid_body.RigidBody(),
+        drive.RotorInertia(),
+        friction.CoulombFriction(),
+        friction.ViscousFriction(),
+        sensing.TorqueOffset(),
+        supply.MechanicalPower(),
+        supply.StandbyPower(),
+        friction.StribeckFriction(),
+        friction.NonlinearViscousFriction(),
+        friction.AsymmetricFriction(),
+        friction.LoadDependentFriction(),
+        friction.TemperatureDependentFriction(),
+        friction.PreslidingHysteresis(),
+        transmission.Backlash(),
+        transmission.JointElasticity(),
+        transmission.TorqueRipple(),
+        friction.PositionDependentFriction(),
+        transmission.JointCoupling(),
+        load.CableDrag(),
+        load.GravityCompensation(),
+        load.Payload(),
+        load.BaseTilt(),
+        load.ExternalContact(),
+        sensing.TorqueConstantError(),
+        sensing.TorqueDrift(),
+        sensing.EncoderOffset(),
+        sensing.TimeDelay(),
+        drive.CopperLoss(),
+        drive.WindingTemperature(),
+        drive.IronLoss(),
+        drive.InverterLoss(),
+        supply.NoRegeneration(),
+        supply.BusCapacitor(),
+        supply.HoldingBrakes(),
+        sensing.MeterLag(),
+        sensing.MeterGain(),
+    )
+    return {effect.id: effect for effect in effects}

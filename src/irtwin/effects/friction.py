@@ -1,47 +1,288 @@
-"""Friction in the joints (Yan 2018, eq. 3)."""
+"""Friction in the joints (Yan 2018, eq. 3, and what that leaves out)."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import JointEffect, Term, force_unit
-from irtwin.robot.description import Joint
+from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity, ratio
+from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
 _STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
+def direction(dq: np.ndarray) -> np.ndarray:
+    """Return the sign of speeds, zero at standstill."""
+    return np.where(np.abs(dq) < _STANDSTILL, 0.0, np.sign(dq))
+
+
+@dataclass(frozen=True)
 class CoulombFriction(JointEffect):
     """Fc sign(dq). At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none."""
 
     id: ClassVar[str] = "coulomb_friction"
     channel: ClassVar[str] = "torque"
 
-    def term(self, joint: Joint) -> Term:
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fc."""
-        return Term("Fc", force_unit(joint), joint=joint.name, spread=15.0, lowest=0.0)
+        return (Term("Fc", force_unit(joint), joint=joint.name, spread=15.0, lowest=0.0),)
 
-    def column(self, motion: Motion) -> np.ndarray:
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return sign(dq)."""
-        return np.where(self.undecided(motion), 0.0, np.sign(motion.dq))
+        return (direction(motion.dq),)
 
     def undecided(self, motion: Motion) -> np.ndarray:
         """Return where a joint stands still."""
         return np.asarray(np.abs(motion.dq) < _STANDSTILL)
 
 
+@dataclass(frozen=True)
 class ViscousFriction(JointEffect):
     """Fv dq."""
 
     id: ClassVar[str] = "viscous_friction"
     channel: ClassVar[str] = "torque"
 
-    def term(self, joint: Joint) -> Term:
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fv."""
-        return Term("Fv", f"{force_unit(joint)} s/{joint.unit}", joint=joint.name, spread=30.0, lowest=0.0)
+        return (Term("Fv", f"{force_unit(joint)} s/{joint.unit}", joint=joint.name, spread=30.0, lowest=0.0),)
 
-    def column(self, motion: Motion) -> np.ndarray:
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return dq."""
-        return motion.dq
+        return (motion.dq,)
+
+
+@dataclass(frozen=True)
+class StribeckFriction(JointEffect):
+    """Fs s exp(-(|dq|/vs)^d): what sticks more while it is slow."""
+
+    id: ClassVar[str] = "stribeck_friction"
+    channel: ClassVar[str] = "torque"
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"vs": (0.005, 0.2), "d": (0.5, 2.0)}
+
+    vs: float = 0.05  # rad/s
+    d: float = 1.0
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return a grid of speeds and two forms."""
+        return tuple(
+            form for flat in self.variants(d=(1.0, 2.0)) for form in flat.variants(vs=(0.01, 0.025, 0.05, 0.1, 0.2))
+        )
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return Fs."""
+        return (Term("Fs", force_unit(joint), joint=joint.name, spread=10.0, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return s exp(-(|dq|/vs)^d)."""
+        return (direction(motion.dq) * np.exp(-((np.abs(motion.dq) / self.vs) ** self.d)),)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return Fs, vs and d."""
+        found = super().parameters(robot, values, covariance, known)
+        shapes = [
+            shape
+            for joint in self.acting(robot)
+            for shape in (
+                Quantity("vs", joint.name, self.vs, f"{joint.unit}/s"),
+                Quantity("d", joint.name, self.d, "1"),
+            )
+        ]
+        return (*found, *shapes)
+
+
+@dataclass(frozen=True)
+class NonlinearViscousFriction(JointEffect):
+    """k s |dq|^d: viscous friction that thins (d < 1) or stirs (d > 1)."""
+
+    id: ClassVar[str] = "nonlinear_viscous_friction"
+    channel: ClassVar[str] = "torque"
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (0.2, 3.0)}
+
+    d: float = 2.0
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return exponents on either side of one."""
+        return self.variants(d=(0.3, 0.5, 0.7, 1.5, 2.0, 3.0))
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return k, the torque at one unit of speed."""
+        return (Term("k", force_unit(joint), joint=joint.name, spread=10.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return s |dq|^d."""
+        return (direction(motion.dq) * np.abs(motion.dq) ** self.d,)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return k and d."""
+        found = super().parameters(robot, values, covariance, known)
+        return (*found, *(Quantity("d", joint.name, self.d, "1") for joint in self.acting(robot)))
+
+
+@dataclass(frozen=True)
+class AsymmetricFriction(JointEffect):
+    """a |s| + b |dq|: friction that differs by direction."""
+
+    id: ClassVar[str] = "asymmetric_friction"
+    channel: ClassVar[str] = "torque"
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return a and b."""
+        unit = force_unit(joint)
+        return Term("a", unit, joint.name, spread=5.0), Term("b", f"{unit} s/{joint.unit}", joint.name, spread=5.0)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return |s| and |dq|."""
+        return np.abs(direction(motion.dq)), np.abs(motion.dq)
+
+
+@dataclass(frozen=True)
+class LoadDependentFriction(JointEffect):
+    """mu |tau| s: gear teeth rub more under load; one coefficient where the joint is driven, one where it drives."""
+
+    id: ClassVar[str] = "load_dependent_friction"
+    channel: ClassVar[str] = "torque"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 1
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return mu when driving, mu when driven back."""
+        return (
+            Term("mu", "1", joint.name, spread=0.3, lowest=0.0),
+            Term("mu_back", "1", joint.name, spread=0.3, lowest=0.0),
+        )
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return |tau| s while tau dq is positive, and while it is not."""
+        assert predicted is not None
+        column = np.abs(predicted.torque) * direction(motion.dq)
+        drives = predicted.torque * motion.dq > 0
+        return np.where(drives, column, 0.0), np.where(drives, 0.0, column)
+
+
+@dataclass(frozen=True)
+class TemperatureDependentFriction(JointEffect):
+    """Fv dq (exp(-k (T - T0)) - 1): oil that thins as the joint warms. Zero where no temperature was measured.
+
+    The coefficient is k Fv, the column the secant dq (exp(-k (T - T0)) - 1)/k, so that both agree in the right shape.
+    """
+
+    id: ClassVar[str] = "temperature_dependent_friction"
+    channel: ClassVar[str] = "torque"
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
+
+    k: float = 0.02  # 1/K
+    T0: float = 25.0  # degC, where viscous_friction's Fv holds
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return slow and fast thinning."""
+        return self.variants(k=(0.005, 0.02, 0.05))
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return k Fv."""
+        return (Term("k Fv", f"{force_unit(joint)} s/({joint.unit} K)", joint.name, spread=1.0, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return dq (exp(-k (T - T0)) - 1)/k."""
+        if motion.temperature is None:
+            return (np.zeros_like(motion.dq),)
+        return (motion.dq * np.expm1(-self.k * (motion.temperature - self.T0)) / self.k,)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return k, relative to the joint's Fv; the shape's k where Fv is not known."""
+        return tuple(
+            quantity("k", joint.name, value, "1/K", deviation, lambda part, base=viscous: ratio(part, base))
+            if viscous
+            else Quantity("k", joint.name, self.k, "1/K")
+            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
+            for viscous in [(known or {}).get(("viscous_friction", joint.name, "Fv"))]
+        )
+
+
+@dataclass(frozen=True)
+class PreslidingHysteresis(JointEffect):
+    """Fc (z - s), dz/dt = dq (1 - s z)/d: after a reversal friction builds up over an angle (Dahl 1968).
+
+    Before the first reversal of a run it is taken to slide. A speed near standstill keeps its last direction.
+    """
+
+    id: ClassVar[str] = "presliding_hysteresis"
+    channel: ClassVar[str] = "torque"
+    memory: ClassVar[bool] = True
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (1e-4, 0.2)}
+
+    d: float = 0.01  # rad
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return angles over the range."""
+        return self.variants(d=(3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return the Coulomb friction that builds up."""
+        return (Term("Fc", force_unit(joint), joint.name, spread=15.0, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return z - s."""
+        column = np.zeros_like(motion.dq)
+        for joint in range(column.shape[1]):
+            signs = direction(motion.dq[:, joint])
+            column[:, joint] = self._lag(motion.q[:, joint], signs)
+        return (column,)
+
+    def _lag(self, q: np.ndarray, signs: np.ndarray) -> np.ndarray:
+        """Return z - s (N,): minus twice the new direction at a reversal, decaying with the way from it."""
+        moving = np.flatnonzero(signs)
+        turns = moving[1:][np.diff(signs[moving]) != 0]
+        lag = np.zeros(len(q))
+        left = 0.0
+        for start, stop in zip(turns, [*turns[1:], len(q)], strict=True):
+            decay = np.exp(-np.abs(q[start:stop] - q[start]) / self.d)
+            lag[start:stop] = (left - 2 * signs[start]) * decay
+            left = lag[stop - 1]
+        return lag
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return d."""
+        return tuple(Quantity("d", joint.name, self.d, joint.unit) for joint in self.acting(robot))
+
+
+@dataclass(frozen=True)
+class PositionDependentFriction(JointEffect):
+    """Fc (a cos q + b sin q) s: a bent shaft or a worn sector. The coefficients are Fc a and Fc b."""
+
+    id: ClassVar[str] = "position_dependent_friction"
+    channel: ClassVar[str] = "torque"
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return Fc a and Fc b."""
+        unit = force_unit(joint)
+        return Term("Fc a", unit, joint.name, spread=5.0), Term("Fc b", unit, joint.name, spread=5.0)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return s cos q and s sin q."""
+        signs = direction(motion.dq)
+        return signs * np.cos(motion.q), signs * np.sin(motion.q)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return a and b, relative to the joint's Fc; nothing where that is not known."""
+        deviations = np.sqrt(np.diag(covariance))
+        found = []
+        for place, joint in enumerate(self.acting(robot)):
+            dry = (known or {}).get(("coulomb_friction", joint.name, "Fc"))
+            for number, name in enumerate(("a", "b")) if dry else ():
+                at = 2 * place + number
+                found.append(quantity(name, joint.name, ratio(values[at], dry), "1", ratio(deviations[at], dry)))
+        return tuple(found)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
 
-from irtwin.effects.effect import Effect, Term
+from irtwin.effects.effect import Effect, Predicted, Term
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange
 from irtwin.signals.motion import Motion
@@ -15,9 +16,11 @@ from irtwin.signals.motion import Motion
 # Pinocchio's order; first moments and inertias about the joint's frame
 NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 _UNITS = ("kg",) + ("kg m",) * 3 + ("kg m^2",) * 6
+_LIGHT = 1e-6  # kg
 _SPREAD = 50.0  # kg: no link of an arm that lifts up to some ten kg is farther off
 
 
+@dataclass(frozen=True)
 class RigidBody(Effect):
     """M(q) ddq + C(q, dq) dq + G(q): linear in ten inertial parameters per moving body (Yan 2018, eqs. 1, 2)."""
 
@@ -39,7 +42,7 @@ class RigidBody(Effect):
             )
         )
 
-    def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return the (N, n, 10 n) torque regressor."""
         model = robot.model
         data = model.createData()
@@ -54,12 +57,55 @@ class RigidBody(Effect):
         model = robot.model
         added = np.zeros(10 * model.nv)
         if motion.payload_mass:
-            frame = model.frames[model.getFrameId(flange(robot), pin.FrameType.BODY)]
+            frame = flange_frame(robot)
             centre = frame.placement.act(np.array(motion.payload_com, dtype=float))
             load = pin.Inertia(motion.payload_mass, centre, np.zeros((3, 3)))
             first = 10 * (frame.parentJoint - 1)
             added[first : first + 10] = load.toDynamicParameters()
         return added
+
+
+def flange_frame(robot: Robot) -> pin.Frame:
+    """Return the flange's frame: its place on the last body, `parentJoint`."""
+    model = robot.model
+    return model.frames[model.getFrameId(flange(robot), pin.FrameType.BODY)]
+
+
+def model_of(robot: Robot, bodies: np.ndarray | None) -> pin.Model:
+    """Return a copy of the robot's model with the (10 n,) inertial parameters; None keeps the URDF's.
+
+    Torque is linear in them, so any numbers will do, bodies of no or negative mass too.
+    """
+    model = robot.model.copy()
+    if bodies is not None:
+        for index, values in enumerate(bodies.reshape(-1, 10), start=1):
+            mass = values[0] if abs(values[0]) > _LIGHT else _LIGHT
+            model.inertias[index] = pin.Inertia.FromDynamicParameters(np.append(mass, values[1:]))
+    return model
+
+
+def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
+    """Return (N, n, 10) the regressor of the body that carries the flange."""
+    model = robot.model
+    data = model.createData()
+    first = 10 * (flange_frame(robot).parentJoint - 1)
+    columns = np.empty((*motion.q.shape, 10))
+    for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        columns[row] = pin.computeJointTorqueRegressor(model, data, *state)[:, first : first + 10]
+    return columns
+
+
+def to_body(placement: pin.SE3) -> np.ndarray:
+    """Return the (10, 10) map of inertial parameters in a frame to those in the body that it is placed on."""
+    start = pin.Inertia(1.0, np.zeros(3), np.eye(3))
+    base = start.toDynamicParameters()
+
+    def moved(parameters: np.ndarray) -> np.ndarray:
+        return np.asarray(placement.act(pin.Inertia.FromDynamicParameters(parameters)).toDynamicParameters())
+
+    origin = moved(base)
+    mass = moved(2 * base) - origin - (moved(base + np.append(0, base[1:])) - origin)
+    return np.column_stack([mass, *(moved(base + unit) - origin for unit in np.eye(10)[1:])])
 
 
 def _body(model: pin.Model, joint: int) -> str | None:

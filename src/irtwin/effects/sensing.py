@@ -1,26 +1,185 @@
-"""What a torque measurement shows beside the torque."""
+"""What a measurement of torque, position or power shows beside the thing itself."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+import pinocchio as pin
+from scipy.signal import lfilter
 
-from irtwin.effects.effect import JointEffect, Term, force_unit
-from irtwin.robot.description import Joint
+from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity
+from irtwin.effects.rigid_body import model_of
+from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
 
+@dataclass(frozen=True)
 class TorqueOffset(JointEffect):
     """c: the reading where there is no torque."""
 
     id: ClassVar[str] = "torque_offset"
     channel: ClassVar[str] = "measurement"
 
-    def term(self, joint: Joint) -> Term:
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return c."""
-        return Term("c", force_unit(joint), joint=joint.name, spread=5.0)
+        return (Term("c", force_unit(joint), joint=joint.name, spread=5.0),)
 
-    def column(self, motion: Motion) -> np.ndarray:
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return ones."""
-        return np.ones_like(motion.dq)
+        return (np.ones_like(motion.dq),)
+
+
+@dataclass(frozen=True)
+class TorqueDrift(JointEffect):
+    """r t: a reading that drifts from the start of each run."""
+
+    id: ClassVar[str] = "torque_drift"
+    channel: ClassVar[str] = "measurement"
+    memory: ClassVar[bool] = True  # it knows when the run began
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return r."""
+        return (Term("r", f"{force_unit(joint)}/s", joint.name, spread=0.2),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return the time since the run's start."""
+        return (np.broadcast_to((motion.time - motion.time[0])[:, None], motion.dq.shape),)
+
+
+@dataclass(frozen=True)
+class TorqueConstantError(JointEffect):
+    """g tau: torque told from current by a wrong constant. The coefficient is g - 1."""
+
+    id: ClassVar[str] = "torque_constant_error"
+    channel: ClassVar[str] = "measurement"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 2
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return g - 1."""
+        return (Term("g - 1", "1", joint.name, spread=0.3, lowest=-1.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return the predicted torque."""
+        assert predicted is not None
+        return (predicted.torque,)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return g."""
+        return tuple(
+            quantity("g", joint.name, value, "1", deviation, lambda excess: 1 + excess)
+            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class EncoderOffset(Effect):
+    """(dG/dq) e: a position that is read e too small. Inertia and Coriolis torque change with it too."""
+
+    id: ClassVar[str] = "encoder_offset"
+    channel: ClassVar[str] = "measurement"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 1
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return e per joint."""
+        return tuple(Term("e", joint.unit, joint.name, spread=0.1) for joint in self.acting(robot))
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, k) slopes of every joint's torque over the position of each acting one."""
+        model = model_of(robot, None if predicted is None else predicted.bodies)
+        data = model.createData()
+        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        columns = np.empty((*motion.q.shape, len(acting)))
+        for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+            columns[row] = pin.computeRNEADerivatives(model, data, *state)[0][:, acting]
+        return columns
+
+
+@dataclass(frozen=True)
+class TimeDelay(JointEffect):
+    """tau(t - d). The column is the secant (tau(t - d) - tau(t))/d, its coefficient d again in the right shape."""
+
+    id: ClassVar[str] = "time_delay"
+    channel: ClassVar[str] = "measurement"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 3
+    memory: ClassVar[bool] = True
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (5e-4, 0.6)}
+
+    d: float = 0.005  # s
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return delays over the range; short ones differ in size alone."""
+        return self.variants(d=(0.005, 0.02, 0.05, 0.1, 0.2, 0.4))
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return d."""
+        return (Term("d", "s", joint.name, spread=0.6, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return (tau(t - d) - tau(t))/d; before the run's start torque is what it was there."""
+        assert predicted is not None
+        late = [np.interp(motion.time - self.d, motion.time, torque) for torque in predicted.torque.T]
+        return ((np.array(late).T - predicted.torque) / self.d,)
+
+
+@dataclass(frozen=True)
+class MeterLag(Effect):
+    """P/(T s + 1): a power meter that lags. The column is the secant (lagged - P)/T, as in `TimeDelay`."""
+
+    id: ClassVar[str] = "meter_lag"
+    channel: ClassVar[str] = "measurement"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "power"
+    stage: ClassVar[int] = 3
+    memory: ClassVar[bool] = True
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"T": (0.02, 2.0)}
+
+    T: float = 0.1  # s
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return time constants over the range."""
+        return self.variants(T=(0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0))
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return T."""
+        return (Term("T", "s", spread=2.0, lowest=0.0),)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, 1) (lagged - P)/T, from rest at the run's first value."""
+        assert predicted is not None and predicted.power is not None
+        keep = np.exp(-1 / (motion.rate * self.T))
+        start = [keep * predicted.power[0]]
+        lagged = lfilter([1 - keep], [1.0, -keep], predicted.power, zi=start)[0]
+        return np.asarray(lagged - predicted.power)[:, None] / self.T
+
+
+@dataclass(frozen=True)
+class MeterGain(Effect):
+    """g P: a power meter out of scale. The coefficient is g - 1."""
+
+    id: ClassVar[str] = "meter_gain"
+    channel: ClassVar[str] = "measurement"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "power"
+    stage: ClassVar[int] = 4
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return g - 1."""
+        return (Term("g - 1", "1", spread=0.3, lowest=-1.0),)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, 1) the predicted power."""
+        assert predicted is not None and predicted.power is not None
+        return predicted.power[:, None]
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return g."""
+        return (quantity("g", None, values[0], "1", float(covariance[0, 0] ** 0.5), lambda excess: 1 + excess),)

@@ -3,40 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Term, catalogue
+from irtwin.effects.effect import Effect, Predicted, Term, catalogue
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+_PIECE = 4096  # samples whose columns are held at once
+
+
+@dataclass(frozen=True)
+class _Torques:
+    """What the torque effects predict over a whole run: for each stage what lower ones say, and all real torque."""
+
+    motion: Motion
+    values: bytes
+    below: dict[int, Predicted]
+    real: np.ndarray
+
 
 class Stack:
-    """The effects of a robot of n joints: K coefficients of the torque channel, L of the power channel."""
+    """The effects of a robot of n joints: K coefficients of the torque signal, L of the power signal."""
 
-    def __init__(self, robot: Robot, effects: Sequence[str]):
-        """Raise InputError on an id that the catalogue lacks, or that stands there twice."""
+    def __init__(self, robot: Robot, effects: Sequence[str | Effect]):
+        """Take effects or their ids. Raise InputError on an id or joint that is unknown, or on one effect twice."""
         known = catalogue()
         for effect in effects:
-            if effect not in known:
+            if isinstance(effect, str) and effect not in known:
                 raise InputError(f'there is no effect "{effect}"; use some of {", ".join(known)}')
-            if list(effects).count(effect) > 1:
-                raise InputError(f'effect "{effect}" stands there twice; name it once')
         self.robot = robot
-        self.ids = tuple(effects)
-        self._torque = [known[effect] for effect in effects if known[effect].channel != "power"]
-        self._power = [known[effect] for effect in effects if known[effect].channel == "power"]
+        self.effects = tuple(known[effect] if isinstance(effect, str) else effect for effect in effects)
+        self.ids = tuple(dict.fromkeys(effect.id for effect in self.effects))
+        self._torque = [effect for effect in self.effects if effect.signal == "torque"]
+        self._power = [effect for effect in self.effects if effect.signal == "power"]
+        self._last_torques: _Torques | None = None
+        self._last_columns: dict[int, tuple[Motion, Predicted | None, np.ndarray]] = {}
+        self._check()
+
+    def _check(self) -> None:
+        names = self.robot.joint_names
+        for effect in self.effects:
+            for joint in effect.joints or ():
+                if joint not in names:
+                    raise InputError(
+                        f'effect "{effect.id}": there is no joint "{joint}"; use some of {", ".join(names)}'
+                    )
+        seen = set()
+        for effect, term in (*self.torque_terms, *self.power_terms):
+            key = (effect.id, term.joint, term.link, term.name)
+            if key in seen:
+                raise InputError(f'effect "{effect.id}" stands there twice; name it once')
+            seen.add(key)
 
     @cached_property
     def torque_terms(self) -> tuple[tuple[Effect, Term], ...]:
-        """The K coefficients of the torque and measurement channels, each with its effect."""
+        """The K coefficients of effects that torque shows, each with its effect."""
         return tuple((effect, term) for effect in self._torque for term in effect.terms(self.robot))
 
     @cached_property
     def power_terms(self) -> tuple[tuple[Effect, Term], ...]:
-        """The L coefficients of the power channel, each with its effect."""
+        """The L coefficients of effects that power shows, each with its effect."""
         return tuple((effect, term) for effect in self._power for term in effect.terms(self.robot))
 
     @cached_property
@@ -49,18 +79,36 @@ class Stack:
         """(L,) whether the coefficient of power is known, not estimated."""
         return np.array([term.fixed for _, term in self.power_terms], dtype=bool)
 
+    @property
+    def coupled(self) -> bool:
+        """Whether columns of torque depend on its coefficients: on what other effects predict."""
+        return any(effect.needs for effect in self._torque)
+
+    @property
+    def power_coupled(self) -> bool:
+        """Whether columns of power depend on its coefficients."""
+        return any(effect.needs == "power" for effect in self._power)
+
     @cached_property
     def pattern(self) -> np.ndarray:
         """(n, K) whether the coefficient can act on the joint's torque, found at a few random states."""
         rng = np.random.default_rng(0)
         shape = (16, len(self.robot.joints))
         q, dq, ddq = rng.uniform(-2, 2, (3, *shape))
-        probe = Motion("probe", np.arange(16.0), q, dq, ddq)
-        return np.asarray(np.any(self.torque_columns(probe) != 0, axis=0))
+        warm = np.full(shape, 50.0)
+        probe = Motion("probe", np.arange(16.0), q, dq, ddq, temperature=warm)
+        found = [
+            np.any(effect.columns(self.robot, probe, Predicted(np.ones(shape))) != 0, axis=0) for effect in self._torque
+        ]
+        return np.concatenate([np.zeros((shape[1], 0), dtype=bool), *found], axis=1)
 
-    def torque_columns(self, motion: Motion) -> np.ndarray:
-        """Return the (N, n, K) torque regressor."""
-        parts = [effect.columns(self.robot, motion) for effect in self._torque]
+    def torque_columns(self, motion: Motion, values: np.ndarray | None = None) -> np.ndarray:
+        """Return the (N, n, K) torque regressor.
+
+        `values` (K,): coefficients with which effects predict what others are built on; None: as expected.
+        """
+        below = self._torques(motion, values).below if self.coupled else {}
+        parts = [self.columns(effect, motion, below.get(effect.stage)) for effect in self._torque]
         return np.concatenate([np.zeros((*motion.dq.shape, 0)), *parts], axis=2)
 
     def undecided(self, motion: Motion) -> np.ndarray:
@@ -73,18 +121,151 @@ class Stack:
 
     def real_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients."""
+        if self.coupled:
+            return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
         return np.asarray(self.torque_columns(motion) @ np.where(self.real, values + self.shift(motion), 0.0))
 
-    def power_columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
-        """Return the (N, L) power regressor, given the predicted real joint torque, (N, n) N m."""
-        parts = [effect.columns(self.robot, motion, torque) for effect in self._power]
+    def predicted_power_columns(
+        self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the (N, L) power regressor of the torque that (K,) coefficients predict.
+
+        `power_values` (L,): coefficients with which effects predict the power that others are built on; None: as
+        expected.
+        """
+        if not self.power_coupled:
+            return self.power_columns(motion, self.real_torque(motion, torque_values))
+        below = self._powers(motion, torque_values, power_values)
+        parts = [self.columns(effect, motion, below[effect.stage]) for effect in self._power]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
+
+    def power_columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
+        """Return the (N, L) power regressor of real joint torques (N, n), N m; zero where predicted power is needed."""
+        parts = [
+            np.zeros((len(motion.time), len(effect.terms(self.robot))))
+            if effect.needs == "power" or not effect.acts_in(motion)
+            else self.columns(effect, motion, None)
+            if effect.memory
+            else effect.columns(self.robot, motion, Predicted(torque))
+            for effect in self._power
+        ]
+        return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
+
+    def predicted(self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None = None) -> Predicted:
+        """Return what all the effects predict over the motion's whole run: what a further effect is built on."""
+        whole = motion.whole or motion
+        torque = self.real_torque(whole, torque_values)
+        values = self._expected(self.power_terms) if power_values is None else power_values
+        columns = self.predicted_power_columns(whole, torque_values, values)
+        axes = np.array([_on_the_bus(effect, term) for effect, term in self.power_terms], dtype=bool)
+        power = columns @ values
+        return Predicted(torque, power, columns[:, axes] @ values[axes], self._bodies(whole, torque_values))
 
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""
-        parts = [np.broadcast_to(effect.shift(self.robot, motion), (count,)) for effect, count in self._counts()]
+        parts = [
+            np.broadcast_to(effect.shift(self.robot, motion), (own.stop - own.start,))
+            for effect, own in _slices(self._torque, self.robot)
+        ]
         return np.concatenate([np.zeros(0), *parts])
 
-    def _counts(self) -> Iterator[tuple[Effect, int]]:
-        for effect in self._torque:
-            yield effect, sum(owner is effect for owner, _ in self.torque_terms)
+    def _expected(self, terms: Sequence[tuple[Effect, Term]]) -> np.ndarray:
+        return np.array([term.expected for _, term in terms], dtype=float)
+
+    def columns(self, effect: Effect, motion: Motion, below: Predicted | None) -> np.ndarray:
+        """Return the columns of an effect (of the stack or not) for a motion that may be a part of a run.
+
+        `below` is what others predict over the whole of that run.
+        """
+        if not effect.acts_in(motion):
+            shape = (len(motion.time), len(effect.terms(self.robot)))
+            return np.zeros(shape if effect.signal == "power" else (shape[0], motion.dq.shape[1], shape[1]))
+        stop = motion.start + len(motion.time)
+        if not effect.memory:
+            return effect.columns(self.robot, motion, None if below is None else below.part(motion.start, stop))
+        whole = motion.whole or motion
+        last = self._last_columns.get(id(effect))
+        if last is None or last[0] is not whole or last[1] is not below:
+            last = (whole, below, effect.columns(self.robot, whole, below))
+            self._last_columns[id(effect)] = last
+        return last[2][motion.start : stop]
+
+    def _bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
+        total = values + self.shift(motion)
+        for effect, own in _slices(self._torque, self.robot):
+            if effect.id == "rigid_body":
+                return total[own]
+        return None
+
+    def _torques(self, motion: Motion, values: np.ndarray | None) -> _Torques:
+        """Predict stage by stage; the last run is remembered, as runs are read piece by piece."""
+        whole = motion.whole or motion
+        values = self._expected(self.torque_terms) if values is None else values
+        last = self._last_torques
+        if last is None or last.motion is not whole or last.values != values.tobytes():
+            last = self._last_torques = self._predict_torques(whole, values)
+        return last
+
+    def _predict_torques(self, whole: Motion, values: np.ndarray) -> _Torques:
+        total, bodies = values + self.shift(whole), self._bodies(whole, values)
+        real, shown = np.zeros(whole.dq.shape), np.zeros(whole.dq.shape)
+        below: dict[int, Predicted] = {}
+        owned = list(_slices(self._torque, self.robot))
+        for stage in sorted({effect.stage for effect in self._torque}):
+            now = [(effect, own) for effect, own in owned if effect.stage == stage]
+            measured = any(effect.channel == "measurement" for effect, _ in now) and stage > 1
+            below[stage] = Predicted(shown.copy() if measured else real.copy(), bodies=bodies)
+            for piece in whole.pieces(_PIECE):
+                cut = slice(piece.start - whole.start, piece.start - whole.start + len(piece.time))
+                for effect, own in now:
+                    if not total[own].any():
+                        continue
+                    part = self.columns(effect, piece, below[stage]) @ total[own]
+                    shown[cut] += part
+                    if effect.channel == "torque":
+                        real[cut] += part
+        return _Torques(whole, values.tobytes(), below, real)
+
+    def _powers(
+        self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None
+    ) -> dict[int, Predicted]:
+        """Return what lower stages predict, for each stage of power, over the whole run."""
+        whole = motion.whole or motion
+        key = torque_values.tobytes() + (b"" if power_values is None else power_values.tobytes())
+        if self._last_powers is None or self._last_powers[0] is not whole or self._last_powers[1] != key:
+            values = self._expected(self.power_terms) if power_values is None else power_values
+            self._last_powers = whole, key, self._predict_powers(whole, torque_values, values)
+        return self._last_powers[2]
+
+    _last_powers: tuple[Motion, bytes, dict[int, Predicted]] | None = None
+
+    def _predict_powers(self, whole: Motion, torque_values: np.ndarray, values: np.ndarray) -> dict[int, Predicted]:
+        pieces = [self.real_torque(piece, torque_values) for piece in whole.pieces(_PIECE)]
+        torque = np.concatenate(pieces)
+        power, axes = np.zeros(len(torque)), np.zeros(len(torque))
+        below: dict[int, Predicted] = {}
+        owned = list(_slices(self._power, self.robot))
+        for stage in sorted({effect.stage for effect in self._power}):
+            below[stage] = Predicted(torque, power.copy(), axes.copy())
+            for effect, own in owned:
+                if effect.stage != stage:
+                    continue
+                part = self.columns(effect, whole, below[stage]) @ values[own]
+                power += part
+                if _on_the_bus(effect, effect.terms(self.robot)[0]):
+                    axes += part
+        return below
+
+
+def _on_the_bus(effect: Effect, term: Term) -> bool:
+    """Return whether power flows between the bus and the joints, or into its capacitor; not what feeds the rest."""
+    return effect.channel == "power" and (term.joint is not None or effect.stage == 1)
+
+
+def _slices(effects: Sequence[Effect], robot: Robot) -> Iterator[tuple[Effect, slice]]:
+    """Yield each effect with the place of its coefficients among all."""
+    start = 0
+    for effect in effects:
+        stop = start + len(effect.terms(robot))
+        yield effect, slice(start, stop)
+        start = stop

@@ -1,42 +1,140 @@
-"""What the supply delivers: mechanical power, and what the controller takes at rest."""
+"""What the supply delivers: mechanical power, what the controller takes at rest, and what the bus keeps or burns."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Term
-from irtwin.robot.description import Robot
+from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, quantity
+from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
+_MOVING = 1e-2  # rad/s
 
-class MechanicalPower(Effect):
+
+@dataclass(frozen=True)
+class MechanicalPower(JointEffect):
     """sum_j tau_j dq_j (Yan 2018, eq. 7 and the sum in eq. 8): a coefficient of one in every joint."""
 
     id: ClassVar[str] = "mechanical_power"
     channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "torque"
 
-    def terms(self, robot: Robot) -> tuple[Term, ...]:
-        """Return a fixed one per joint."""
-        return tuple(Term("", "1", joint=joint.name, expected=1.0, fixed=True) for joint in robot.joints)
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return a fixed one."""
+        return (Term("", "1", joint=joint.name, expected=1.0, fixed=True),)
 
-    def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:
-        """Return (N, n) tau_j dq_j."""
-        assert torque is not None
-        return np.asarray(torque * motion.dq)
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return tau_j dq_j."""
+        assert predicted is not None
+        return (predicted.torque * motion.dq,)
 
 
+@dataclass(frozen=True)
 class StandbyPower(Effect):
     """P0: controller, fans, brakes held open; Pconstant of Yan 2018, eq. 8."""
 
     id: ClassVar[str] = "standby_power"
     channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return P0."""
         return (Term("P0", "W", spread=600.0, lowest=0.0),)
 
-    def columns(self, robot: Robot, motion: Motion, torque: np.ndarray | None = None) -> np.ndarray:
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, 1) ones."""
         return np.ones((len(motion.time), 1))
+
+
+@dataclass(frozen=True)
+class BusCapacitor(Effect):
+    """C V dV/dt: the bus keeps up to E of what braking axes give back, and feeds it to the next that drives.
+
+    The column is the flow into a store of E joule, over E; the coefficient is E again where the shape is right.
+    """
+
+    id: ClassVar[str] = "bus_capacitor"
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "power"
+    stage: ClassVar[int] = 1
+    memory: ClassVar[bool] = True
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"E": (5.0, 500.0)}
+
+    E: float = 50.0  # J
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return stores over the range."""
+        return self.variants(E=(5.0, 15.0, 50.0, 150.0, 500.0))
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return E."""
+        return (Term("E", "J", spread=500.0, lowest=0.0),)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, 1) the flow into the store, over E."""
+        assert predicted is not None and predicted.axes is not None
+        step = 1 / motion.rate
+        stored = 0.0
+        flow = np.zeros(len(motion.time))
+        for place, power in enumerate(predicted.axes.tolist()):
+            flow[place] = min(max(-power, -stored / step), (self.E - stored) / step)
+            stored += flow[place] * step
+        return flow[:, None] / self.E
+
+
+@dataclass(frozen=True)
+class NoRegeneration(Effect):
+    """max(sum_j P_j, 0): the brake chopper burns what the axes give back. The coefficient is the burnt share."""
+
+    id: ClassVar[str] = "no_regeneration"
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    needs: ClassVar[str | None] = "power"
+    stage: ClassVar[int] = 2
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return the share that is burnt: all of it, unless data say otherwise."""
+        return (Term("burnt", "1", expected=1.0, lowest=0.0),)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, 1) what the axes give back together."""
+        assert predicted is not None and predicted.axes is not None
+        return np.maximum(-predicted.axes, 0.0)[:, None]
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return the share that goes back to the mains."""
+        return (quantity("returned", None, values[0], "1", float(covariance[0, 0] ** 0.5), lambda burnt: 1 - burnt),)
+
+
+@dataclass(frozen=True)
+class HoldingBrakes(Effect):
+    """Pb while the brakes are released: as long as a joint moves, and `delay` longer."""
+
+    id: ClassVar[str] = "holding_brakes"
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+    memory: ClassVar[bool] = True
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"delay": (0.0, 10.0)}
+
+    delay: float = 0.5  # s
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return delays after which brakes close."""
+        return self.variants(delay=(0.0, 0.2, 0.5, 1.0, 2.0, 5.0))
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return Pb."""
+        return (Term("Pb", "W", spread=100.0, lowest=0.0),)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, 1) whether the brakes are released."""
+        moving = np.any(np.abs(motion.dq) > _MOVING, axis=1)
+        last = np.maximum.accumulate(np.where(moving, motion.time, -np.inf))
+        return (motion.time - last <= self.delay).astype(float)[:, None]

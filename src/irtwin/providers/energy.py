@@ -20,7 +20,14 @@ from irtwin.twin.files import load
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate
 
-_ELECTRICAL_LOSSES = {"standby_power", "copper_loss"}
+_ELECTRICAL_LOSSES = {
+    "standby_power",
+    "copper_loss",
+    "winding_temperature",
+    "iron_loss",
+    "inverter_loss",
+    "holding_brakes",
+}
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
@@ -93,8 +100,8 @@ def _run_energy(
     judged = whole if start == 0 else validate(twin, [motion.part(start, len(motion.time))])[0]
     power = twin.power(motion) if motion.power is None else motion.power
     standby = sum(entry.energy for entry in ledger if entry.effect == "standby_power")
-    has_standby = "standby_power" in twin.effects
-    electrical = _ELECTRICAL_LOSSES.intersection(twin.effects)
+    has_standby = "standby_power" in twin.effect_ids
+    electrical = _ELECTRICAL_LOSSES.intersection(twin.effect_ids)
     return schema.RunEnergy(
         run_id=run_id,
         twin_id=twin_id,

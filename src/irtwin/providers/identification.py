@@ -60,7 +60,7 @@ def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> 
         used=[run_iri(run_id) for run_id in keys.values()],
         rows=[
             row,
-            *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in dict.fromkeys(twin.effects)),
+            *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effect_ids),
             *_runs(twin_id, keys, parts),
             *_parameters(twin_id, robot_id, twin),
             *_base_parameters(twin_id, twin),

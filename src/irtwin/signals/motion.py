@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ class Motion:
     time: (N,) s; q, dq, ddq: (N, n) rad, rad/s, rad/s^2; torque: (N, n) N m on the joint side;
     current: (N, n) A; temperature: (N, n) degC; power: (N,) W; payload_com: (3,) m in the flange frame.
     `cutoff` is that of the zero-phase filter that the signals went through, Hz; None for a planned motion.
+    A part knows the `whole` that it was cut from, and its first sample there: what depends on the past is computed
+    over the whole.
     """
 
     run: str
@@ -29,6 +31,8 @@ class Motion:
     payload_mass: float = 0.0  # kg
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cutoff: float | None = None
+    whole: Motion | None = field(default=None, repr=False, compare=False)
+    start: int = field(default=0, compare=False)
 
     @property
     def rate(self) -> float:
@@ -56,4 +60,6 @@ class Motion:
             current=cut(self.current),
             temperature=cut(self.temperature),
             power=cut(self.power),
+            whole=self.whole or self,
+            start=self.start + start,
         )

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from irtwin.effects.effect import Effect, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
@@ -67,7 +68,7 @@ def to_json(twin: Twin) -> str:
             "joints": {joint.name: {key: getattr(joint, key) for key in _SHEET} for joint in robot.joints},
             "urdf": robot.urdf,
         },
-        "effects": list(twin.effects),
+        "effects": [_effect_document(effect) for effect in twin.stack.effects],
         "unidentified": list(twin.unidentified),
         "fitted": list(twin.fitted),
         "cutoff": twin.cutoff,
@@ -75,6 +76,8 @@ def to_json(twin: Twin) -> str:
         "parameters": [asdict(parameter) for parameter in twin.parameters],
         "base_parameters": [asdict(parameter) for parameter in twin.base_parameters],
     }
+    if twin.quantities:
+        document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
@@ -91,13 +94,16 @@ def from_json(text: str, path: Path) -> Twin:
         raise InputError(f'{path}: "version" is not {_VERSION}; identify the twin again with this irtwin')
     twin = Twin(
         robot=_robot(path, reader.inner("robot")),
-        effects=tuple(reader.texts("effects")),
+        effects=tuple(_effect(path, place, each) for place, each in enumerate(reader.take("effects", list), 1)),
         parameters=tuple(Parameter(**row) for row in reader.rows("parameters", _PARAMETER)),
         cutoff=reader.take("cutoff", float, None),
         unidentified=tuple(reader.texts("unidentified")),
         base_parameters=tuple(BaseParameter(**row) for row in reader.rows("base_parameters", _BASE_PARAMETER)),
         condition_number=reader.take("condition_number", float, None),
         fitted=tuple(reader.texts("fitted")),
+        quantities=tuple(Parameter(**row) for row in reader.rows("quantities", _PARAMETER))
+        if "quantities" in document
+        else (),
     )
     _check_complete(path, twin)
     return twin
@@ -142,6 +148,43 @@ class _Reader:
     def rows(self, key: str, columns: _Columns) -> list[dict[str, Any]]:
         rows = [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
         return [{name: row.take(name, *kinds) for name, kinds in columns.items()} for row in rows]
+
+
+def _effect_document(effect: Effect) -> str | dict[str, Any]:
+    """Return the effect's id; with joints, runs and shape where these are not the catalogue's."""
+    if effect == catalogue().get(effect.id):
+        return effect.id
+    shape = {name: value if not isinstance(value, float) else _finite(value) for name, value in effect.shape.items()}
+    return {"id": effect.id, "joints": effect.joints, "runs": effect.runs, "shape": shape}
+
+
+def _finite(value: float) -> float | str:
+    """Return a number as JSON can hold it: "inf" and "-inf" as text."""
+    return value if math.isfinite(value) else str(value)
+
+
+def _effect(path: Path, place: int, document: Any) -> Effect:
+    reader = _Reader(
+        path, {"id": document} if isinstance(document, str) else document, f'in "effects", entry {place}: '
+    )
+    name = reader.take("id", str)
+    known = catalogue().get(name)
+    if known is None:
+        raise InputError(f'{path}: there is no effect "{name}"; use some of {", ".join(catalogue())}')
+    if isinstance(document, str):
+        return known
+    shape = reader.inner("shape").values
+    if shape.keys() != known.shape.keys():
+        raise reader.fail("shape", f"should have {', '.join(known.shape) or 'no key'}")
+    kinds = {key: type(value) for key, value in known.shape.items()}
+    try:
+        fields = {key: kinds[key](value) for key, value in shape.items()}
+    except (TypeError, ValueError) as error:
+        raise reader.fail("shape", f"holds a wrong value ({error})") from error
+    parts = {
+        key: None if reader.take(key, list, None) is None else tuple(reader.texts(key)) for key in ("joints", "runs")
+    }
+    return replace(known, **fields, **parts)
 
 
 def _robot(path: Path, reader: _Reader) -> Robot:

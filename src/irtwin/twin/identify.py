@@ -10,7 +10,7 @@ import numpy as np
 from irtwin.effects.effect import BASELINE, Effect, Term
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.identification.accumulate import Equations, Rows, accumulate
+from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
 from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
 from irtwin.identification.estimators import Estimate, combine, estimate
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
@@ -20,13 +20,15 @@ from irtwin.signals.motion import Motion
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 Terms = Sequence[tuple[Effect, Term]]
+Found = tuple[Terms, Estimate]
 
 _STEPS = 20  # of Gauss-Newton, at most
 _CONVERGED = 1e-3  # of the prior spread
+_REPEATS = 8  # of fit and prediction, at most
 _TORQUE_STEP = 1e-2  # N m, exact for what is quadratic in torque
 
 
-def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str] = BASELINE) -> Twin:
+def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect] = BASELINE) -> Twin:
     """Return the twin of a robot that fits the motions.
 
     - Where torque was measured, it gives the coefficients of torque; then power, where it was measured, gives those
@@ -35,8 +37,9 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str] = B
       these the torque.
     - Where power alone was measured, the coefficients of torque are found through the power that torque carries.
 
-    Effects that nothing measured can show are listed as `unidentified`, and left out. Raises InputError where there
-    is nothing to fit.
+    Effects are ids, with the catalogue's shape, or effects of a shape. Those that nothing measured can show are
+    listed as `unidentified`, and left out. Where columns depend on what other effects predict, fit and prediction are
+    repeated until they agree. Raises InputError where there is nothing to fit.
     """
     if not motions:
         raise InputError("there is no run to fit a twin to; give at least one")
@@ -50,21 +53,23 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str] = B
     stack = _visible(robot, effects, torque=bool(with_torque), power=bool(with_power))
     fit = _fit_torque(stack, with_torque) if with_torque else None
     if fit:
-        parameters = _parameters(stack.torque_terms, fit.estimate)
-        parameters += _fit_power(stack, with_power, fit.estimate.values) if with_power else []
+        found = [(stack.torque_terms, fit.estimate)]
+        found += _fit_power(stack, with_power, fit.estimate.values) if with_power else []
     else:
-        parameters = _fit_through_power(stack, with_power)
+        found = _fit_through_power(stack, with_power)
     if constants:
-        parameters += _parameters(constants.terms, constants.estimate)
+        found.append((constants.terms, constants.estimate))
+    parameters = [parameter for terms, result in found for parameter in _parameters(terms, result)]
     return Twin(
         robot=robot,
-        effects=stack.ids,
+        effects=stack.effects,
         parameters=tuple(parameters),
         cutoff=max((motion.cutoff for motion in motions if motion.cutoff), default=None),
-        unidentified=tuple(effect for effect in effects if effect not in stack.ids),
+        unidentified=tuple(effect for effect in Stack(robot, effects).ids if effect not in stack.ids),
         base_parameters=fit.base if fit else (),
         condition_number=fit.condition if fit and np.isfinite(fit.condition) else None,
         fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
+        quantities=_quantities(robot, found[: len(found) - bool(constants)], parameters),
     )
 
 
@@ -75,13 +80,13 @@ class _TorqueFit:
     condition: float
 
 
-def _visible(robot: Robot, effects: Sequence[str], *, torque: bool, power: bool) -> Stack:
+def _visible(robot: Robot, effects: Sequence[str | Effect], *, torque: bool, power: bool) -> Stack:
     """Return the effects that can be told from what was measured, or that hold nothing to be told."""
     whole = Stack(robot, effects)
     seen = {effect.id for effect, term in whole.power_terms if power or term.fixed}
-    carried = "mechanical_power" in effects
+    carried = "mechanical_power" in whole.ids
     seen |= {effect.id for effect, _ in whole.torque_terms if torque or (carried and effect.channel == "torque")}
-    return Stack(robot, [effect for effect in effects if effect in seen])
+    return Stack(robot, [effect for effect in whole.effects if effect.id in seen])
 
 
 def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot, list[Motion], TorqueConstants | None]:
@@ -102,36 +107,75 @@ def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot
 
 
 def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
-    def equations(motion: Motion) -> Rows:
-        assert motion.torque is not None
-        columns = stack.torque_columns(motion)
-        return Rows(columns, columns @ stack.shift(motion), motion.torque, stack.undecided(motion))
+    terms = [term for _, term in stack.torque_terms]
 
-    blocks = accumulate(motions, equations, stack.pattern)
-    found = estimate(blocks, stack.pattern, [term for _, term in stack.torque_terms])
+    def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
+        blocks = accumulate(motions, _torque_equations(stack, values), stack.pattern)
+        return blocks, estimate(blocks, stack.pattern, terms)
+
+    blocks, found = fit(_alone(stack, motions) if stack.coupled else None)
+    for _ in range(_REPEATS if stack.coupled else 0):
+        before = found.values
+        blocks, found = fit(before)
+        if _settled(found.values, before, terms):
+            break
     base = base_parameters(stack)
     factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
     return _TorqueFit(found, _base(base, found), condition_number(np.concatenate(factors)[:, :-1], base))
 
 
-def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> list[Parameter]:
+def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
+    def equations(motion: Motion) -> Rows:
+        assert motion.torque is not None
+        columns = stack.torque_columns(motion, values)
+        return Rows(columns, columns @ stack.shift(motion), motion.torque, stack.undecided(motion))
+
+    return equations
+
+
+def _alone(stack: Stack, motions: Sequence[Motion]) -> np.ndarray:
+    """Return the coefficients of the effects that need no prediction, fitted without the others, which are none."""
+    direct = Stack(stack.robot, [effect for effect in stack.effects if effect.signal == "torque" and not effect.needs])
+    values = np.zeros(len(stack.torque_terms))
+    if direct.torque_terms:
+        blocks = accumulate(motions, _torque_equations(direct, None), direct.pattern)
+        found = estimate(blocks, direct.pattern, [term for _, term in direct.torque_terms])
+        values[[not effect.needs for effect, _ in stack.torque_terms]] = found.values
+    return values
+
+
+def _settled(values: np.ndarray, before: np.ndarray, terms: Sequence[Term]) -> bool:
+    return bool(np.all(np.abs(values - before) < _CONVERGED * np.array([term.spread for term in terms])))
+
+
+def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> list[Found]:
     """Fit the coefficients of power on top of the torque that was found."""
     free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
     if not free:
         return []
 
-    def equations(motion: Motion) -> Rows:
-        assert motion.power is not None
-        torque = stack.real_torque(motion, torque_values)
-        columns = stack.power_columns(motion, torque)
-        known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
-        return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
+    def fit(values: np.ndarray) -> Estimate:
+        def equations(motion: Motion) -> Rows:
+            assert motion.power is not None
+            columns = stack.predicted_power_columns(motion, torque_values, values)
+            known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+            return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
 
-    found = _estimate(motions, equations, free)
-    return _parameters(free, found)
+        return _estimate(motions, equations, free)
+
+    values = _expected(stack.power_terms)
+    found = fit(values)
+    for _ in range(_REPEATS if stack.power_coupled else 0):
+        before = found.values
+        values = values.copy()
+        values[~stack.fixed] = before
+        found = fit(values)
+        if _settled(found.values, before, [term for _, term in free]):
+            break
+    return [(free, found)]
 
 
-def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Parameter]:
+def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Found]:
     """Fit the coefficients of torque and power together to measured power, which torque carries into it.
 
     Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from no torque, where the first
@@ -149,17 +193,20 @@ def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Paramete
         if np.all(np.abs(found.values - before) < _CONVERGED * spread):
             break
         before = found.values
-    return _parameters([*real, *free], found)
+    return [([*real, *free], found)]
 
 
 def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
-    """Return the equation of power, linear in the deviation of the torque coefficients from `torque_values`."""
+    """Return the equation of power, linear in the deviation of the torque coefficients from `torque_values`.
+
+    Effects that need predicted power take it as it is with these values.
+    """
 
     def equations(motion: Motion) -> Rows:
         assert motion.power is not None
-        columns = stack.torque_columns(motion)[:, :, stack.real]
+        columns = stack.torque_columns(motion, torque_values)[:, :, stack.real]
         torque = stack.real_torque(motion, torque_values)
-        power = stack.power_columns(motion, torque)
+        power = stack.predicted_power_columns(motion, torque_values, power_values)
         slope = np.empty_like(torque)  # of power over torque, (N, n)
         for joint in range(torque.shape[1]):
             step = np.zeros(torque.shape[1])
@@ -200,6 +247,22 @@ def _parameters(terms: Terms, found: Estimate) -> list[Parameter]:
         )
         for (effect, term), value, width in zip(terms, found.values, widths, strict=True)
     ]
+
+
+def _quantities(robot: Robot, found: Sequence[Found], parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
+    """Return the catalogue's parameters of effects whose coefficients are others."""
+    known = {(parameter.effect, parameter.joint, parameter.name): parameter.value for parameter in parameters}
+    told = []
+    for terms, result in found:
+        for effect in dict.fromkeys(effect for effect, _ in terms):
+            if type(effect).parameters is Effect.parameters:
+                continue
+            own = [place for place, (owner, _) in enumerate(terms) if owner is effect]
+            values, covariance = result.values[own], result.covariance[np.ix_(own, own)]
+            for each in effect.parameters(robot, values, covariance, known):
+                place = (each.joint, None, each.name, each.value, each.unit, each.lower, each.upper)
+                told.append(Parameter(effect.id, *place))
+    return tuple(told)
 
 
 def _base(base: BaseParameters, found: Estimate) -> tuple[BaseParameter, ...]:

@@ -55,17 +55,24 @@ class Twin:
     """A robot of n joints and what moves it, identified. Immutable.
 
     `effects` are those that the twin models; `unidentified` were asked for, but nothing measured could show them.
-    `cutoff` (Hz) is that of the filter in the fit; `condition_number` that of the scaled base regressor.
+    `cutoff` (Hz) is that of the filter in the fit; `condition_number` that of the scaled base regressor. `parameters`
+    are the coefficients that predict; `quantities` what they say in the catalogue's terms, where that differs.
     """
 
     robot: Robot
-    effects: tuple[str, ...]
+    effects: tuple[str | Effect, ...]
     parameters: tuple[Parameter, ...]
     cutoff: float | None = None
     unidentified: tuple[str, ...] = ()
     base_parameters: tuple[BaseParameter, ...] = ()
     condition_number: float | None = None
     fitted: tuple[str, ...] = ()  # runs
+    quantities: tuple[Parameter, ...] = ()
+
+    @property
+    def effect_ids(self) -> tuple[str, ...]:
+        """The ids of the effects, each once."""
+        return self.stack.ids
 
     @cached_property
     def stack(self) -> Stack:
@@ -75,7 +82,8 @@ class Twin:
     def torque(self, motion: Motion) -> np.ndarray:
         """Return the torque that a measurement would show, (N, n) N m: real torque and what the sensing adds."""
         values = self._torque_values + self.stack.shift(motion)
-        return np.concatenate([self.stack.torque_columns(piece) @ values for piece in motion.pieces(_PIECE)])
+        pieces = motion.pieces(_PIECE)
+        return np.concatenate([self.stack.torque_columns(piece, self._torque_values) @ values for piece in pieces])
 
     def joint_torque(self, motion: Motion) -> np.ndarray:
         """Return the real torque in the joints, (N, n) N m (Yan 2018, eqs. 1 to 3)."""
@@ -90,8 +98,7 @@ class Twin:
 
     def power(self, motion: Motion) -> np.ndarray:
         """Return the electrical power, (N,) W (Yan 2018, eqs. 7, 8). Without an effect of power: zero."""
-        columns = self.stack.power_columns(motion, self.joint_torque(motion))
-        return np.asarray(columns @ self._power_values)
+        return np.concatenate([self._power_columns(piece) @ self._power_values for piece in motion.pieces(_PIECE)])
 
     def energy(self, motion: Motion) -> float:
         """Return the energy over the motion, J (Yan 2018, eq. 9)."""
@@ -114,12 +121,12 @@ class Twin:
         for piece in motion.pieces(_PIECE):
             weights = durations[start : start + len(piece.time)]
             start += len(piece.time)
-            columns = self.stack.torque_columns(piece)
-            watts = weights @ self.stack.power_columns(piece, columns @ values) * self._power_values  # (L,)
+            columns = self.stack.torque_columns(piece, self._torque_values)
+            watts = weights @ self._power_columns(piece) * self._power_values  # (L,)
             for value, (effect, term) in zip(watts, self.stack.power_terms, strict=True):
                 if effect.id != "mechanical_power":
                     enter(effect.id, term.joint, float(value))
-            if "mechanical_power" in self.effects:
+            if "mechanical_power" in self.effect_ids:
                 work = np.einsum("t,tj,tjk->jk", weights, piece.dq, columns) * values
                 for joint, index in zip(*np.nonzero(self.stack.pattern & self.stack.real), strict=True):
                     effect, _ = self.stack.torque_terms[index]
@@ -129,6 +136,9 @@ class Twin:
     def value(self, effect: str, term: Term) -> float:
         """Return the identified value of an effect's coefficient."""
         return term.expected if term.fixed else self._values[effect, term.joint, term.link, term.name]
+
+    def _power_columns(self, motion: Motion) -> np.ndarray:
+        return self.stack.predicted_power_columns(motion, self._torque_values, self._power_values)
 
     def _joint_torque(self, motion: Motion) -> np.ndarray:
         return self.stack.real_torque(motion, self._torque_values)

@@ -1,0 +1,175 @@
+"""What the arm carries, is held by or touches: hoses, balancers, payloads, a tilted floor, a contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.effects.effect import (
+    Effect,
+    JointEffect,
+    Known,
+    Predicted,
+    Quantity,
+    Term,
+    force_unit,
+    quantity,
+    ratio,
+    size,
+)
+from irtwin.effects.rigid_body import flange_frame, last_body_columns, model_of, to_body
+from irtwin.robot.description import Joint, Robot
+from irtwin.signals.motion import Motion
+
+_TURN = np.linspace(0, 2 * np.pi, 181)
+
+
+@dataclass(frozen=True)
+class CableDrag(JointEffect):
+    """k (q - q0): a hose package that pulls. Its constant part shows as a torque offset."""
+
+    id: ClassVar[str] = "cable_drag"
+    channel: ClassVar[str] = "torque"
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return k."""
+        return (Term("k", f"{force_unit(joint)}/{joint.unit}", joint.name, spread=20.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return q."""
+        return (motion.q,)
+
+
+@dataclass(frozen=True)
+class GravityCompensation(JointEffect):
+    """k (L(q) - L0) dL/dq: a spring or a cylinder beside the joint; its first two orders in the angle."""
+
+    id: ClassVar[str] = "gravity_compensation"
+    channel: ClassVar[str] = "torque"
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return the torques that go with cos q, sin q, cos 2 q and sin 2 q."""
+        names = ("cos", "sin", "cos 2", "sin 2")
+        return tuple(Term(name, force_unit(joint), joint.name, spread=1000.0) for name in names)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return cos q, sin q, cos 2 q, sin 2 q."""
+        return np.cos(motion.q), np.sin(motion.q), np.cos(2 * motion.q), np.sin(2 * motion.q)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return the largest torque over a turn."""
+        waves = np.column_stack([np.cos(_TURN), np.sin(_TURN), np.cos(2 * _TURN), np.sin(2 * _TURN)])
+        found = []
+        for place, joint in enumerate(self.acting(robot)):
+            own = slice(4 * place, 4 * place + 4)
+            torque = waves @ values[own]
+            wave = waves[int(np.argmax(np.abs(torque)))]
+            deviation = float(np.sqrt(wave @ covariance[own, own] @ wave))
+            found.append(quantity("torque", joint.name, np.abs(torque).max(), force_unit(joint), deviation))
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class Payload(Effect):
+    """Y_n(q, dq, ddq) (m, m c, I): a load at the flange that nobody told; c from the flange frame's origin."""
+
+    id: ClassVar[str] = "payload"
+    channel: ClassVar[str] = "torque"
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return mass, first moments and inertia in the flange frame."""
+        moments = [Term(f"m c_{axis}", "kg m", spread=2.0) for axis in "xyz"]
+        inertias = [Term(f"I{axes}", "kg m^2", spread=0.3) for axes in ("xx", "xy", "yy", "xz", "yz", "zz")]
+        return (Term("m", "kg", spread=20.0), *moments, *inertias)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, 10)."""
+        return last_body_columns(robot, motion) @ to_body(flange_frame(robot).placement)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return m, and c where the mass is one."""
+        mass = float(values[0])
+        found = [quantity("m", None, mass, "kg", float(covariance[0, 0] ** 0.5))]
+        for number, axis in enumerate("xyz", start=1):
+            place = ratio(values[number], mass)
+            if np.isfinite(place):
+                slope = np.array([-place, 1.0]) / mass
+                spread = covariance[np.ix_([0, number], [0, number])]
+                found.append(quantity(f"c_{axis}", None, place, "m", float(np.sqrt(slope @ spread @ slope))))
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class BaseTilt(Effect):
+    """Gravity turned by small angles about the base's x and y axes, in rad."""
+
+    id: ClassVar[str] = "base_tilt"
+    channel: ClassVar[str] = "torque"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 1
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return the two angles."""
+        return Term("angle_x", "rad", spread=0.15), Term("angle_y", "rad", spread=0.15)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, 2): the torque of gravity's change, turned by a unit."""
+        model = model_of(robot, None if predicted is None else predicted.bodies)
+        down = model.gravity.linear.copy()
+        columns = np.empty((*motion.q.shape, 2))
+        for axis in range(2):
+            model.gravity.linear = np.cross(np.eye(3)[axis], down)
+            data = model.createData()
+            columns[:, :, axis] = [pin.computeGeneralizedGravity(model, data, q) for q in motion.q]
+        return columns
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return the angle between the base's axis and the plumb line, and its two parts."""
+        angle, deviation = size(values, covariance)
+        whole = quantity("angle", None, angle, "rad", deviation)
+        return (whole, *super().parameters(robot, values, covariance, known))
+
+
+@dataclass(frozen=True)
+class ExternalContact(Effect):
+    """J(q)^T f: a force at the flange, in the base's axes, from `start` to `stop` of the run's clock.
+
+    The coefficients are what the drives add against the contact. `runs` says in which runs; None: in all.
+    """
+
+    id: ClassVar[str] = "external_contact"
+    channel: ClassVar[str] = "torque"
+
+    start: float = -np.inf  # s
+    stop: float = np.inf  # s
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return the force along three axes."""
+        return tuple(Term(f"f_{axis}", "N", spread=200.0) for axis in "xyz")
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, 3) the Jacobian, transposed, during the event."""
+        model = robot.model
+        data = model.createData()
+        frame = model.getFrameId(flange_frame(robot).name, pin.FrameType.BODY)
+        columns = np.zeros((*motion.q.shape, 3))
+        for row in np.flatnonzero((motion.time >= self.start) & (motion.time <= self.stop)):
+            jacobian = pin.computeFrameJacobian(model, data, motion.q[row], frame, pin.LOCAL_WORLD_ALIGNED)
+            columns[row] = jacobian[:3].T
+        return columns
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return the force, and its three parts."""
+        length, deviation = size(values, covariance)
+        return (quantity("f", None, length, "N", deviation), *super().parameters(robot, values, covariance, known))
