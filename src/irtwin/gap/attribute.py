@@ -1,0 +1,252 @@
+"""Which effects explain the gap: forward selection on groups left out, rivals, and what each cause closes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from irtwin.gap.hypotheses import Hypothesis, Variant
+from irtwin.gap.significance import p_values
+from irtwin.gap.system import System, Trial, attempt, scores
+
+_ROUNDS = 12
+_MATTERS = 0.03  # of the mean square of one equation's residual: less than this a cause has to explain
+_ALPHA = 0.01  # of the whole catalogue
+_LEAST_T = 2.5  # mean gain over its standard error between groups
+_NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
+_RIVAL = 0.8  # of the cause's gain a rival explains
+_APART = 2.0  # standard errors between groups that tell rivals apart
+_SAME = 0.03  # of the gain: less does not
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect in one or more joints (the variants chosen), with what it explains on groups left out.
+
+    gain: (G,) of weighted squares; p: adjusted for the whole catalogue; t: of the gain, between groups; `rivals`: the
+    effects that explain it as well; `columns`: the indices of its columns.
+    """
+
+    effect: str
+    scope: str
+    joints: tuple[str, ...]
+    variants: tuple[Variant, ...]
+    gain: float
+    t: float
+    p: float
+    rivals: tuple[str, ...] = ()
+    rival_gains: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """The indices of its columns."""
+        return tuple(k for variant in self.variants for k in variant.columns)
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """The causes found, ranked by gain; `noise` (g,) what they leave; `visible` of each hypothesis before any."""
+
+    causes: tuple[Cause, ...]
+    noise: np.ndarray
+    hypotheses: tuple[Hypothesis, ...]
+    visible: np.ndarray
+    share_visible: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Found:
+    hypothesis: Hypothesis
+    variant: Variant
+    gain: float
+    t: float
+    p: float
+
+
+def attribute(system: System, candidates: Sequence[Hypothesis], seed: int) -> Attribution:
+    """Find the effects that the data show beyond the twin's.
+
+    Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out.
+    """
+    noise = np.maximum(system.residual_rms((), np.ones(len(system.pattern))), 1e-9)
+    noise = np.maximum(system.residual_rms((), noise), 1e-9)
+    moments = system.moments(noise)
+    first = attempt(system, moments, (), [h.variants for h in candidates])
+    found: list[_Found] = []
+    for _ in range(_ROUNDS):
+        chosen = _columns(found)
+        new = _round(system, moments, noise, candidates, chosen, found, seed)
+        if not new:
+            break
+        found.extend(new)
+        noise = np.maximum(system.residual_rms(_columns(found), noise), 1e-9)
+        moments = system.moments(noise)
+    found = _backward(system, moments, found)
+    causes = _causes(system, moments, candidates, found)
+    noise = np.maximum(system.residual_rms([k for cause in causes for k in cause.columns], noise), 1e-9)
+    return Attribution(causes, noise, tuple(candidates), first.visible, first.share_visible)
+
+
+def _columns(found: Sequence[_Found]) -> list[int]:
+    return [k for one in found for k in one.variant.columns]
+
+
+def _gains(system: System, trial: Trial, candidates: Sequence[Hypothesis]) -> tuple[np.ndarray, np.ndarray]:
+    """Return each hypothesis' gain per row and its t between groups, (H,)."""
+    rows = np.maximum(system.rows.max(axis=1), 1.0)
+    gain = (trial.start - trial.loss) / rows  # (H, G)
+    mean, t = np.empty(len(candidates)), np.empty(len(candidates))
+    for k, hypothesis in enumerate(candidates):
+        own = system.group_observed if hypothesis.scope == "changed" else np.ones(len(rows), dtype=bool)
+        mean[k] = np.average(gain[k, own], weights=rows[own])
+        spread = float(np.std(gain[k, own], ddof=1)) if own.sum() > 1 else np.inf
+        t[k] = mean[k] / max(spread / np.sqrt(own.sum()), 1e-12)
+    return mean, t
+
+
+def _round(
+    system: System,
+    moments: Sequence[np.ndarray],
+    noise: np.ndarray,
+    candidates: Sequence[Hypothesis],
+    chosen: Sequence[int],
+    found: Sequence[_Found],
+    seed: int,
+) -> list[_Found]:
+    taken = set(chosen)
+    left = [h for h in candidates if not any(set(v.columns) & taken for v in h.variants)]
+    left = [h for h in left if not any(_same_place(h, one.hypothesis) for one in found)]
+    if not left:
+        return []
+    trial = attempt(system, moments, chosen, [h.variants for h in left])
+    gain, t = _gains(system, trial, left)
+    plausible = np.flatnonzero((gain >= _MATTERS) & (t >= _LEAST_T))
+    if not len(plausible):
+        return []
+    block_scores, products = scores(system, moments, noise, chosen)
+    p = p_values(block_scores, products, left, seed)
+    plausible = plausible[p[plausible] <= _ALPHA]
+    if not len(plausible):
+        return []
+    best = _leader(plausible, gain, left, found)
+    leader = left[best]
+    taken_now = [int(best)]
+    if leader.joint is not None:
+        for k in plausible:
+            other = left[k]
+            if k == best or other.effect != leader.effect or other.scope != leader.scope or other.joint is None:
+                continue
+            rivals = [gain[j] for j in plausible if left[j].joint == other.joint]
+            robot = [gain[j] for j in plausible if left[j].joint is None]
+            if gain[k] >= _NEAR * max(rivals) and (not robot or max(robot) < gain[best]):
+                taken_now.append(int(k))
+    return [
+        _Found(left[k], left[k].variants[_variant(trial, left, k)], float(gain[k]), float(t[k]), float(p[k]))
+        for k in taken_now
+    ]
+
+
+def _leader(plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis], found: Sequence[_Found]) -> int:
+    """Return the place of the best hypothesis; one of an effect that was found before goes before a rival to it."""
+    best = int(plausible[np.argmax(gain[plausible])])
+    before = {(one.hypothesis.effect, one.hypothesis.scope) for one in found}
+    known = [int(k) for k in plausible if (left[k].effect, left[k].scope) in before and left[k].joint]
+    if known and (nearest := max(known, key=lambda k: gain[k])) != best and gain[nearest] >= _RIVAL * gain[best]:
+        return nearest
+    return best
+
+
+def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether both are one effect at one place, in any scope or shape."""
+    return one.effect == other.effect and (one.joint == other.joint or None in (one.joint, other.joint))
+
+
+def _variant(trial: Trial, candidates: Sequence[Hypothesis], place: int) -> int:
+    before = sum(len(h.variants) for h in candidates[:place])
+    return int(trial.best[place]) - before
+
+
+def _backward(system: System, moments: Sequence[np.ndarray], found: list[_Found]) -> list[_Found]:
+    """Drop what the later ones made idle."""
+    while len(found) > 1:
+        gains = [_alone(system, moments, found, k) for k in range(len(found))]
+        worst = int(np.argmin(gains))
+        if gains[worst] >= _MATTERS / 2:
+            break
+        found = [one for k, one in enumerate(found) if k != worst]
+    return found
+
+
+def _alone(system: System, moments: Sequence[np.ndarray], found: Sequence[_Found], place: int) -> float:
+    rest = _columns([one for k, one in enumerate(found) if k != place])
+    one = found[place]
+    trial = attempt(system, moments, rest, [[one.variant]])
+    return float(_gains(system, trial, [one.hypothesis])[0][0])
+
+
+def _causes(
+    system: System, moments: Sequence[np.ndarray], candidates: Sequence[Hypothesis], found: Sequence[_Found]
+) -> tuple[Cause, ...]:
+    """Join the finds of one effect and scope into causes, and look for rivals of each."""
+    keys = list(dict.fromkeys((one.hypothesis.effect, one.hypothesis.scope) for one in found))
+    causes: list[Cause] = []
+    for effect, scope in keys:
+        members = [one for one in found if (one.hypothesis.effect, one.hypothesis.scope) == (effect, scope)]
+        others = _columns([one for one in found if one not in members])
+        causes.append(_with_rivals(system, moments, candidates, members, others))
+    return tuple(sorted(causes, key=lambda cause: -cause.gain))
+
+
+def _with_rivals(
+    system: System,
+    moments: Sequence[np.ndarray],
+    candidates: Sequence[Hypothesis],
+    members: Sequence[_Found],
+    others: Sequence[int],
+) -> Cause:
+    joints = tuple(one.hypothesis.joint for one in members if one.hypothesis.joint)
+    effect, scope = members[0].hypothesis.effect, members[0].hypothesis.scope
+    free = [h for h in candidates if not any(set(v.columns) & set(others) for v in h.variants)]
+    single = attempt(system, moments, others, [h.variants for h in free])
+    choice = {(h.effect, h.scope, h.joint): h.variants[_variant(single, free, k)] for k, h in enumerate(free)}
+    rivals: list[tuple[str, str, tuple[Variant, ...]]] = [(effect, scope, tuple(one.variant for one in members))]
+    for name, other_scope in dict.fromkeys((h.effect, h.scope) for h in free):
+        if (name, other_scope) == (effect, scope):
+            continue
+        for places in dict.fromkeys([joints, (None,)]):
+            parts = [choice.get((name, other_scope, joint)) for joint in places]
+            if parts and all(part is not None for part in parts):
+                rivals.append((name, other_scope, tuple(part for part in parts if part is not None)))
+    joined = [[_joined(parts)] for _, _, parts in rivals]
+    trial = attempt(system, moments, others, joined)
+    rows = np.maximum(system.rows.max(axis=1), 1.0)
+    own = system.group_observed if scope == "changed" else np.ones(len(rows), dtype=bool)
+    per_group = ((trial.start - trial.loss) / rows)[:, own]
+    gain = np.average(per_group, axis=1, weights=rows[own])
+    equal: list[str] = []
+    for k, (name, _, _) in enumerate(rivals[1:], start=1):
+        apart = per_group[0] - per_group[k]
+        error = float(np.std(apart, ddof=1)) / np.sqrt(len(apart))
+        near = gain[0] - gain[k] < max(_SAME * gain[0], _APART * error)
+        if name != effect and gain[k] >= _RIVAL * gain[0] and near:
+            equal.append(name)
+    known = {name: float(gain[k]) for k, (name, _, _) in enumerate(rivals) if k}
+    spread = float(np.std(per_group[0], ddof=1)) / np.sqrt(per_group.shape[1])
+    return Cause(
+        effect=effect,
+        scope=scope,
+        joints=joints,
+        variants=tuple(one.variant for one in members),
+        gain=float(gain[0]),
+        t=float(gain[0] / max(spread, 1e-12)),
+        p=max(one.p for one in members),
+        rivals=tuple(dict.fromkeys(sorted(equal, key=lambda name: -known[name]))),
+        rival_gains=known,
+    )
+
+
+def _joined(parts: Sequence[Variant]) -> Variant:
+    columns = tuple(k for part in parts for k in part.columns)
+    return Variant(parts[0].effect, columns, tuple(term for part in parts for term in part.terms))

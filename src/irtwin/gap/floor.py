@@ -1,0 +1,113 @@
+"""The noise floor: what no model of the motion could explain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import minimize_scalar
+
+from irtwin.signals.filter import kernel, low_pass
+from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
+
+REPEATS, OUT_OF_BAND = "repeats", "out_of_band"
+_LONGEST_SHIFT = 1.0  # s, between the starts of a motion and its repeat
+_SAME = 0.1  # of the motion's size: repeats that differ by more are no repeats
+_MARGIN = 1.05  # of the cutoff: where the filter's stop band begins in earnest
+
+
+@dataclass(frozen=True)
+class Floor:
+    """RMS of the noise in the filter's band: torque (n,) N m, power W; None where it was not measured or unknown.
+
+    `source` is "repeats", "out_of_band", or None where neither could tell.
+    """
+
+    torque: np.ndarray | None
+    power: float | None
+    source: str | None
+
+
+def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion]) -> Floor:
+    """Return the floor: from repeats of one motion where there are any, else from above the band.
+
+    `motions`: each run's, by name, filtered alike. Repeats: RMS of the aligned difference / sqrt(2), pooled.
+    Above the band: what the filter took away, taken as white, scaled to the band. This misses noise that is
+    coloured, so it is the smaller of the two.
+    """
+    pairs = [(motions[run.repeat_of], motions[run.name]) for run in runs if run.repeat_of and _has_repeat(run, runs)]
+    torque = _pooled([_difference(a, b, "torque") for a, b in pairs])
+    power = _pooled([_difference(a, b, "power") for a, b in pairs])
+    if torque is not None or power is not None:
+        return Floor(torque, None if power is None else float(power[0]), REPEATS)
+    torque = _pooled([_above(run.signals.time, run.signals.torque, motions[run.name]) for run in runs])
+    power = _pooled([_above(run.signals.time, run.signals.power, motions[run.name]) for run in runs])
+    source = None if torque is None and power is None else OUT_OF_BAND
+    return Floor(torque, None if power is None else float(power[0]), source)
+
+
+def _has_repeat(run: Run, runs: Sequence[Run]) -> bool:
+    return any(other.name == run.repeat_of and other.role == run.role for other in runs)
+
+
+def _pooled(variances: Sequence[np.ndarray | None]) -> np.ndarray | None:
+    known = [variance for variance in variances if variance is not None]
+    return np.sqrt(np.mean(known, axis=0)) if known else None
+
+
+def _difference(first: Motion, second: Motion, signal: str) -> np.ndarray | None:
+    """Return half the mean square difference of two runs of one motion, (n,) or (1,)."""
+    one, two = getattr(first, signal), getattr(second, signal)
+    if one is None or two is None:
+        return None
+    shift = _shift(first, second)
+    start = max(first.time[0], second.time[0] + shift) + 1e-9
+    stop = min(first.time[-1], second.time[-1] + shift) - 1e-9
+    inside = (first.time >= start) & (first.time <= stop)
+    if inside.sum() < 20:
+        return None
+    time = first.time[inside]
+    q = make_interp_spline(second.time + shift, second.q)(time)
+    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > _SAME * max(float(first.q.std()), 1e-3):
+        return None
+    again = make_interp_spline(second.time + shift, two, k=1)(time)
+    squares = (one[inside] - again) ** 2 / 2
+    return np.atleast_1d(np.mean(_without_jumps(squares), axis=0))
+
+
+def _without_jumps(squares: np.ndarray) -> np.ndarray:
+    """Cap the one percent largest: repeats change the sign of friction at slightly different instants."""
+    return np.asarray(np.minimum(squares, np.quantile(squares, 0.99, axis=0)))
+
+
+def _shift(first: Motion, second: Motion) -> float:
+    """Return by how much later (s) the second motion has to be moved to lie on the first."""
+    spline = make_interp_spline(second.time, second.q)
+    low, high = second.time[0], second.time[-1]
+    every = slice(None, None, max(1, len(first.time) // 500))
+    time, q = first.time[every], first.q[every]
+
+    def distance(shift: float) -> float:
+        inside = (time - shift >= low) & (time - shift <= high)
+        return float(np.mean((spline(time[inside] - shift) - q[inside]) ** 2)) if inside.any() else np.inf
+
+    offset = first.time[0] - second.time[0]
+    grid = offset + np.linspace(-_LONGEST_SHIFT, _LONGEST_SHIFT, 81)
+    best = grid[int(np.argmin([distance(shift) for shift in grid]))]
+    step = grid[1] - grid[0]
+    return float(minimize_scalar(distance, bounds=(best - step, best + step), method="bounded").x)
+
+
+def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion) -> np.ndarray | None:
+    """Return the variance in the band of white noise that has, above it, what the filter takes away."""
+    if signal is None or motion.cutoff is None or len(kernel(motion.rate, motion.cutoff)) == 1:
+        return None
+    share = min(1.0, _MARGIN * motion.cutoff / (motion.rate / 2))
+    if share > 0.9:
+        return None
+    even = make_interp_spline(time, signal, k=1)(motion.time)
+    above = even - low_pass(even, motion.rate, motion.cutoff)
+    return np.atleast_1d(np.median(above**2, axis=0) / 0.4549 * share / (1 - share))

@@ -1,0 +1,303 @@
+"""The equations of one channel, reduced once, and the algebra of trying hypotheses on them.
+
+A sample's equations are [columns of the twin | candidate columns] @ coefficients = measured. Blocks of time are reduced
+to triangular factors while the samples are read; whatever is asked later works on these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from irtwin.effects.effect import Effect, Term
+from irtwin.gap.hypotheses import Column, Variant, bounds
+from irtwin.identification.accumulate import Block
+
+
+@dataclass(frozen=True)
+class System:
+    """g equations a sample, B blocks; K terms of the twin, M candidate columns.
+
+    `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
+    whether the block belongs to an observed run. With any that does not, each candidate column stands there twice: as
+    it is, and (from index K + M) zero in all but observed runs.
+    """
+
+    terms: tuple[tuple[Effect, Term], ...]
+    columns: tuple[Column, ...]
+    pattern: np.ndarray
+    blocks: tuple[Block, ...]
+    group: np.ndarray
+    observed: np.ndarray
+
+    @property
+    def base(self) -> int:
+        """K, how many terms the twin has."""
+        return len(self.terms)
+
+    @property
+    def both(self) -> bool:
+        """Whether there are reference runs beside the observed ones."""
+        return not self.observed.all()
+
+    @property
+    def changed(self) -> int:
+        """The index of the first candidate column that is zero outside observed runs."""
+        return self.base + len(self.columns)
+
+    @property
+    def groups(self) -> int:
+        """How many groups there are."""
+        return int(self.group.max()) + 1
+
+    @cached_property
+    def group_observed(self) -> np.ndarray:
+        """(G,) whether the group is of observed runs."""
+        return np.array([self.observed[self.group == g].all() for g in range(self.groups)])
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(G, g) how many rows each equation has in each group."""
+        counts = np.zeros((self.groups, len(self.pattern)))
+        for block, group in zip(self.blocks, self.group, strict=True):
+            counts[group] += block.rows
+        return counts
+
+    @cached_property
+    def all_terms(self) -> tuple[Term, ...]:
+        """The terms of every column, those of changes too: their expectation is no change, without bound."""
+        first = [term for _, term in self.terms]
+        return (*first, *(column.term for column in self.columns), *(_change(c.term) for c in self.columns))
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """(D,) the prior's standard deviations; factors are taken in units of it."""
+        return np.array([term.spread for term in self.all_terms[: self._size]])
+
+    @cached_property
+    def expected(self) -> np.ndarray:
+        """(K,) what is expected of the twin's terms."""
+        return np.array([term.expected for _, term in self.terms])
+
+    @property
+    def _size(self) -> int:
+        return self.base + len(self.columns) * (2 if self.both else 1)
+
+    def factor(self, block: int, equation: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return a block's factor of an equation, (r, k + 1), in units of the prior, and the indices (k,) it has.
+
+        The last column is what was measured, less what was expected.
+        """
+        used = np.flatnonzero(self.pattern[equation])
+        factor = self.blocks[block].factors[equation]
+        own = used[used < self.base]
+        target = factor[:, -1] - factor[:, : len(own)] @ self.expected[own]
+        columns = factor[:, :-1]
+        if self.both and self.observed[block]:
+            later = used >= self.base
+            columns = np.concatenate([columns, columns[:, later]], axis=1)
+            used = np.append(used, used[later] + len(self.columns))
+        return np.column_stack([columns * self.scale[used], target]), used
+
+    def moments(self, noise: np.ndarray) -> list[np.ndarray]:
+        """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,)."""
+        found = [np.zeros((self._size + 1, self._size + 1)) for _ in range(self.groups)]
+        for group, total in enumerate(found):
+            for equation, level in enumerate(noise):
+                factors: dict[int, list[np.ndarray]] = {}
+                places: dict[int, np.ndarray] = {}
+                for block in np.flatnonzero(self.group == group):
+                    factor, used = self.factor(int(block), equation)
+                    factors.setdefault(len(used), []).append(factor)
+                    places[len(used)] = np.append(used, self._size)
+                for size, parts in factors.items():
+                    stacked = np.concatenate(parts) / level
+                    total[np.ix_(places[size], places[size])] += stacked.T @ stacked
+        return found
+
+    def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
+        """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns."""
+        vector = self.solution(chosen, np.sum(self.moments(noise), axis=0))
+        squares = sum(self.squares(vector, group) for group in range(self.groups))
+        return np.asarray(np.sqrt(squares / np.maximum(self.rows.sum(axis=0), 1)))
+
+    def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
+        """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
+        inside = np.append(np.arange(self.base), np.array(chosen, dtype=int))
+        normal = total[np.ix_(inside, inside)] + np.eye(len(inside))
+        vector = np.zeros(self._size)
+        vector[inside] = cho_solve(cho_factor(normal), total[inside, -1])
+        return vector
+
+    def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
+        """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
+        found = np.zeros(len(self.pattern))
+        for block in np.flatnonzero(self.group == group):
+            for equation in range(len(self.pattern)):
+                factor, used = self.factor(int(block), equation)
+                found[equation] += float(np.sum((factor @ np.append(-vector[used], 1.0)) ** 2))
+        return found
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What H hypotheses do on groups left out: weighted squares (H, G) each, `start` (G,) without any.
+
+    `best` (H,): the index of the variant that the whole data choose; `values`: its coefficients, in units of the prior;
+    `visible` (H,): mean square that the variant adds beyond what the rest imitates, with coefficients as large as
+    expected; `share_visible` (H,): the part of its columns that the rest cannot imitate.
+    """
+
+    start: np.ndarray
+    loss: np.ndarray
+    best: np.ndarray
+    values: tuple[np.ndarray, ...]
+    visible: np.ndarray
+    share_visible: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Variants of one number of coefficients: `place` (V,) in all variants, `columns` (V, k), `lowest` (V, k)."""
+
+    place: np.ndarray
+    columns: np.ndarray
+    lowest: np.ndarray
+
+
+def attempt(
+    system: System, moments: Sequence[np.ndarray], chosen: Sequence[int], candidates: Sequence[Sequence[Variant]]
+) -> Trial:
+    """Try hypotheses, each a list of variants, beside the twin's terms and the `chosen` columns.
+
+    Everything is refitted without each group in turn; the shape (variant) is chosen inside the training groups.
+    """
+    variants = [variant for group in candidates for variant in group]
+    owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
+    batches = _batches(system, variants)
+    total = np.sum(moments, axis=0)
+    start = np.empty(len(moments))
+    loss = np.empty((len(candidates), len(moments)))
+    for group, part in enumerate(moments):
+        train, test = _project(total - part, part, system.base, chosen)
+        start[group] = test[-1, -1]
+        objective, left_out, _ = _fit(train, test, batches, len(variants))
+        best = _best(objective, owner, len(candidates))
+        loss[:, group] = left_out[best]
+    train, _ = _project(total, total, system.base, chosen)
+    objective, _, values = _fit(train, train, batches, len(variants))
+    best = _best(objective, owner, len(candidates))
+    diagonal = np.diag(train)
+    rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
+    visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
+    whole = np.diag(total)
+    share = np.array([_ratio(diagonal[list(variants[k].columns)], whole[list(variants[k].columns)]) for k in best])
+    return Trial(start, loss, best, tuple(values[k] for k in best), visible, share)
+
+
+def scores(
+    system: System, moments: Sequence[np.ndarray], noise: np.ndarray, chosen: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return each block's score of each column (B, D), and the products of projected columns (D + 1, D + 1)."""
+    total = np.sum(moments, axis=0)
+    inside, weights = _weights(total, system.base, chosen)
+    rest = np.zeros(len(total))
+    rest[-1] = 1.0
+    rest[inside] = -weights[:, -1]
+    found = np.empty((len(system.blocks), len(total) - 1))
+    for block in range(len(system.blocks)):
+        vector = np.zeros(len(total))
+        for equation, level in enumerate(noise):
+            factor, used = system.factor(block, equation)
+            places = np.append(used, len(total) - 1)
+            vector[places] += factor.T @ (factor @ rest[places]) / level**2
+        found[block] = (vector - weights.T @ vector[inside])[:-1]
+    train, _ = _project(total, total, system.base, chosen)
+    return found, train
+
+
+def _change(term: Term) -> Term:
+    return Term(term.name, term.unit, term.joint, term.link, 0.0, term.spread)
+
+
+def _ratio(part: np.ndarray, whole: np.ndarray) -> float:
+    return float(part.sum() / whole.sum()) if whole.sum() > 0 else 0.0
+
+
+def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:
+    sizes: dict[int, list[int]] = {}
+    for place, variant in enumerate(variants):
+        sizes.setdefault(len(variant.columns), []).append(place)
+    batches = []
+    for places in sizes.values():
+        columns = np.array([variants[place].columns for place in places])
+        lowest = np.array([bounds(variants[place]) for place in places])
+        lowest[columns >= system.changed] = -np.inf
+        batches.append(_Batch(np.array(places), columns, lowest / system.scale[columns]))
+    return batches
+
+
+def _weights(total: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the fitted columns' indices, and their weights in the fit of every column and of the measurement."""
+    inside = np.append(np.arange(base), np.array(chosen, dtype=int))
+    normal = total[np.ix_(inside, inside)] + np.eye(len(inside))
+    return inside, cho_solve(cho_factor(normal), total[inside])
+
+
+def _project(train: np.ndarray, test: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the products of what a fit on `train` leaves of each column: on train, and on test."""
+    inside, weights = _weights(train, base, chosen)
+    cross = weights.T @ test[inside]
+    squares = weights.T @ test[np.ix_(inside, inside)] @ weights
+    return train - train[inside].T @ weights, test - cross - cross.T + squares
+
+
+def _fit(
+    train: np.ndarray, test: np.ndarray, batches: Sequence[_Batch], count: int
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Fit each variant on train; return the objective there, the squares on test, and the coefficients."""
+    objective, left_out = np.empty(count), np.empty(count)
+    values: list[np.ndarray] = [np.zeros(0)] * count
+    for batch in batches:
+        rows, columns = batch.columns[:, :, None], batch.columns[:, None, :]
+        normal, right = train[rows, columns], train[batch.columns, -1]
+        solved = _bounded(normal + np.eye(normal.shape[1]), right, batch.lowest)
+        objective[batch.place] = _squares(train[-1, -1], right, normal, solved) + (solved**2).sum(axis=1)
+        left_out[batch.place] = _squares(test[-1, -1], test[batch.columns, -1], test[rows, columns], solved)
+        for place, value in zip(batch.place, solved, strict=True):
+            values[place] = value
+    return objective, left_out, values
+
+
+def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """Solve V small systems (V, k, k); what falls below its bound is put there, the rest solved again."""
+    solved = np.linalg.solve(normal, right[..., None])[..., 0]
+    fixed = np.zeros(solved.shape, dtype=bool)
+    for _ in range(normal.shape[1]):
+        below = (solved < lowest) & ~fixed
+        if not below.any():
+            break
+        fixed |= below
+        held = np.where(fixed, lowest, 0.0)
+        held[~np.isfinite(held)] = 0.0
+        free = ~fixed
+        system = normal * (free[:, :, None] & free[:, None, :])
+        system[:, range(normal.shape[1]), range(normal.shape[1])] += fixed
+        target = np.where(fixed, held, right - np.einsum("vij,vj->vi", normal, held))
+        solved = np.linalg.solve(system, target[..., None])[..., 0]
+    return solved
+
+
+def _squares(start: float, right: np.ndarray, normal: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.asarray(start - 2 * (values * right).sum(axis=1) + np.einsum("vi,vij,vj->v", values, normal, values))
+
+
+def _best(objective: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+    """Return, for each hypothesis, the place of its variant of the least objective."""
+    order = np.lexsort((objective, owner))
+    first = np.searchsorted(owner[order], np.arange(count))
+    return np.asarray(order[first])
