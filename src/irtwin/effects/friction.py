@@ -244,7 +244,7 @@ class PreslidingHysteresis(JointEffect):
         turns = moving[1:][np.diff(signs[moving]) != 0]
         lag = np.zeros(len(q))
         left = 0.0
-        for start, stop in zip(turns, [*turns[1:], len(q)], strict=True):
+        for start, stop in zip(turns, np.append(turns, len(q))[1:], strict=True):
             decay = np.exp(-np.abs(q[start:stop] - q[start]) / self.d)
             lag[start:stop] = (left - 2 * signs[start]) * decay
             left = lag[stop - 1]
