@@ -1,0 +1,50 @@
+"""Motions of a case: exciting ones (Fourier series that start and end at rest) and work cycles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from plant.machine import Drawings
+from plant.motion import Motion, programme
+
+HARMONICS = 5
+
+
+def exciting(drawings: Drawings, seconds: float, reach: float, speed: float, rng: np.random.Generator) -> Motion:
+    """Return a random Fourier motion of all joints; `reach` and `speed` are shares of the limits."""
+    limits = drawings.limits
+    n = len(limits.lower)
+    w = 2 * np.pi / seconds * np.arange(1, HARMONICS + 1)
+    time = drawings.step * np.arange(round(seconds / drawings.step))
+    sine, cosine = rng.standard_normal((2, HARMONICS, n)) / np.arange(1, HARMONICS + 1)[:, None] ** 0.5
+    sine -= w[:, None] * (w @ sine) / (w @ w)  # at rest at both ends
+    cosine -= (w**2)[:, None] * (w**2 @ cosine) / (w**2 @ w**2)
+    sin, cos = np.sin(np.outer(time, w)), np.cos(np.outer(time, w))
+    q, dq, ddq = (
+        sin @ sine + cos @ cosine,
+        (cos * w) @ sine - (sin * w) @ cosine,
+        -(sin * w**2) @ sine - (cos * w**2) @ cosine,
+    )
+    half = np.minimum((limits.upper - limits.lower) / 2, 1.6)
+    middle = (limits.upper + limits.lower) / 2
+    scale = np.minimum(
+        reach * half / (np.ptp(q, axis=0) / 2),
+        np.minimum(speed * limits.speed / np.abs(dq).max(0), speed * limits.acceleration / np.abs(ddq).max(0)),
+    )
+    centre = middle - scale * (q.max(0) + q.min(0)) / 2
+    return Motion(centre + scale * q, scale * dq, scale * ddq)
+
+
+def work(drawings: Drawings, seconds: float, joints: int, speed: float, rng: np.random.Generator) -> Motion:
+    """Return point-to-point moves between four poses with pauses; only the first `joints` joints move."""
+    limits = drawings.limits
+    middle, half = (limits.upper + limits.lower) / 2, np.minimum((limits.upper - limits.lower) / 2, 1.3)
+    moving = np.arange(len(middle)) < joints
+    poses = [middle + moving * half * rng.uniform(-0.8, 0.8, len(middle)) for _ in range(4)]
+    moves = [
+        {"to": np.degrees(pose), "speed": speed, "pause": pause, "profile": profile}
+        for pose, pause, profile in zip(poses, (0.3, 1.2, 0.0, 0.6), ("quintic", "trapezoid") * 2, strict=True)
+    ]
+    motion = programme(moves, limits, drawings.step, cycles=12)
+    rows = round(seconds / drawings.step)
+    return Motion(motion.q[:rows], motion.dq[:rows], motion.ddq[:rows])
