@@ -151,7 +151,7 @@
       const several = figure.data.length > 1, bars = new Set(figure.data.flatMap((trace) => trace.x)).size;
       const layout = base(Object.assign({ showlegend: several, bargap: Math.max(0.3, 1 - 0.14 * bars) }, figure.layout));
       if (!several) layout.margin.t = 8;
-      if (bars > 8) layout.xaxis.tickangle = -35;
+      if (bars > 8 && layout.xaxis.type === "category") layout.xaxis.tickangle = -35;
       Plotly.newPlot(holder, figure.data, layout, CONFIG);
     }
     if (!page.explorer) return;

@@ -27,7 +27,7 @@ _WHERE = re.compile(r"WHERE\s*\{", re.IGNORECASE)
 
 
 def infer(graph: KnowledgeGraph) -> int:
-    """Run the rules of `rules/rules.ttl` until nothing is new; return how many triples they made."""
+    """Run the rules of the files `rules/*rules.ttl` until nothing is new; return how many triples they made."""
     made: set[Triple] = set()
     graph.replace([], GRAPH_SHACL)
     while True:
@@ -40,8 +40,9 @@ def infer(graph: KnowledgeGraph) -> int:
 
 @cache
 def set_wise_rules() -> tuple[str, ...]:
-    """Return a CONSTRUCT for each rule of `rules/rules.ttl`."""
-    return read_rules(folder("rules") / "rules.ttl")
+    """Return a CONSTRUCT for each rule of the files `rules/*rules.ttl`."""
+    files = sorted(folder("rules").glob("*rules.ttl"))
+    return tuple(construct for file in files for construct in read_rules(file))
 
 
 def read_rules(file: Path) -> tuple[str, ...]:

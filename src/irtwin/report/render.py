@@ -64,7 +64,7 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Mapping[str, An
         "plotly": get_plotlyjs(),
         "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
     }
-    return _environment(folder).get_template("energy/page.html.jinja").render(
+    return environment(folder).get_template("energy/page.html.jinja").render(
         answers=answers,
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
@@ -78,7 +78,7 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Mapping[str, An
         conclusions=tables.conclusions(answers["conclusions"].rows),
         drawn=drawn,
         curves=curves,
-        data=_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),
+        data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),
         scene=None if scene is None else Markup(scene),
         scene_run=curves["runs"][curves["opens"]]["name"] if curves else None,
         style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
@@ -102,13 +102,14 @@ def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(normal.encode("utf-8")).digest()).decode("ascii")
 
 
-def _json(data: object) -> Markup:
+def embedded_json(data: object) -> Markup:
     """Return JSON that is safe inside a script element: no `<` that could end it."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))
 
 
-def _environment(folder: Path) -> jinja2.Environment:
+def environment(folder: Path) -> jinja2.Environment:
+    """Return the templates of a reports folder, with the filters that pages use."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         autoescape=True,

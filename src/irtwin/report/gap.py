@@ -1,0 +1,117 @@
+"""A robot's gap report: where its twin and the robot differ, why, and what to do; one HTML file that opens offline."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from irtwin import resources
+from irtwin.errors import InputError
+from irtwin.knowledge import shacl_rules
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.providers.gap import record
+from irtwin.providers.records import identifier, ingest, robot_iri
+from irtwin.report import gap_figures, gap_verdict
+from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_questions
+from irtwin.report.render import content_policy, embedded_json, environment
+from irtwin.signals.log import DataSet
+from irtwin.storage.database import Workspace
+
+ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
+
+
+def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path) -> None:
+    """Write the gap report of a robot (its IRI) to `out`.
+
+    Numbers come from the questions in `reports/gap`, curves from the evidence file that the graph names.
+    Raises InputError where the graph has no diagnosis of the robot.
+    """
+    found = ask(graph, {"diagnosis": _questions()["diagnosis"]}, {"robot": robot})["diagnosis"].first
+    if found is None:
+        raise InputError(f"{robot}: no diagnosis in the graph; run `irtwin diagnose` with this workspace first")
+    bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
+    answers = ask(graph, _questions(), bindings)
+    evidence = json.loads(read_document(found["evidence_file"], found["evidence_checksum"]))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(_page(answers, bindings, evidence), encoding="utf-8")
+
+
+def render_alone(data_set: DataSet, diagnosis: Mapping[str, Any], evidence: Mapping[str, Any], out: Path) -> None:
+    """Write the gap report of a diagnosis that no workspace keeps."""
+    robot_id = identifier(data_set.robot.name)
+    with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as workspace:
+        ingest(workspace, data_set)
+        record(workspace, robot_id, diagnosis, evidence)
+        graph = KnowledgeGraph()
+        graph.load_ontology()
+        mappings = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+        graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        shacl_rules.infer(graph)
+        render_gap(graph, robot_iri(robot_id), workspace.read_document, out)
+
+
+def _questions() -> dict[str, Question]:
+    return read_questions(resources.folder("reports") / "gap")
+
+
+def _page(answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, Any]) -> str:
+    folder = resources.folder("reports")
+    drawn = gap_figures.figures(answers, evidence)
+    scripts = {
+        "plotly": get_plotlyjs(),
+        "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
+    }
+    first = answers["next_experiment"].first
+    return environment(folder).get_template("gap/page.html.jinja").render(
+        answers=answers,
+        bindings=bindings,
+        rows={name: answer.rows for name, answer in answers.items()},
+        verdict=gap_verdict.sentence(answers),
+        causes=[_cause(row, answers) for row in answers["causes"].rows],
+        foremost=gap_figures.foremost_joint(answers),
+        follows=evidence.get("follows") or [],
+        experiment=_pairs(first["description"]) if first else None,
+        drawn=drawn,
+        data=embedded_json({"figures": drawn, "explorer": None}),
+        style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
+        scripts={name: Markup(text) for name, text in scripts.items()},
+        policy=content_policy(scripts.values()),
+    )  # fmt: skip
+
+
+def _cause(row: Row, answers: Answers) -> dict[str, Any]:
+    rank = row["rank"]
+    return {
+        **row,
+        "name": gap_verdict.effect_name(row),
+        "joints": gap_verdict.joints_of(rank, answers),
+        "rivals": gap_verdict.rivals_of(rank, answers),
+        "parameters": [one for one in answers["cause_parameters"].rows if one["rank"] == rank],
+        "evidence": _pairs(row["evidence"]),
+    }
+
+
+def _pairs(text: str) -> list[tuple[str, str]]:
+    """Return a JSON object as names and texts."""
+    given: dict[str, Any] = json.loads(text)
+    return [(name.replace("_", " "), _said(value)) for name, value in given.items() if value is not None]
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+    if isinstance(value, list):
+        return ", ".join(_said(one) for one in value)
+    if isinstance(value, dict):
+        return "; ".join(f"{name.replace('_', ' ')} {_said(one)}" for name, one in value.items())
+    return str(value).replace("_", " ") if isinstance(value, str) and " " not in value else str(value)

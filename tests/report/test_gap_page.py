@@ -1,0 +1,154 @@
+"""The gap report of hand-written diagnoses: its words, and the page in a real browser without network."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+from pathlib import Path
+
+import gap_cases
+import pytest
+import rows
+
+from irtwin.errors import InputError
+from irtwin.knowledge import shacl_rules
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.providers.gap import record
+from irtwin.providers.records import robot_iri
+from irtwin.report.gap import render_gap
+from irtwin.resources import folder
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Joint
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+ORDER = ["summary", "where", "which", "shrink", "next", "untestable", "provenance"]
+
+
+def six_axis(workspace: Workspace) -> None:
+    joints = [
+        Joint(robot_id=rows.ROBOT, name=name, position=k, kind="revolute") for k, name in enumerate(gap_cases.JOINTS, 1)
+    ]
+    runs = [rows.run(name, role="reference" if name.startswith("ref") else "observed") for name in gap_cases.RUNS]
+    workspace.ingest(rows.robot(controlled_axes=6), joints, runs, {run.run_id: rows.samples(1) for run in runs})
+
+
+def graph_of(workspace: Workspace) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    mappings = sorted(folder("mappings").glob("*.r2rml.ttl"))
+    graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    shacl_rules.infer(graph)
+    return graph
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    files = {}
+    base = tmp_path_factory.mktemp("gap")
+    for verdict in gap_cases.VERDICTS:
+        with Workspace(base / verdict) as workspace:
+            six_axis(workspace)
+            record(workspace, rows.ROBOT, gap_cases.diagnosis(verdict), gap_cases.evidence(verdict), "{}")
+            files[verdict] = base / f"{verdict}.html"
+            render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, files[verdict])
+    return files
+
+
+def verdict_of(page: str) -> str:
+    found = re.search(r'class="verdict">(.*?)</p>', page)
+    assert found
+    return html.unescape(found[1]).replace("\N{NO-BREAK SPACE}", " ")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        ("no_gap", "The twin explains the data down to their noise floor: there is no gap to close."),
+        (
+            "ambiguous",
+            "There is a gap in the torque of joint_a3, foremost in the regime “low speed”, and these data do not tell its"
+            " causes apart: Stribeck friction on joint_a3 or nonlinear viscous friction on joint_a3 would explain it"
+            " equally well.",
+        ),
+        (
+            "unexplained",
+            "There is a gap in the torque of joint_a3, foremost in the regime “low speed”, and no effect of the catalogue"
+            " closes it.",
+        ),
+        (
+            "attributed",
+            "Stribeck friction on joint_a3 (confidence 96 %) and viscous friction on joint_a3 (confidence 70 %) changed"
+            " since the reference runs; with that in the twin, 93 % (95 % interval 88 % to 97 %) of the gap closes on"
+            " runs held out.",
+        ),
+    ],
+)
+def test_the_verdict_is_one_sentence(pages: dict[str, Path], verdict: str, said: str) -> None:
+    assert verdict_of(pages[verdict].read_text()) == said
+
+
+@pytest.mark.parametrize("verdict", gap_cases.VERDICTS)
+def test_sections_stand_in_order(pages: dict[str, Path], verdict: str) -> None:
+    assert re.findall(r'<(?:section|header) id="(\w+)"', pages[verdict].read_text()) == ORDER
+
+
+@pytest.mark.parametrize(
+    ("verdict", "action"),
+    [
+        ("no_gap", "Keep the twin as it is"),
+        ("attributed", "Adopt the twin with the causes added"),
+        ("attributed", "Check the gear oil and temperature: joint_a3"),
+        ("ambiguous", "Measure what tells the rivals apart"),
+        ("ambiguous", "Model the effect: joint_a3"),
+        ("unexplained", "Look for an effect outside the catalogue"),
+    ],
+)
+def test_rules_say_what_to_do(pages: dict[str, Path], verdict: str, action: str) -> None:
+    assert action in pages[verdict].read_text()
+
+
+def test_nothing_is_drawn_of_nothing(pages: dict[str, Path]) -> None:
+    found = re.search(r'id="page-data">(.*?)</script>', pages["no_gap"].read_text())
+    assert found
+    assert set(json.loads(found[1])["figures"]) == {"heat_map"}
+
+
+def test_a_robot_without_diagnosis_is_an_error(tmp_path: Path) -> None:
+    with Workspace(tmp_path / "w") as workspace:
+        six_axis(workspace)
+        with pytest.raises(InputError, match="no diagnosis"):
+            render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, tmp_path / "p.html")
+
+
+def test_text_from_the_data_is_no_markup(tmp_path: Path) -> None:
+    said = gap_cases.diagnosis("attributed")
+    said["not_testable"] = [{"effect": "payload", "why": "<script>alert(1)</script>"}]
+    with Workspace(tmp_path / "w") as workspace:
+        six_axis(workspace)
+        record(workspace, rows.ROBOT, said, gap_cases.evidence("attributed"))
+        render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, tmp_path / "p.html")
+    assert "<script>alert" not in (tmp_path / "p.html").read_text()
+
+
+@pytest.mark.system
+@pytest.mark.skipif(not CHROMIUM, reason="no Chromium on this machine")
+def test_every_figure_is_drawn_without_network(pages: dict[str, Path]) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-quic"])
+        for verdict, file in pages.items():
+            page = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True).new_page()
+            complaints: list[str] = []
+            page.on("console", lambda message, into=complaints: into.append(message.text))
+            page.on("pageerror", lambda error, into=complaints: into.append(str(error)))
+            page.goto(file.as_uri())
+            page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
+            for plot in page.locator(".plot").all():
+                assert plot.locator(".plot-container").count() == 1
+            assert page.evaluate("document.documentElement.scrollWidth") == 1440
+            assert complaints == [], verdict
+        browser.close()
