@@ -204,7 +204,8 @@ class Case:
             weights=1 / sensors.torque_noise, interval=self.interval,
         )  # fmt: skip
         noisy_torque, noisy_power = self.noisy(seen, drawn)
-        self.floor = np.sqrt((self.basis.left(noisy_torque) ** 2).mean(axis=(0, 1)))
+        least = 0.2 * sensors.torque_noise  # of a joint that hardly moves
+        self.floor = np.maximum(np.sqrt((self.basis.left(noisy_torque) ** 2).mean(axis=(0, 1))), least)
         rest = low_pass(noisy_power - drawn, self.interval)
         self.power_floor = float(np.sqrt((rest**2).mean()))
 
@@ -217,7 +218,10 @@ class Case:
             more = more - more.mean()
             return float(np.sqrt((more[:, active] ** 2).mean())) / self.power_floor
         left = self.basis.left(seen - self.healthy[0])[:, active]
-        return float((np.sqrt((left**2).mean(axis=(0, 1))) / self.floor).max())
+        gap = float((np.sqrt((left**2).mean(axis=(0, 1))) / self.floor).max())
+        if not np.isfinite(gap):
+            raise RuntimeError("the robot shook itself apart")
+        return gap
 
     def calibrate(self, drawn: Draw, target: float) -> tuple[Effect, float]:
         """Find the strength that leaves `target` floors, by secants; return the effect and the gap it makes."""

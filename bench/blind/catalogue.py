@@ -90,7 +90,7 @@ class Draw:
     most: float
 
 
-def draw(name: str, machine: Machine, runs: np.ndarray, everywhere: bool, rng: np.random.Generator) -> Draw:
+def draw(name: str, machine: Machine, runs: np.ndarray, everywhere: bool, rng: np.random.Generator) -> Draw:  # noqa: C901
     """Draw joints and shape. `runs`: mask of those that may have it; `everywhere`: it changed since the reference."""
     n = len(machine.drawings.joints)
     fc, fv = machine.friction.coulomb, machine.friction.viscous

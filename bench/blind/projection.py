@@ -10,6 +10,7 @@ from plant.arm import Arm
 
 BAND = 10.0  # Hz, above it a twin's filter leaves little
 STRIDE = 4
+SLOW = 0.02  # rad/s
 
 
 def low_pass(signal: np.ndarray, interval: float) -> np.ndarray:
@@ -90,24 +91,30 @@ class Basis:
         interval: float,
     ) -> None:
         """`payload`: (R, 10) parameters told, `known`: (R,) mask of their runs, `weights`: (n,) 1 / noise."""
-        self.interval, self.weights, self.shape = interval, weights, q[::STRIDE].shape
-        n = q.shape[2]
-        q, dq, ddq = (low_pass(x, interval)[::STRIDE].reshape(-1, n) for x in (q, dq, ddq))
-        links = rigid_body(arm, q, dq, ddq)
-        told = np.tile(np.where(known[:, None], payload, 0), (self.shape[0], 1))
+        self.interval = interval
+        steps, runs, n = q.shape
+        moving = np.abs(low_pass(dq, interval)[::STRIDE]) > SLOW  # at rest friction may hold anything
+        self.weights = (moving * weights).reshape(-1, runs, n)
+        flat = [x.reshape(-1, n) for x in (q, dq, ddq)]
+        links = rigid_body(arm, *flat)
+        told = np.tile(np.where(known[:, None], payload, 0), (steps, 1))
         carried = np.einsum("rjc,rc->rj", links[:, :, -10:], told)[:, :, None]
-        own = np.zeros((len(q), n, 4 * n))
+        links = np.concatenate([links, carried], axis=2).reshape(steps, runs, n, -1)
+        links = low_pass(links, interval)[::STRIDE]
+        own = np.zeros((*links.shape[:3], 4 * n))
+        columns = np.stack([np.tanh(dq / 0.01), dq, np.ones_like(q), ddq], axis=-1)
+        columns = low_pass(columns, interval)[::STRIDE]
         for joint in range(n):
-            columns = (np.tanh(dq[:, joint] / 0.02), dq[:, joint], np.ones(len(q)), ddq[:, joint])
-            own[:, joint, 4 * joint : 4 * joint + 4] = np.stack(columns, axis=1)
-        matrix = np.concatenate([links, carried, own], axis=2) * weights[:, None]
-        matrix = matrix.reshape(len(q) * n, -1)
+            own[:, :, joint, 4 * joint : 4 * joint + 4] = columns[:, :, joint]
+        matrix = np.concatenate([links, own], axis=3) * self.weights[..., None]
+        matrix = matrix.reshape(-1, matrix.shape[-1])
         scale = np.linalg.norm(matrix, axis=0)
-        self.matrix = matrix[:, scale > 1e-9 * scale.max()] / scale[scale > 1e-9 * scale.max()]
+        seen = scale > 1e-9 * scale.max()
+        self.matrix = matrix[:, seen] / scale[seen]
         self.inverse = np.linalg.pinv(self.matrix.T @ self.matrix, rcond=1e-10, hermitian=True)
 
     def left(self, torque: np.ndarray) -> np.ndarray:
-        """Return the part of a torque (T, R, n) that the columns cannot imitate: (T / stride, R, n) N m."""
+        """Return the part of a torque (T, R, n) that the columns cannot imitate: (T / stride, R, n) N m, 0 at rest."""
         y = (low_pass(torque, self.interval)[::STRIDE] * self.weights).reshape(-1)
-        rest = y - self.matrix @ (self.inverse @ (self.matrix.T @ y))
-        return np.asarray(rest.reshape(self.shape) / self.weights)
+        rest = (y - self.matrix @ (self.inverse @ (self.matrix.T @ y))).reshape(self.weights.shape)
+        return np.divide(rest, self.weights, out=np.zeros_like(rest), where=self.weights > 0)

@@ -64,7 +64,7 @@ class Fleet:
         torque = torque[low] * (1 - share) + torque[high] * share
         return torque + self.machine.drawings.control.friction_forward * dq, inertia[low]
 
-    def run(self, effects: tuple[Effect, ...] = ()) -> Traces:
+    def run(self, effects: tuple[Effect, ...] = ()) -> Traces:  # noqa: C901 - one loop, every part of the cell in it
         """Simulate all runs with some effects. Raises RuntimeError where a robot cannot follow."""
         drive, control, friction = self.machine.drive, self.machine.drawings.control, self.machine.friction
         q_wanted, dq_wanted, _ = self.wanted
@@ -92,8 +92,8 @@ class Fleet:
         bristle_stiffness = coulomb / deflection
         bristle_damping = 0.4 * np.sqrt(bristle_stiffness * rotor)
         data = [arm.data for arm in arms]
-        for run, d in enumerate(data):
-            arms[run].place(q_wanted[0, run])
+        for arm, pose in zip(arms, q_wanted[0], strict=True):
+            arm.place(pose)
         q, dq, ddq = q_wanted[0].copy(), np.zeros((runs, n)), np.zeros((runs, n))
         motor_q, motor_dq = q.copy(), dq.copy()
         z, load, integral = np.zeros((runs, n)), np.zeros((runs, n)), np.zeros((runs, n))
