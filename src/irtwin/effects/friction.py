@@ -199,13 +199,12 @@ class TemperatureDependentFriction(JointEffect):
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
     ) -> tuple[Quantity, ...]:
         """Return k, relative to the joint's Fv; the shape's k where Fv is not known."""
-        return tuple(
-            quantity("k", joint.name, value, "1/K", deviation, lambda part, base=viscous: ratio(part, base))
-            if viscous
-            else Quantity("k", joint.name, self.k, "1/K")
-            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
-            for viscous in [(known or {}).get(("viscous_friction", joint.name, "Fv"))]
-        )
+        found = []
+        for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True):
+            viscous = (known or {}).get(("viscous_friction", joint.name, "Fv"))
+            part = (ratio(value, viscous), ratio(deviation, viscous)) if viscous else (self.k, None)
+            found.append(quantity("k", joint.name, part[0], "1/K", part[1]))
+        return tuple(found)
 
 
 @dataclass(frozen=True)

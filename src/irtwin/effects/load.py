@@ -89,7 +89,7 @@ class Payload(Effect):
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, n, 10)."""
-        return last_body_columns(robot, motion) @ to_body(flange_frame(robot).placement)
+        return np.asarray(last_body_columns(robot, motion) @ to_body(flange_frame(robot).placement))
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

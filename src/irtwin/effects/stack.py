@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Predicted, Term, catalogue
+from irtwin.effects.effect import Effect, JointEffect, Predicted, Term, catalogue
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -91,14 +91,18 @@ class Stack:
 
     @cached_property
     def pattern(self) -> np.ndarray:
-        """(n, K) whether the coefficient can act on the joint's torque, found at a few random states."""
+        """(n, K) whether the coefficient can act on the joint's torque: where not plain, found at random states."""
         rng = np.random.default_rng(0)
         shape = (16, len(self.robot.joints))
         q, dq, ddq = rng.uniform(-2, 2, (3, *shape))
         warm = np.full(shape, 50.0)
         probe = Motion("probe", np.arange(16.0), q, dq, ddq, temperature=warm)
+        predicted = Predicted(rng.uniform(-50, 50, shape))
         found = [
-            np.any(effect.columns(self.robot, probe, Predicted(np.ones(shape))) != 0, axis=0) for effect in self._torque
+            np.array([[term.joint == name for term in effect.terms(self.robot)] for name in self.robot.joint_names])
+            if isinstance(effect, JointEffect)
+            else np.any(effect.columns(self.robot, probe, predicted) != 0, axis=0)
+            for effect in self._torque
         ]
         return np.concatenate([np.zeros((shape[1], 0), dtype=bool), *found], axis=1)
 
@@ -194,7 +198,7 @@ class Stack:
         total = values + self.shift(motion)
         for effect, own in _slices(self._torque, self.robot):
             if effect.id == "rigid_body":
-                return total[own]
+                return np.asarray(total[own])
         return None
 
     def _torques(self, motion: Motion, values: np.ndarray | None) -> _Torques:

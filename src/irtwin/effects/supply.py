@@ -104,7 +104,7 @@ class NoRegeneration(Effect):
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, 1) what the axes give back together."""
         assert predicted is not None and predicted.axes is not None
-        return np.maximum(-predicted.axes, 0.0)[:, None]
+        return np.asarray(np.maximum(-predicted.axes, 0.0)[:, None])
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

@@ -53,7 +53,7 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
     stack = _visible(robot, effects, torque=bool(with_torque), power=bool(with_power))
     fit = _fit_torque(stack, with_torque) if with_torque else None
     if fit:
-        found = [(stack.torque_terms, fit.estimate)]
+        found: list[Found] = [(stack.torque_terms, fit.estimate)]
         found += _fit_power(stack, with_power, fit.estimate.values) if with_power else []
     else:
         found = _fit_through_power(stack, with_power)

@@ -1,0 +1,381 @@
+"""Each effect against data made by a formula of its own: found again, predicted, booked, saved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.interpolate import make_interp_spline
+
+from irtwin.effects import drive, friction, load, sensing, supply, transmission
+from irtwin.effects.effect import BASELINE, Effect, Predicted, catalogue
+from irtwin.effects.stack import Stack
+from irtwin.robot.urdf import parse_urdf
+from irtwin.twin.files import load as load_twin
+from irtwin.twin.files import save
+from irtwin.twin.identify import identify
+from synthetic import arm, rigid_torque, swing, truth, with_constants
+
+TRUE = truth(arm(3))
+ROBOT = with_constants(arm(3))
+# rotors as on their data sheet: torque alone does not tell a rotor's inertia from a link's
+ROBOT = replace(
+    ROBOT,
+    joints=tuple(
+        replace(joint, rotor_inertia=float(rotor)) for joint, rotor in zip(ROBOT.joints, TRUE["Ia"], strict=True)
+    ),
+)
+J2 = ("joint_2",)
+KT = 8.0
+
+
+@dataclass
+class State:
+    """What a healthy robot of the `truth` does, for a formula to build on."""
+
+    motion: object
+    rigid: np.ndarray
+    real: np.ndarray  # joint torque
+    shown: np.ndarray  # with the offset of its measurement
+    axes: np.ndarray  # W, mechanical and copper
+    power: np.ndarray  # W, with standby
+
+
+def healthy(motion):
+    rigid = rigid_torque(ROBOT, motion)
+    real = rigid + TRUE["Ia"] * motion.ddq + TRUE["Fc"] * np.sign(motion.dq) + TRUE["Fv"] * motion.dq
+    axes = (real * motion.dq + TRUE["R"] * (real / KT) ** 2).sum(axis=1)
+    return State(motion, rigid, real, real + TRUE["c"], axes, axes + TRUE["P0"])
+
+
+@dataclass
+class Case:
+    """`torque`, `reading`, `power`: what the effect does to real torque, its measurement, measured power.
+
+    `truth`: (parameter, joint) -> value; `off`: how far it may be found, relative; `rate` Hz, `seconds` of a run.
+    """
+
+    effect: Effect
+    truth: dict
+    torque: Callable | None = None
+    reading: Callable | None = None
+    power: Callable | None = None
+    off: float = 0.03
+    rate: float = 100.0
+    seconds: float = 15.0
+    noise: float = 0.02  # N m, W
+    rests_from: float | None = None  # s
+    visible: bool = True  # what is not, other coefficients imitate
+
+    def __str__(self):
+        return self.effect.id
+
+
+def only(column, joint=1):
+    """A joint's torque among those of all."""
+    all_joints = np.zeros((len(column), 3))
+    all_joints[:, joint] = column
+    return all_joints
+
+
+def sign(state, joint=1):
+    return np.sign(state.motion.dq[:, joint])
+
+
+def dahl(state, d=0.05, fc=TRUE["Fc"][1]):
+    """The bristle's law by small steps of the way."""
+    q, z, found = state.motion.q[:, 1], None, []
+    for before, after in zip(np.append(q[0], q[:-1]), q, strict=True):
+        way = after - before
+        z = np.sign(state.motion.dq[0, 1]) if z is None else z
+        for _ in range(100):
+            z += way / 100 * (1 - np.sign(way) * z) / d
+        found.append(z)
+    return only(fc * (np.array(found) - sign(state)))
+
+
+def gap(state, b=3e-3):
+    """The load's torque while a motor crosses a gap, as a machine of two states."""
+    lost, crossed, side = np.zeros(len(state.motion.time)), np.inf, np.sign(state.rigid[0, 1])
+    for row, (q, torque) in enumerate(zip(state.motion.q[:, 1], state.rigid[:, 1], strict=True)):
+        if np.sign(torque) != side:
+            side, crossed = np.sign(torque), q
+        if abs(q - crossed) < b:
+            lost[row] = torque
+    return only(-lost)
+
+
+def tilted(state, x=0.05, y=-0.03):
+    model = ROBOT.model.copy()
+    turn = pin.rpy.rpyToMatrix(x, y, 0.0)
+    model.gravity.linear = turn @ model.gravity.linear
+    data = model.createData()
+    states = zip(state.motion.q, state.motion.dq, state.motion.ddq, strict=True)
+    return np.array([pin.rnea(model, data, *each) for each in states]) - state.rigid
+
+
+def ball(state):
+    """A ball of 2 kg in the URDF, in the second run only."""
+    if state.motion.run != "swing_1":
+        return np.zeros_like(state.rigid)
+    inner = '<inertial><origin xyz="0.05 -0.02 0.1"/><mass value="2"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" '
+    urdf = ROBOT.urdf.replace('<link name="flange"/>', f'<link name="flange">{inner}izz="0"/></inertial></link>')
+    return rigid_torque(parse_urdf(urdf), state.motion) - state.rigid
+
+
+def push(state, force=(30.0, -20.0, 40.0)):
+    """A force at the flange from second 4 to 9, through the slope of the flange's place."""
+    from irtwin.robot.kinematics import flange_position
+
+    q, step = state.motion.q, 1e-6
+    slopes = [
+        (flange_position(ROBOT, q + step * e) - flange_position(ROBOT, q - step * e)) / (2 * step) for e in np.eye(3)
+    ]
+    during = (state.motion.time >= 4) & (state.motion.time <= 9) & (state.motion.run == "swing_1")
+    return np.column_stack([slope @ np.array(force) for slope in slopes]) * during[:, None]
+
+
+def shifted(state, e=0.02):
+    """The torque at a position that is read e too small."""
+    moved = state.motion.q + e * np.eye(3)[1]
+    return rigid_torque(ROBOT, replace(state.motion, q=moved)) - state.rigid
+
+
+def late(state, d=0.02):
+    spline = make_interp_spline(state.motion.time, state.shown[:, 1], k=3)
+    return only(spline(np.maximum(state.motion.time - d, 0.0)) - state.shown[:, 1])
+
+
+def stored(state, store=30.0):
+    """Grid power with a store between mains and axes, by the energy in it."""
+    dt, energy, found = state.motion.time[1] - state.motion.time[0], 0.0, []
+    for watts in state.axes:
+        after = np.clip(energy - watts * dt, 0.0, store)
+        found.append(watts + (after - energy) / dt)
+        energy = after
+    return np.array(found) - state.axes
+
+
+def lagged(state, constant=0.2):
+    dt, shown, found = state.motion.time[1] - state.motion.time[0], state.power[0], []
+    for watts in state.power:
+        shown += (watts - shown) * (1 - np.exp(-dt / constant))
+        found.append(shown)
+    return np.array(found) - state.power
+
+
+def warm(motion):
+    return np.linspace(20, 55, len(motion.time))[:, None] * np.ones(3)
+
+
+CASES = [
+    Case(
+        friction.StribeckFriction(vs=0.08, joints=J2),
+        {("Fs", "joint_2"): 4.0, ("vs", "joint_2"): 0.08, ("d", "joint_2"): 1.0},
+        lambda s: only(4 * sign(s) * np.exp(-np.abs(s.motion.dq[:, 1]) / 0.08)),
+    ),
+    Case(
+        friction.NonlinearViscousFriction(d=2.0, joints=J2),
+        {("k", "joint_2"): -1.5, ("d", "joint_2"): 2.0},
+        lambda s: only(-1.5 * s.motion.dq[:, 1] * np.abs(s.motion.dq[:, 1])),
+    ),
+    Case(
+        friction.AsymmetricFriction(joints=J2),
+        {("b", "joint_2"): -0.8},
+        lambda s: only(1.2 - 0.8 * np.abs(s.motion.dq[:, 1])),
+        off=0.1,
+    ),
+    Case(
+        friction.LoadDependentFriction(joints=J2),
+        {("mu", "joint_2"): 0.1, ("mu_back", "joint_2"): 0.2},
+        lambda s: only(np.where(s.real[:, 1] * sign(s) > 0, 0.1, 0.2) * np.abs(s.real[:, 1]) * sign(s)),
+        off=0.06,
+    ),
+    Case(
+        friction.TemperatureDependentFriction(k=0.02, joints=J2),
+        {("k", "joint_2"): 0.02},
+        lambda s: only(TRUE["Fv"][1] * s.motion.dq[:, 1] * (np.exp(-0.02 * (warm(s.motion)[:, 1] - 25)) - 1)),
+    ),
+    Case(friction.PreslidingHysteresis(d=0.05, joints=J2), {("d", "joint_2"): 0.05}, dahl),
+    Case(
+        transmission.Backlash(b=3e-3, joints=J2),
+        {("b", "joint_2"): 3e-3},
+        gap,
+        rate=1000.0,
+        seconds=8.0,
+        off=0.1,
+        noise=1e-3,
+    ),
+    Case(
+        transmission.JointElasticity(joints=J2),
+        {("K", "joint_2"): 1500.0},
+        lambda s: only(TRUE["Ia"][1] / 1500 * np.gradient(np.gradient(s.rigid[:, 1], 0.005), 0.005)),
+        rate=200.0,
+        off=0.1,
+        noise=1e-3,
+    ),
+    Case(
+        transmission.TorqueRipple(N=50.0, joints=J2),
+        {("A", "joint_2"): 1.7, ("N", "joint_2"): 50.0},
+        lambda s: only(1.7 * np.sin(50 * s.motion.q[:, 1] + 0.6)),
+    ),
+    Case(
+        friction.PositionDependentFriction(joints=J2),
+        {("a", "joint_2"): 0.2, ("b", "joint_2"): -0.1},
+        lambda s: only(TRUE["Fc"][1] * (0.2 * np.cos(s.motion.q[:, 1]) - 0.1 * np.sin(s.motion.q[:, 1])) * sign(s)),
+        off=0.1,
+    ),
+    Case(
+        transmission.JointCoupling(joints=("joint_2", "joint_3")),
+        {("Fv", "joint_3"): 1.1, ("Fc", "joint_3"): 0.7},
+        lambda s: np.column_stack(
+            [
+                np.zeros(len(s.rigid)),
+                *(1.1 * s.motion.dq[:, k] + 0.7 * np.sign(s.motion.dq[:, 1] + s.motion.dq[:, 2]) for k in (2, 1)),
+            ]
+        ),
+    ),
+    Case(load.CableDrag(joints=J2), {("k", "joint_2"): 6.0}, lambda s: only(6 * s.motion.q[:, 1]), off=0.1),
+    # a spring without length of its own: of one order, which gravity itself imitates
+    Case(load.GravityCompensation(joints=J2), {}, lambda s: only(-80 * np.sin(2 * s.motion.q[:, 1] - 0.4))),
+    Case(load.Payload(runs=("swing_1",)), {("m", None): 2.0, ("c_x", None): 0.05, ("c_z", None): 0.1}, ball, off=0.05),
+    Case(load.BaseTilt(), {("angle_x", None): 0.05, ("angle_y", None): -0.03}, tilted, off=0.1),
+    Case(
+        load.ExternalContact(start=4.0, stop=9.0, runs=("swing_1",)),
+        {("f_x", None): 30.0, ("f_y", None): -20.0, ("f_z", None): 40.0, ("f", None): 2900**0.5},
+        push,
+    ),
+    Case(
+        sensing.TorqueConstantError(joints=J2),
+        {("g", "joint_2"): 1.15},
+        reading=lambda s: only(0.15 * s.real[:, 1]),
+        off=0.05,
+    ),
+    Case(sensing.TorqueDrift(joints=J2), {("r", "joint_2"): 0.08}, reading=lambda s: only(0.08 * s.motion.time)),
+    Case(sensing.EncoderOffset(joints=J2), {}, reading=shifted, visible=False),  # a plane arm carries its zero along
+    Case(sensing.TimeDelay(d=0.02, joints=J2), {("d", "joint_2"): 0.02}, reading=late, off=0.1),
+    Case(
+        drive.WindingTemperature(),
+        {("T", "joint_2"): 30.0},
+        power=lambda s: (TRUE["R"] * 0.0039 * (warm(s.motion) - 25) * (s.real / KT) ** 2).sum(axis=1),
+        off=0.1,
+    ),
+    Case(
+        drive.IronLoss(joints=J2),
+        {("k1", "joint_2"): 9.0, ("k2", "joint_2"): 4.0},
+        power=lambda s: 9 * np.abs(s.motion.dq[:, 1]) + 4 * s.motion.dq[:, 1] ** 2,
+        off=0.1,
+    ),
+    Case(
+        drive.InverterLoss(joints=J2),
+        {("V0", "joint_2"): 3.0},
+        power=lambda s: 3 * np.abs(s.real[:, 1]) / KT,
+        off=0.1,
+    ),
+    Case(supply.NoRegeneration(), {("returned", None): 0.0}, power=lambda s: np.maximum(s.axes, 0) - s.axes),
+    Case(supply.BusCapacitor(E=30.0), {("E", None): 30.0}, power=stored),
+    Case(
+        supply.HoldingBrakes(delay=0.5),
+        {("Pb", None): 40.0},
+        power=lambda s: np.where(s.motion.time - 10 <= 0.5, 40.0, 0.0),
+        rests_from=10.0,
+    ),
+    Case(sensing.MeterLag(T=0.2), {("T", None): 0.2}, power=lagged),
+    Case(sensing.MeterGain(), {("g", None): 1.2}, power=lambda s: 0.2 * s.power, off=0.02),
+]
+
+
+def measured(case, seed):
+    motion = swing(ROBOT, seed, seconds=case.seconds, rate=case.rate)
+    if stop := case.rests_from:  # the arm rests from then on
+        rest = motion.time > stop
+        still = {name: np.where(rest[:, None], 0.0, getattr(motion, name)) for name in ("dq", "ddq")}
+        motion = replace(motion, q=np.where(rest[:, None], motion.q[np.argmax(rest)], motion.q), **still)
+    motion = replace(motion, temperature=warm(motion))
+    state = healthy(motion)
+    rng = np.random.default_rng(seed)
+    shown = state.shown + case.noise * rng.standard_normal(state.shown.shape)
+    if case.reading:
+        shown = shown + case.reading(state)
+    power = state.power
+    if case.torque:
+        added = case.torque(state)
+        whole = state.real + added
+        shown = shown + added
+        power = TRUE["P0"] + (whole * motion.dq + TRUE["R"] * (whole / KT) ** 2).sum(axis=1)
+    if case.power:
+        power = power + case.power(state)
+    return replace(motion, torque=shown, power=power + case.noise * rng.standard_normal(len(power)))
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_truth_is_found_predicted_booked_and_saved(case, tmp_path):
+    motions = [measured(case, seed) for seed in range(2)]
+    twin = identify(ROBOT, motions, (*BASELINE, "copper_loss", case.effect))
+    found = {(p.name, p.joint): p.value for p in (*twin.parameters, *twin.quantities) if p.effect == case.effect.id}
+    for key, value in case.truth.items():
+        assert found[key] == pytest.approx(value, rel=case.off, abs=0.02 if value == 0 else None), key
+    without = identify(ROBOT, motions, (*BASELINE, "copper_loss"))
+    again = measured(case, 1 if case.effect.runs else 7)
+
+    def errors(judged):
+        moving = np.all(np.abs(again.dq) > 1e-2, axis=1)
+        torque = np.sqrt(np.mean((judged.torque(again) - again.torque)[moving] ** 2))
+        return torque, np.sqrt(np.mean((judged.power(again) - again.power) ** 2))
+
+    which = int(case.effect.signal == "power")
+    assert errors(twin)[which] < (0.6 * errors(without)[which] if case.visible else 1.2 * case.noise)
+    assert sum(entry.energy for entry in twin.ledger(again)) == pytest.approx(twin.energy(again), rel=1e-9)
+    save(twin, tmp_path / "twin.json")
+    loaded = load_twin(tmp_path / "twin.json")
+    assert loaded.effects == twin.effects and loaded.quantities == twin.quantities
+    np.testing.assert_array_equal(loaded.torque(again), twin.torque(again))
+    np.testing.assert_array_equal(loaded.power(again), twin.power(again))
+
+
+def test_an_encoders_offset_shifts_torque_as_inverse_dynamics_says():
+    motion = swing(ROBOT, 2, seconds=3)
+    state = healthy(motion)
+    column = sensing.EncoderOffset(joints=J2).columns(ROBOT, motion)[:, :, 0]
+    np.testing.assert_allclose(column * 1e-4, shifted(state, 1e-4), atol=1e-5)
+
+
+def test_every_effect_beyond_the_baseline_has_a_case():
+    assert {case.effect.id for case in CASES} == catalogue().keys() - {*BASELINE, "copper_loss"}
+
+
+@pytest.mark.parametrize("effect", catalogue().values(), ids=lambda effect: effect.id)
+def test_columns_are_one_per_term_and_blind_to_other_joints(effect):
+    motion = replace(swing(ROBOT, 3, seconds=3), temperature=None)
+    motion = replace(motion, temperature=warm(motion))
+    rng = np.random.default_rng(0)
+    predicted = Predicted(rng.normal(size=motion.q.shape), rng.normal(size=300), rng.normal(size=300))
+    everywhere = effect.columns(ROBOT, motion, predicted)
+    shape = (300,) if effect.signal == "power" else (300, 3)
+    assert everywhere.shape == (*shape, len(effect.terms(ROBOT)))
+    if effect.terms(ROBOT)[0].joint and effect.id not in ("rigid_body", "joint_coupling"):
+        own = effect.on("joint_2")
+        assert {term.joint for term in own.terms(ROBOT)} == {"joint_2"}
+        chosen = [term.joint == "joint_2" for term in effect.terms(ROBOT)]
+        np.testing.assert_array_equal(own.columns(ROBOT, motion, predicted), everywhere[..., chosen])
+    for candidate in effect.candidates(ROBOT):
+        assert np.all(np.isfinite(candidate.columns(ROBOT, motion, predicted)))
+        assert type(candidate) is type(effect)
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case.effect.memory], ids=str)
+def test_memory_reaches_over_the_pieces_of_a_run(case):
+    stack = Stack(ROBOT, (*BASELINE, "copper_loss", case.effect))
+    motion = measured(case, 1)
+    torque, power = (
+        np.array([term.expected + 0.1 for _, term in terms]) for terms in (stack.torque_terms, stack.power_terms)
+    )
+    for columns in (
+        lambda part: stack.torque_columns(part, torque),
+        lambda part: stack.predicted_power_columns(part, torque, power),
+    ):
+        pieces = np.concatenate([columns(piece) for piece in motion.pieces(217)])
+        np.testing.assert_allclose(pieces, columns(motion), atol=1e-9)
