@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 
@@ -79,10 +80,13 @@ def _runs(twin_id: str, keys: dict[str, str], parts: Split) -> Iterator[schema.T
 
 
 def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[schema.Parameter]:
-    for parameter in twin.parameters:
+    seen: Counter[str] = Counter()  # an effect of two shapes in one joint has two parameters of a name
+    for parameter in twin.stated:
         place = parameter.joint or parameter.link or "robot"
+        key = f"{twin_id}.{parameter.effect}.{place}.{parameter.name}"
+        seen[key] += 1
         yield schema.Parameter(
-            parameter_id=f"{twin_id}.{parameter.effect}.{place}.{parameter.name}",
+            parameter_id=key if seen[key] == 1 else f"{key}.{seen[key]}",
             twin_id=twin_id,
             robot_id=robot_id,
             effect=parameter.effect,

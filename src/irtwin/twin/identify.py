@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE, Effect, Term
+from irtwin.effects.effect import BASELINE, Effect, JointEffect, Term
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
@@ -37,7 +37,8 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
       these the torque.
     - Where power alone was measured, the coefficients of torque are found through the power that torque carries.
 
-    Effects are ids, with the catalogue's shape, or effects of a shape. Those that nothing measured can show are
+    Effects are ids, for which the data choose among the candidates of shape (joint by joint), or effects of a shape.
+    Those that nothing measured can show are
     listed as `unidentified`, and left out. Where columns depend on what other effects predict, fit and prediction are
     repeated until they agree. Raises InputError where there is nothing to fit.
     """
@@ -51,10 +52,16 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
     if not with_torque and not with_power:
         raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
     stack = _visible(robot, effects, torque=bool(with_torque), power=bool(with_power))
-    fit = _fit_torque(stack, with_torque) if with_torque else None
-    if fit:
+    open_shapes = {effect for effect in effects if isinstance(effect, str)}
+    fit = None
+    if with_torque:
+        stack = _shaped(stack, open_shapes, "torque", lambda trial: _solve_torque(trial, with_torque)[1])
+        fit = _fit_torque(stack, with_torque)
+        torque_values = fit.estimate.values
         found: list[Found] = [(stack.torque_terms, fit.estimate)]
-        found += _fit_power(stack, with_power, fit.estimate.values) if with_power else []
+        if with_power and not stack.fixed.all():
+            stack = _shaped(stack, open_shapes, "power", lambda trial: _fit_power(trial, with_power, torque_values)[1])
+            found.append(_fit_power(stack, with_power, torque_values))
     else:
         found = _fit_through_power(stack, with_power)
     if constants:
@@ -106,7 +113,40 @@ def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot
     return replace(robot, joints=joints), known, found
 
 
+def _shaped(stack: Stack, open_shapes: set[str], signal: str, fit: Callable[[Stack], Estimate]) -> Stack:
+    """Give each effect of the signal, whose shape is open, the one that leaves least of what was measured."""
+    effects = list(stack.effects)
+    for effect in stack.effects:
+        shapes = effect.candidates(stack.robot)
+        if effect.id not in open_shapes or effect.signal != signal or len(shapes) < 2:
+            continue
+        place = effects.index(effect)
+        before, after = effects[:place], effects[place + 1 :]
+        noise = np.array([fit(Stack(stack.robot, [*before, shape, *after])).noise for shape in shapes])
+        effects = [*before, *_best(shapes, noise, stack.robot), *after]
+    return Stack(stack.robot, effects)
+
+
+def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Effect]:
+    """Return the best of shapes by what each leaves in g equations, (shapes, g): joint by joint where it acts so."""
+    if not isinstance(shapes[0], JointEffect) or noise.shape[1] != len(robot.joints):
+        return [shapes[int(np.argmin(np.log(noise).sum(axis=1)))]]
+    chosen: dict[int, list[str]] = {}
+    for joint, best in zip(robot.joint_names, np.argmin(noise, axis=0).tolist(), strict=True):
+        chosen.setdefault(best, []).append(joint)
+    if len(chosen) == 1:
+        return [shapes[next(iter(chosen))]]
+    return [shapes[best].on(*joints) for best, joints in chosen.items()]
+
+
 def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
+    blocks, found = _solve_torque(stack, motions)
+    base = base_parameters(stack)
+    factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
+    return _TorqueFit(found, _base(base, found), condition_number(np.concatenate(factors)[:, :-1], base))
+
+
+def _solve_torque(stack: Stack, motions: Sequence[Motion]) -> tuple[list[Block], Estimate]:
     terms = [term for _, term in stack.torque_terms]
 
     def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
@@ -119,9 +159,7 @@ def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
         blocks, found = fit(before)
         if _settled(found.values, before, terms):
             break
-    base = base_parameters(stack)
-    factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
-    return _TorqueFit(found, _base(base, found), condition_number(np.concatenate(factors)[:, :-1], base))
+    return blocks, found
 
 
 def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
@@ -148,11 +186,9 @@ def _settled(values: np.ndarray, before: np.ndarray, terms: Sequence[Term]) -> b
     return bool(np.all(np.abs(values - before) < _CONVERGED * np.array([term.spread for term in terms])))
 
 
-def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> list[Found]:
+def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Found:
     """Fit the coefficients of power on top of the torque that was found."""
     free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
-    if not free:
-        return []
 
     def fit(values: np.ndarray) -> Estimate:
         def equations(motion: Motion) -> Rows:
@@ -172,7 +208,7 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
         found = fit(values)
         if _settled(found.values, before, [term for _, term in free]):
             break
-    return [(free, found)]
+    return free, found
 
 
 def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Found]:

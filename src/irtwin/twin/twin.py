@@ -79,6 +79,12 @@ class Twin:
         """The effects' regressors."""
         return Stack(self.robot, self.effects)
 
+    @property
+    def stated(self) -> tuple[Parameter, ...]:
+        """The parameters in the catalogue's terms: quantities where an effect has them, else its coefficients."""
+        told = {quantity.effect for quantity in self.quantities}
+        return (*(parameter for parameter in self.parameters if parameter.effect not in told), *self.quantities)
+
     def torque(self, motion: Motion) -> np.ndarray:
         """Return the torque that a measurement would show, (N, n) N m: real torque and what the sensing adds."""
         values = self._torque_values + self.stack.shift(motion)
