@@ -8,10 +8,10 @@ import re
 import shutil
 from pathlib import Path
 
-import gap_cases
 import pytest
-import rows
 
+import gap_cases
+import rows
 from irtwin.errors import InputError
 from irtwin.knowledge import shacl_rules
 from irtwin.knowledge.graph import KnowledgeGraph
@@ -70,14 +70,14 @@ def verdict_of(page: str) -> str:
         ("no_gap", "The twin explains the data down to their noise floor: there is no gap to close."),
         (
             "ambiguous",
-            "There is a gap in the torque of joint_a3, foremost in the regime “low speed”, and these data do not tell its"
-            " causes apart: Stribeck friction on joint_a3 or nonlinear viscous friction on joint_a3 would explain it"
-            " equally well.",
+            "There is a gap in the torque of joint_a3, foremost in the regime “low speed”, and these data do not tell"
+            " its causes apart: Stribeck friction on joint_a3 or nonlinear viscous friction on joint_a3 would explain"
+            " it equally well.",
         ),
         (
             "unexplained",
-            "There is a gap in the torque of joint_a3, foremost in the regime “low speed”, and no effect of the catalogue"
-            " closes it.",
+            "There is a gap in the torque of joint_a3, foremost in the regime “low speed”, and no effect of the"
+            " catalogue closes it.",
         ),
         (
             "attributed",

@@ -12,7 +12,7 @@ from irtwin.report.questions import Answers
 Evidence = Mapping[str, Any]
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
-_SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#A63603"]]
+_SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
 _BANDED = 0.25
 
 
@@ -20,7 +20,7 @@ def figures(answers: Answers, evidence: Evidence) -> dict[str, Figure]:
     """Return every figure that there is evidence for, by name."""
     drawn = {"heat_map": heat_map(evidence.get("heat_map") or {})}
     for place, curve in enumerate(evidence.get("follows") or []):
-        drawn[f"follows_{place}"] = follows(curve)
+        drawn[f"follows_{place}"] = follows(curve, effect_names(answers))
     for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
         if name == "runs_power" or joint is not None:
             drawn[name] = runs(evidence.get("runs") or [], joint)
@@ -54,7 +54,12 @@ def heat_map(given: Evidence) -> Figure | None:
     return {"data": [cells], "layout": {**axes, "hovermode": "closest", "margin": {"l": 80, "r": 12, "t": 40, "b": 12}}}
 
 
-def follows(curve: Evidence) -> Figure:
+def effect_names(answers: Answers) -> dict[str, str]:
+    """Return what the ontology calls the effects that are causes, by their ids."""
+    return {wording.local_name(row["effect"]): row["label"] for row in answers["causes"].rows if row["label"]}
+
+
+def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
     """Draw the residual against the variable that it follows, and the effect's curve on it."""
     unit = "W" if curve.get("channel") == "power" else "N m"
     x, data = list(curve["x"]), []
@@ -79,10 +84,11 @@ def follows(curve: Evidence) -> Figure:
             "y": list(curve["residual"]),
             "marker": {"color": MEASURED, "size": 5},
             "hovertemplate": f"residual {left}",
-        }  # fmt: skip
+        }
     )
     if curve.get("fitted"):
-        name = plain((curve.get("effect") or "fitted curve").replace("_", " "))
+        effect = curve.get("effect") or "fitted_curve"
+        name = plain(names.get(effect, effect.replace("_", " ")))
         line = {"color": PALETTE[5], "width": 2.5}
         data.append(
             {
@@ -93,7 +99,7 @@ def follows(curve: Evidence) -> Figure:
                 "y": list(curve["fitted"]),
                 "line": line,
                 "hovertemplate": f"{name} {left}",
-            }  # fmt: skip
+            }
         )
     variable = curve["variable"].replace("_", " ")
     unit_of_x = wording.unit_symbol(curve.get("unit"))
@@ -127,7 +133,7 @@ def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
                 "y": [row.get("floor") for row in rows],
                 "marker": marker,
                 "hovertemplate": f"noise floor %{{y:.3~g}} {unit}<extra></extra>",
-            }  # fmt: skip
+            }
         )
     yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis}}

@@ -1,0 +1,141 @@
+"""A diagnosis kept and its twin adopted, on a small arm whose truth is known."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import select
+
+from irtwin.errors import InputError
+from irtwin.providers import energy, identification
+from irtwin.providers.gap import adopt, record
+from irtwin.providers.records import ingest, robot_iri, run_iri
+from irtwin.signals.conditioning import condition
+from irtwin.signals.log import DataSet
+from irtwin.storage import gap_schema, schema
+from irtwin.storage.database import Workspace
+from irtwin.twin.files import to_json
+from irtwin.twin.identify import identify
+from synthetic import arm, as_run, measure, swing, with_constants
+
+ROBOT = "arm_2"
+BARE = ("rigid_body", "viscous_friction")
+FULL = (*BARE, "coulomb_friction")
+
+
+def diagnosis(**changes: Any) -> dict[str, Any]:
+    cause = {
+        "effect": "coulomb_friction",
+        "joints": ["joint_1", "joint_2"],
+        "scope": "missing",
+        "confidence": 0.97,
+        "parameters": [{"name": "Fc", "joint": "joint_1", "value": 6.0, "unit": "Nm", "interval95": [5.9, 6.1]}],
+        "indistinguishable_from": ["stribeck_friction"],
+    }
+    said = {
+        "verdict": "attributed",
+        "robot": ROBOT,
+        "gap": {"torque": {"joint_1": {"rmse": 3.0, "noise_floor": None, "excess": None}}},
+        "locations": [{"channel": "torque", "joint": "joint_1", "share": 0.8, "runs": ["swing_3"]}],
+        "causes": [cause],
+        "not_testable": [{"effect": "payload", "why": "one payload only"}, {"effect": "payload", "why": "too short"}],
+        "shrink": {"held_out_runs": ["swing_3"], "closed_fraction": {"value": 0.9, "interval95": [0.8, 1.0]}},
+    }
+    return said | changes
+
+
+@pytest.fixture
+def workspace(tmp_path: Path):
+    """Three runs, with a twin that lacks friction and the energy of a run by it."""
+    robot = with_constants(arm(2))
+    runs = tuple(as_run(measure(robot, swing(robot, seed, seconds=6.0), noise=0.05)) for seed in (1, 2, 3))
+    with Workspace(tmp_path / "workspace") as opened:
+        ingest(opened, DataSet(Path(), robot, runs, BARE, None, "mains", True, {}))
+        keep(opened, "identification", robot_iri(ROBOT), identification.provide(opened, ROBOT))
+        keep(opened, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(opened, f"{ROBOT}.swing_1"))
+        opened.better = to_json(identify(robot, [condition(run, robot, 10.0) for run in runs[:2]], FULL))
+        yield opened
+
+
+def keep(workspace: Workspace, provider: str, subject: str, made: Any) -> None:
+    now = datetime.now(UTC)
+    activity = schema.Activity(
+        activity_id=f"{provider}.1",
+        robot_id=ROBOT,
+        provider=provider,
+        subject=subject,
+        started=now,
+        ended=now,
+        software="x",
+    )
+    workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
+
+
+def count(workspace: Workspace, table: Any) -> int:
+    with workspace.reading() as session:
+        return len(session.execute(select(table)).all())
+
+
+def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
+    first = record(workspace, ROBOT, diagnosis(), {"runs": []}, workspace.better)
+    second = record(workspace, ROBOT, diagnosis(verdict="ambiguous"), {"runs": []}, workspace.better)
+    assert first.diagnosis_id != second.diagnosis_id
+    assert {file.name for file in (workspace.folder / "diagnoses").iterdir()} == {
+        f"{second.diagnosis_id}{kind}.json" for kind in ("", ".evidence", ".twin")
+    }
+    assert workspace.read_document(second.evidence_file, second.evidence_sha256) == b'{"runs": []}'
+    assert count(workspace, gap_schema.GapNotTestable) == 2
+    assert count(workspace, schema.Twin) == count(workspace, schema.RunEnergy) == 1
+
+
+def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
+    found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    twin_id = adopt(workspace, ROBOT)
+    with workspace.reading() as session:
+        twin = session.scalars(select(schema.Twin)).one()
+        assert twin.twin_id == twin_id
+        assert (workspace.folder / twin.file).read_text() == workspace.better
+        assert set(session.scalars(select(schema.TwinEffect.effect))) == set(FULL)
+        parts = {row.run_id: row.part for row in session.scalars(select(schema.TwinRun))}
+        assert parts == {f"{ROBOT}.swing_{k}": part for k, part in ((1, "fit"), (2, "fit"), (3, "held_out"))}
+        used = session.scalars(
+            select(schema.ActivityUse.entity).where(schema.ActivityUse.activity_id == twin.activity_id)
+        )
+        assert f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}" in set(used)
+        assert session.scalars(select(schema.TorqueFit.r_squared)).all()
+    assert count(workspace, schema.RunEnergy) == 0
+    assert count(workspace, gap_schema.GapDiagnosis) == 1
+    keep(workspace, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))
+    assert count(workspace, schema.RunEnergy) == 1
+    assert adopt(workspace, ROBOT) == twin_id
+
+
+def test_nothing_to_adopt_is_an_error(workspace: Workspace) -> None:
+    with pytest.raises(InputError, match="no diagnosis"):
+        adopt(workspace, ROBOT)
+    record(workspace, ROBOT, diagnosis(verdict="unexplained", causes=[]), {})
+    with pytest.raises(InputError, match="added nothing to the twin"):
+        adopt(workspace, ROBOT)
+
+
+def test_what_the_workspace_lacks_is_named(workspace: Workspace) -> None:
+    with pytest.raises(InputError, match="no robot other here"):
+        record(workspace, "other", diagnosis(), {})
+    with pytest.raises(InputError, match='run "swing_9"'):
+        record(workspace, ROBOT, diagnosis(shrink={"held_out_runs": ["swing_9"]}), {})
+    with pytest.raises(InputError, match="no joint joint_9"):
+        record(workspace, ROBOT, diagnosis(gap={"torque": {"joint_9": {"rmse": 1.0}}}), {})
+    assert count(workspace, gap_schema.GapDiagnosis) == 0
+
+
+def test_a_changed_document_is_told(workspace: Workspace) -> None:
+    found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    (workspace.folder / found.twin_file).write_text("{}")
+    with pytest.raises(InputError, match="changed since it was written"):
+        adopt(workspace, ROBOT)
+    (workspace.folder / found.twin_file).unlink()
+    with pytest.raises(InputError, match="cannot be read"):
+        adopt(workspace, ROBOT)
