@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from irtwin.gap.confidence import confidence
 from irtwin.gap.experiment import next_experiment
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
-from irtwin.gap.locate import Location, heat_map, locate
+from irtwin.gap.locate import Location, curves, heat_map, locate, locate_power
 from irtwin.gap.shrink import HeldOut, closed_fraction, held_out, pooled_interval
 from irtwin.gap.system import System
 from irtwin.gap.visibility import Untestable, untestable
@@ -27,6 +27,8 @@ from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
+from irtwin.twin.identify import identify
+from irtwin.twin.twin import Twin
 
 Progress = Callable[[str], None]
 PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -60,6 +62,32 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class EnergyErrors:
+    """Energy error of each observed group when it was left out of the fit, %: (G,) before and after."""
+
+    before: np.ndarray
+    after: np.ndarray
+
+    @property
+    def mean(self) -> tuple[float, float]:
+        """Over groups, before and after."""
+        return float(self.before.mean()), float(self.after.mean())
+
+    def to_json(self, seed: int) -> dict[str, Any]:
+        """Return the change in the form of the schema."""
+        generator = np.random.default_rng(seed)
+        drawn = [generator.choice(self.after, len(self.after)).mean() for _ in range(1000)]
+        low, high = np.quantile(drawn, [0.025, 0.975])
+        before, after = self.mean
+        return {
+            "before": before,
+            "after": after,
+            "noise_floor": None,
+            "interval95_after": [float(low), float(high)],
+        }
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """The diagnosis; `to_json` has the form of `diagnosis.schema.json`; `evidence` holds what a page draws."""
 
@@ -73,6 +101,8 @@ class Diagnosis:
     seed: int = 0
     experiment: dict[str, Any] | None = None
     evidence: dict[str, Any] = field(default_factory=dict)
+    twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
+    energies: EnergyErrors | None = None
 
     @property
     def causes(self) -> tuple[tuple[Channel, Cause], ...]:
@@ -94,7 +124,7 @@ class Diagnosis:
         }
 
     def _gap(self) -> dict[str, Any]:
-        gap: dict[str, Any] = {"energy_error_percent": None}
+        gap: dict[str, Any] = {"energy_error_percent": self.energies.mean[0] if self.energies else None}
         for channel in self.channels:
             numbers = [
                 {
@@ -151,6 +181,8 @@ class Diagnosis:
             if floor is not None and channel.attribution.causes:
                 parts.append((judged, floor))
             shrink["by_cause"] += [_by_cause(channel, cause) for cause in channel.attribution.causes]
+        if self.energies:
+            shrink["energy_error_percent"] = self.energies.to_json(self.seed)
         closed = closed_fraction(parts, self.seed) if parts else None
         if closed:
             shrink["closed_fraction"] = {"value": closed[0], "interval95": closed[1]}
@@ -175,6 +207,7 @@ def diagnose(
     tell(f"Filtering {len(data_set.runs)} runs")
     cutoff = choose_cutoff(data_set.runs)
     motions = {run.name: condition(run, data_set.robot, cutoff) for run in data_set.runs}
+    given = dict(motions)
     data_set, motions = _torque_from_current(data_set, motions)
     _check(data_set, motions)
     robot = data_set.robot
@@ -184,6 +217,7 @@ def diagnose(
     stack = Stack(robot, effects)
     known = catalogue()
     channels: list[Channel] = []
+    energies: EnergyErrors | None = None
     predicted: Torque | None = None
     with_torque = [motion for motion in motions.values() if motion.torque is not None]
     if with_torque:
@@ -197,16 +231,19 @@ def diagnose(
     with_power = [motion for motion in motions.values() if motion.power is not None]
     if with_power and predicted is not None:
         tell("Trying every effect on power")
-        torque = _explained(stack, channels[0], predicted)
+        torque = _Explained(stack, channels[0], predicted)
         power_of = _power(stack, with_power, grouping, torque)
         tried = _variants(robot, known.values(), "power")
         system = power_system(stack, with_power, grouping, tried, torque, power_of)
         power_floor = None if floor.power is None else np.array([floor.power])
         channels.append(_channel("power", system, power_floor, effects, seed))
+        energies = _energies(channels[-1], with_power)
     verdict = _verdict(channels, floor)
+    tell("Identifying the twin with its causes")
+    twin = _twin(data_set.robot, given, observed, effects, channels)
     lacking = untestable(known.values(), effects, [(c.name, c.attribution) for c in channels], motions.values())
-    traces = list(motions.values())
-    locations, evidence = _where(channels, robot.joint_names, stack, traces, predicted, observed)
+    seen = [motion for run, motion in motions.items() if run in observed]
+    locations, evidence = _where(channels, stack, seen, predicted)
     rivals = [(cause.effect, cause.joints, cause.rivals) for c in channels for cause in c.attribution.causes]
     return Diagnosis(
         description=robot,
@@ -219,6 +256,8 @@ def diagnose(
         seed=seed,
         experiment=next_experiment(rivals, [one.effect for one in lacking]),
         evidence=evidence,
+        twin=twin,
+        energies=energies,
     )
 
 
@@ -327,32 +366,45 @@ def _power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: 
     return power_of
 
 
-def _explained(stack: Stack, channel: Channel, predicted: Torque) -> Torque:
-    """Return the joint torque by the twin refitted with the causes, for the balance of power."""
-    system, values = channel.system, channel.estimate.values
-    causes = [cause for cause in channel.attribution.causes]
-    if not causes:
-        return predicted
-    variants = [variant for cause in causes for variant in cause.variants if variant.effect.channel == "torque"]
-    places = {k: place for place, k in enumerate(_used(system, causes))}
-    robot = stack.robot
+class _Explained:
+    """The joint torque of the twin refitted with the causes, and what each cause adds to the torque."""
 
-    def torque(motion: Motion) -> np.ndarray:
-        found = stack.real_torque(motion, values[: system.base])
-        before = predicted(motion)
-        for variant in variants:
-            effect = variant.effect
-            columns = effect.columns(robot, motion, Predicted(before))
-            for k, column in enumerate(variant.columns):
-                source = column - len(system.columns) if column >= system.changed else column
-                entry = system.columns[source - system.base]
-                own = columns[:, :, entry.index or 0]
-                active = column < system.changed or _observed(system, motion.run)
-                if active:
-                    found = found + own * values[places[variant.columns[k]]]
-        return found
+    def __init__(self, stack: Stack, channel: Channel, predicted: Torque):
+        self._stack, self._channel, self._predicted = stack, channel, predicted
+        causes = channel.attribution.causes
+        self._places = {k: place for place, k in enumerate(_used(channel.system, causes))}
+        self._held: tuple[str, np.ndarray] | None = None
 
-    return torque
+    def __call__(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, of a run or a part of one."""
+        whole = motion.whole or motion
+        if self._held is None or self._held[0] != whole.run:
+            torque = self._stack.real_torque(whole, self.values)
+            for cause in self._channel.attribution.causes:
+                torque = torque + self.added(cause, whole, real=True)
+            self._held = whole.run, torque
+        return self._held[1][motion.start : motion.start + len(motion.time)]
+
+    @property
+    def values(self) -> np.ndarray:
+        """(K,) the twin's coefficients."""
+        return self._channel.estimate.values[: self._channel.system.base]
+
+    def added(self, cause: Cause, whole: Motion, *, real: bool = False) -> np.ndarray:
+        """Return what a cause adds to the torque over a whole run, (N, n) N m; `real` torque alone or all of it."""
+        system, robot = self._channel.system, self._stack.robot
+        below = Predicted(self._predicted(whole))
+        total = np.zeros(whole.dq.shape)
+        for variant in cause.variants:
+            if real and variant.effect.channel != "torque":
+                continue
+            columns = variant.effect.columns(robot, whole, below)
+            for k in variant.columns:
+                if k < system.changed or _observed(system, whole.run):
+                    source = k - len(system.columns) if k >= system.changed else k
+                    own = columns[:, :, system.columns[source - system.base].index or 0]
+                    total += own * self._channel.estimate.values[self._places[k]]
+        return total
 
 
 def _observed(system: System, run: str) -> bool:
@@ -373,6 +425,56 @@ def _channel(name: str, system: System, floor: np.ndarray | None, effects: Seque
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise, found.noise, chosen)
     return Channel(name, system, found, judged, floor, _estimate(system, found.causes))
+
+
+def _energies(channel: Channel, motions: Sequence[Motion]) -> EnergyErrors:
+    """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones."""
+    system, found = channel.system, channel.attribution
+    ones = next(k for k, column in enumerate(system.columns) if column.effect.id == "standby_power") + system.base
+    mean = {m.run: float(np.mean(m.power)) for m in motions if m.power is not None}
+    chosen = [k for cause in found.causes for k in cause.columns]
+    errors = []
+    for columns, noise in (((), channel.rmse), (chosen, found.noise)):
+        moments = system.moments(noise)
+        total = np.sum(moments, axis=0)
+        part = []
+        for group in np.flatnonzero(system.group_observed):
+            vector = system.solution(columns, total - moments[group])
+            residual, energy = 0.0, 0.0
+            for block in np.flatnonzero(system.group == group):
+                factor, used = system.factor(int(block), 0)
+                left = factor @ np.append(-vector[used], 1.0)
+                residual += float(factor[:, int(np.flatnonzero(used == ones)[0])] @ left) / system.scale[ones]
+                energy += mean[system.blocks[block].run] * float(system.blocks[block].rows[0])
+            part.append(100 * abs(residual) / max(abs(energy), 1e-9))
+        errors.append(np.array(part))
+    return EnergyErrors(*errors)
+
+
+def _twin(
+    robot: Robot,
+    motions: Mapping[str, Motion],
+    observed: frozenset[str],
+    effects: Sequence[str],
+    channels: Sequence[Channel],
+) -> Twin:
+    """Return the twin with the causes added; where some effect changed, fitted to the observed runs alone.
+
+    A changed effect that the twin has needs no second one; a load at the flange is one with the last body.
+    """
+    causes = [cause for channel in channels for cause in channel.attribution.causes]
+    added: list[Effect] = []
+    for cause in causes:
+        if cause.effect in effects or (cause.effect == "payload" and cause.scope == CHANGED):
+            continue
+        for variant in cause.variants:
+            joint = variant.terms[0].joint if cause.joints else None
+            effect = variant.effect if joint is None or cause.effect == "joint_coupling" else variant.effect.on(joint)
+            if not any(one.id == effect.id and one.joints == effect.joints for one in added):
+                added.append(effect)
+    changed = any(cause.scope == CHANGED for cause in causes)
+    used = [motion for run, motion in motions.items() if run in observed or not changed]
+    return identify(robot, used, [*effects, *added])
 
 
 def _used(system: System, causes: Sequence[Cause]) -> list[int]:
@@ -476,24 +578,64 @@ def _above(channel: Channel, floor: Floor) -> bool:
 
 
 def _where(
-    channels: Sequence[Channel],
-    joints: tuple[str, ...],
-    stack: Stack,
-    motions: Sequence[Motion],
-    predicted: Torque | None,
-    observed: frozenset[str],
+    channels: Sequence[Channel], stack: Stack, motions: Sequence[Motion], predicted: Torque | None
 ) -> tuple[list[Location], dict[str, Any]]:
+    """Return the ranked locations of the gap, and the arrays that a page draws; motions are the observed ones."""
+    joints = stack.robot.joint_names
+    locations: list[Location] = []
+    evidence: dict[str, Any] = {"follows": [], "runs": [line for c in channels for line in _per_run(c, joints)]}
     for channel in channels:
-        if channel.name == "torque":
-            noise = channel.rmse if channel.floor is None else channel.floor
-            values = _values(
-                channel.system,
-                channel.system.solution((), np.sum(channel.system.moments(channel.rmse), axis=0)),
-            )
-            judged = [motion for motion in motions if motion.run in observed and motion.torque is not None]
-            residuals = [(motion, _residual(stack, motion, values)) for motion in judged]
-            return locate(joints, residuals, noise), {"heat_map": heat_map(joints, residuals, noise)}
-    return [], {}
+        if channel.name == "power":
+            shares = locate_power(channel.held_out.before, channel.held_out.rows, channel.floor, _names(channel))
+            locations.extend(shares)
+            continue
+        assert predicted is not None
+        noise = channel.rmse if channel.floor is None else channel.floor
+        total = np.sum(channel.system.moments(channel.rmse), axis=0)
+        plain = _values(channel.system, channel.system.solution((), total))
+        judged = [motion for motion in motions if motion.torque is not None]
+        residuals = [(motion, _residual(stack, motion, plain)) for motion in judged]
+        locations.extend(locate(joints, residuals, noise))
+        evidence["heat_map"] = heat_map(joints, residuals, noise)
+        explained = _Explained(stack, channel, predicted)
+        for cause in channel.attribution.causes:
+            added = [explained.added(cause, motion) for motion in judged]
+            partial = []
+            for motion, own in zip(judged, added, strict=True):
+                others = [c for c in channel.attribution.causes if c is not cause]
+                rest = np.sum([explained.added(c, motion) for c in others], axis=0) if others else 0.0
+                partial.append((motion, _residual(stack, motion, explained.values) - rest))
+                del own
+            evidence["follows"] += curves(cause.effect, cause.joints or joints, joints, partial, added)
+    return sorted(locations, key=lambda location: -location.share), evidence
+
+
+def _names(channel: Channel) -> list[tuple[str, ...]]:
+    """Return the runs of each observed group."""
+    system = channel.system
+    return [
+        tuple(dict.fromkeys(system.blocks[k].run for k in np.flatnonzero(system.group == group)))
+        for group in np.flatnonzero(system.group_observed)
+    ]
+
+
+def _per_run(channel: Channel, joints: Sequence[str]) -> list[dict[str, Any]]:
+    judged = channel.held_out
+    lines = []
+    for group, runs in enumerate(_names(channel)):
+        for k in range(judged.rows.shape[1]):
+            rows = max(float(judged.rows[group, k]), 1.0)
+            lines += [
+                {
+                    "run": run,
+                    "joint": joints[k] if channel.name == "torque" else None,
+                    "before": float(np.sqrt(judged.before[group, k] / rows)),
+                    "after": float(np.sqrt(judged.after[group, k] / rows)),
+                    "floor": None if channel.floor is None else float(channel.floor[k]),
+                }
+                for run in runs
+            ]
+    return lines
 
 
 def _residual(stack: Stack, motion: Motion, values: np.ndarray) -> np.ndarray:

@@ -18,6 +18,15 @@ _REVERSAL = 0.1  # s, around a change of direction
 _BINS = 12
 _LOCATIONS = 12
 _LEAST_SHARE = 0.02
+_STANDS_OUT = 1.5  # times the floor's square
+_UNITS = {
+    "angle": "rad",
+    "speed": "rad/s",
+    "acceleration": "rad/s^2",
+    "time": "s",
+    "torque": "N m",
+    "temperature": "degC",
+}
 
 Residuals = Sequence[tuple[Motion, np.ndarray]]
 
@@ -61,6 +70,62 @@ def locate(joints: Sequence[str], residuals: Residuals, floor: np.ndarray) -> li
             if share >= _LEAST_SHARE:
                 found.append(Location("torque", joint, regime, variable, runs, min(share, 1.0)))
     return sorted(found, key=lambda location: -location.share)[:_LOCATIONS]
+
+
+def locate_power(
+    squares: np.ndarray, rows: np.ndarray, floor: np.ndarray | None, runs: Sequence[tuple[str, ...]]
+) -> list[Location]:
+    """Return where power is off: the groups of runs that stand out. squares, rows: (G, 1); floor: (1,) W."""
+    if floor is None:
+        return []
+    means = squares[:, 0] / np.maximum(rows[:, 0], 1) / floor[0] ** 2
+    worst = [k for k in np.argsort(-means) if means[k] > _STANDS_OUT]
+    if not worst:
+        return []
+    names = dict.fromkeys(run for k in worst for run in runs[k])
+    return [Location("power", None, None, None, tuple(names), 1.0)]
+
+
+def curves(
+    effect: str, shown: Sequence[str], joints: Sequence[str], residuals: Residuals, added: Sequence[np.ndarray]
+) -> list[dict[str, Any]]:
+    """Return, for each joint shown, the residual without an effect against the variable that it follows.
+
+    residuals: each run's motion and residual of a fit that has the effect, less what the effect adds (that is, partial
+    residuals); added: (N, n) of each run. Bins hold equal numbers of samples; low and high are their quartiles.
+    """
+    found = []
+    for joint in shown:
+        j = joints.index(joint)
+        name = follows([(m, a) for (m, _), a in zip(residuals, added, strict=True)], j)
+        if name is None:
+            continue
+        values = _variables(residuals, j)[name]
+        residual = np.concatenate([r[:, j] for _, r in residuals])
+        fitted = np.concatenate([a[:, j] for a in added])
+        kept = np.isfinite(residual)
+        place = _places(values[kept])
+        bins = [place == k for k in range(2 * _BINS)]
+        bins = [inside for inside in bins if inside.any()]
+        found.append(
+            {
+                "effect": effect,
+                "joint": joint,
+                "variable": name,
+                "unit": _UNITS[name],
+                "x": [float(np.median(values[kept][inside])) for inside in bins],
+                "residual": [float(np.mean(residual[kept][inside])) for inside in bins],
+                "low": [float(np.quantile(residual[kept][inside], 0.25)) for inside in bins],
+                "high": [float(np.quantile(residual[kept][inside], 0.75)) for inside in bins],
+                "fitted": [float(np.mean(fitted[kept][inside])) for inside in bins],
+            }
+        )
+    return found
+
+
+def _places(values: np.ndarray) -> np.ndarray:
+    edges = np.quantile(values, np.linspace(0, 1, 2 * _BINS + 1)[1:-1])
+    return np.asarray(np.searchsorted(edges, values))
 
 
 def heat_map(joints: Sequence[str], residuals: Residuals, floor: np.ndarray) -> dict[str, Any]:
@@ -147,5 +212,5 @@ def _excess(joints: Sequence[str], residuals: Residuals, floor: np.ndarray) -> n
 def _runs(residuals: Residuals, joint: int, floor: float) -> tuple[str, ...]:
     """Return the runs that stand out over the floor, the worst first."""
     means = {motion.run: float(np.nanmean(residual[:, joint] ** 2)) for motion, residual in residuals}
-    above = [run for run, mean in means.items() if mean > 1.5 * floor**2]
+    above = [run for run, mean in means.items() if mean > _STANDS_OUT * floor**2]
     return tuple(sorted(above, key=lambda run: -means[run]))
