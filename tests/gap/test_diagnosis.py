@@ -1,0 +1,162 @@
+"""Diagnoses of arms whose missing effect is known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import arm, as_run, measure, swing
+
+from irtwin.errors import InputError
+from irtwin.gap.diagnosis import diagnose
+from irtwin.signals.log import DataSet
+
+ROBOT = arm(3)
+
+
+def data_set(runs, robot=ROBOT, effects=None):
+    return DataSet(Path("arm"), robot, tuple(runs), effects, None, "mains", True, {})
+
+
+def runs(count=6, noise=0.3, change=None, role="observed", first=0):
+    """Runs of one arm; `change` alters the torque (and so power) of a motion by N m."""
+    made = []
+    for seed in range(first, first + count):
+        motion = replace(swing(ROBOT, seed // 2, seconds=10.0), run=f"{role}_{seed}")
+        shown = measure(ROBOT, motion, noise=noise, seed=seed)
+        if change is not None:
+            added = change(motion)
+            shown = replace(
+                shown,
+                torque=shown.torque + added,
+                power=shown.power + (added * motion.dq).sum(axis=1),
+                current=None,
+            )
+        run = as_run(replace(shown, current=None))
+        made.append(replace(run, role=role, repeat_of=f"{role}_{seed - 1}" if seed % 2 else None))
+    return made
+
+
+def on_joint(joint, function):
+    def change(motion):
+        added = np.zeros_like(motion.dq)
+        added[:, joint] = function(motion)
+        return added
+
+    return change
+
+
+def valid(diagnosis):
+    document = diagnosis.to_json()
+    schema = json.loads((resources.files("irtwin.gap") / "diagnosis.schema.json").read_text())
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.validate(document, schema)
+    return document
+
+
+WITH_LOSS = (
+    "rigid_body",
+    "rotor_inertia",
+    "coulomb_friction",
+    "viscous_friction",
+    "torque_offset",
+    "mechanical_power",
+    "standby_power",
+    "copper_loss",
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_gap_is_found_where_there_is_none(seed):
+    diagnosis = diagnose(data_set(runs(first=10 * seed), effects=WITH_LOSS))
+    assert diagnosis.verdict == "no_gap"
+    assert diagnosis.causes == ()
+    assert diagnosis.floor.source == "repeats"
+
+
+def test_a_missing_friction_is_named_with_its_joint():
+    stribeck = on_joint(1, lambda m: 4 * np.sign(m.dq[:, 1]) * np.exp(-np.abs(m.dq[:, 1]) / 0.1))
+    diagnosis = diagnose(data_set(runs(change=stribeck), effects=WITH_LOSS))
+    (_, cause), *_ = diagnosis.causes
+    assert "stribeck_friction" in (cause.effect, *cause.rivals)
+    assert cause.joints == ("joint_2",)
+    assert cause.scope == "missing"
+    shrink = diagnosis.to_json()["shrink"]
+    assert shrink["closed_fraction"]["value"] > 0.8
+    assert shrink["torque_rmse"]["after"] < shrink["torque_rmse"]["before"]
+
+
+def test_a_change_is_named_beside_the_reference_runs():
+    grease = on_joint(0, lambda m: 3 * m.dq[:, 0])
+    observed = runs(change=grease, first=20)
+    diagnosis = diagnose(data_set([*runs(role="reference"), *observed], effects=WITH_LOSS))
+    (_, cause), *_ = diagnosis.causes
+    assert (cause.effect, cause.scope, cause.joints) == ("viscous_friction", "changed", ("joint_1",))
+    (parameter,) = diagnosis.to_json()["causes"][0]["parameters"]
+    assert parameter["value"] == pytest.approx(3.0, rel=0.1)
+    assert parameter["interval95"][0] < 3.0 < parameter["interval95"][1]
+
+
+def test_withheld_friction_comes_back():
+    diagnosis = diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["coulomb_friction"])
+    (_, cause), *_ = diagnosis.causes
+    assert cause.effect == "coulomb_friction"
+    assert set(cause.joints) == {"joint_1", "joint_2", "joint_3"}
+    assert "coulomb_friction" in diagnosis.twin.stack.ids
+
+
+def test_power_lacks_the_loss_in_the_windings():
+    diagnosis = diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["copper_loss"])
+    channel, cause = diagnosis.causes[0]
+    assert (channel.name, cause.effect) == ("power", "copper_loss")
+
+
+def test_one_run_without_power_is_cut_in_time():
+    (run, *_) = runs(1, change=on_joint(2, lambda m: 2 * np.sin(5 * m.q[:, 2])))
+    run = replace(run, signals=replace(run.signals, power=None))
+    document = valid(diagnose(data_set([run])))
+    assert document["gap"].get("power") is None
+    assert {"effect": "copper_loss", "why": "no power was measured"} in document["not_testable"]
+
+
+def test_json_has_the_form_of_the_contract():
+    document = valid(diagnose(data_set(runs()), withhold=["viscous_friction"]))
+    assert document["verdict"] in ("attributed", "ambiguous")
+    json.dumps(document, allow_nan=False)
+
+
+def test_the_same_data_give_the_same_diagnosis():
+    made = [diagnose(data_set(runs(4)), withhold=["viscous_friction"]).to_json() for _ in range(2)]
+    assert made[0] == made[1]
+
+
+@pytest.mark.parametrize(
+    ("withhold", "message"),
+    [(["glue"], "no such effect"), (["copper_loss"], "the twin does not have it"), (["rigid_body"], "without bodies")],
+)
+def test_withholding_what_cannot_be(withhold, message):
+    with pytest.raises(InputError, match=message):
+        diagnose(data_set(runs(2)), withhold=withhold)
+
+
+def test_nothing_to_judge():
+    with pytest.raises(InputError, match='role = "observed"'):
+        diagnose(data_set(runs(2, role="reference")))
+
+
+def test_nothing_measured():
+    (run,) = runs(1)
+    bare = replace(run, signals=replace(run.signals, torque=None, power=None))
+    with pytest.raises(InputError, match="neither torque nor power"):
+        diagnose(data_set([bare]))
+
+
+def test_nothing_moves():
+    (run,) = runs(1)
+    still = replace(run, signals=replace(run.signals, q=np.zeros_like(run.signals.q)))
+    with pytest.raises(InputError, match="no joint moves"):
+        diagnose(data_set([still]))
