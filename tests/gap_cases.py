@@ -86,7 +86,7 @@ def _cause(effect: str, confidence: float, rivals: list[str], scope: str = "chan
     }
 
 
-def _shrink(closed: float | None, after: float) -> dict[str, Any]:
+def _shrink(closed: float | None, after: float, scope: str = "changed") -> dict[str, Any]:
     return {
         "held_out_runs": RUNS[2:],
         "noise_floor_from": "repeats",
@@ -102,9 +102,11 @@ def _shrink(closed: float | None, after: float) -> dict[str, Any]:
         "by_cause": [
             {
                 "effect": "stribeck_friction",
-                "joints": ["joint_a3"],
-                "alone": {"value": 0.9, "interval95": [0.8, 0.95]},
-                "left_out": {"value": 0.05, "interval95": [0.0, 0.1]},
+                "scope": scope,
+                "channel": "torque",
+                "rmse_before": [1.4, 1.5],
+                "rmse_alone": [0.6, 0.62],
+                "rmse_when_left_out": [1.3, 1.45],
             }
         ],
     }
@@ -136,10 +138,12 @@ _CASES: dict[str, dict[str, Any]] = {
             _cause("stribeck_friction", 0.52, ["nonlinear_viscous_friction"], "missing"),
             _cause("nonlinear_viscous_friction", 0.44, ["stribeck_friction"], "missing"),
         ],
-        "shrink": _shrink(0.9, 0.5),
+        "shrink": _shrink(0.9, 0.5, "missing"),
         "next_experiment": {
-            "motion": "speed ladder on joint_a3: 0.01 to 0.5 rad/s, 12 steps of 4 s",
-            "tells_apart": ["stribeck_friction", "nonlinear_viscous_friction"],
+            "purpose": "tell stribeck_friction from nonlinear_viscous_friction",
+            "effects": ["stribeck_friction", "nonlinear_viscous_friction"],
+            "joints": ["joint_a3"],
+            "motions": ["speed ladder: 0.01 to 0.5 rad/s, 12 steps of 4 s"],
             "expected_separation": 4.2,
         },
     },

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
@@ -46,8 +47,8 @@ def record(
         *_sizes(row.diagnosis_id, robot_id, diagnosis["gap"]),
         *_locations(row.diagnosis_id, robot_id, diagnosis["locations"], runs),
         *_causes(row.diagnosis_id, robot_id, diagnosis["causes"]),
-        *_changes(row.diagnosis_id, diagnosis["shrink"]),
-        *_shrinkages(row.diagnosis_id, diagnosis),
+        *_changes(row.diagnosis_id, diagnosis),
+        *_shrinkage(row.diagnosis_id, diagnosis["shrink"].get("closed_fraction")),
         *(
             gap_schema.GapHeldOut(diagnosis_id=row.diagnosis_id, run_id=_run_id(runs, name))
             for name in dict.fromkeys(diagnosis["shrink"].get("held_out_runs") or [])
@@ -170,7 +171,16 @@ def _row(
 
 
 def _text(value: object) -> str:
-    return json.dumps(value, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return json.dumps(_finite(value), sort_keys=True, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    """Return the value with None for numbers that JSON does not have."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(one) for key, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def _sizes(diagnosis_id: str, robot_id: str, gap: Json) -> Iterator[Base]:
@@ -240,50 +250,48 @@ def _causes(diagnosis_id: str, robot_id: str, causes: Sequence[Json]) -> Iterato
             )
 
 
-def _changes(diagnosis_id: str, shrink: Json) -> Iterator[Base]:
-    for measure, unit in _UNITS.items():
-        change = shrink.get(measure)
-        if change is None:
-            continue
+def _changes(diagnosis_id: str, diagnosis: Json) -> Iterator[Base]:
+    """What all causes change together; and, where it is said, each alone and all without it."""
+
+    def row(measure: str, part: str, rank: int | None, change: Json) -> Base:
         lower, upper = change.get("interval95_after") or (None, None)
-        yield gap_schema.GapChange(
+        return gap_schema.GapChange(
             diagnosis_id=diagnosis_id,
             measure=measure,
+            part=part,
+            place=rank or 0,
+            rank=rank,
             before=change["before"],
             after=change["after"],
             noise_floor=change.get("noise_floor"),
             lower=lower,
             upper=upper,
-            unit=unit,
-        )
-
-
-def _shrinkages(diagnosis_id: str, diagnosis: Json) -> Iterator[Base]:
-    """The closed fraction of all causes together, and where it is said, of each alone and of all without it."""
-
-    def row(part: str, rank: int | None, closed: Json) -> Base:
-        lower, upper = closed.get("interval95") or (None, None)
-        return gap_schema.GapShrinkage(
-            diagnosis_id=diagnosis_id,
-            part=part,
-            place=rank or 0,
-            rank=rank,
-            closed_fraction=closed["value"],
-            lower=lower,
-            upper=upper,
+            unit=_UNITS[measure],
         )
 
     shrink = diagnosis["shrink"]
-    if shrink.get("closed_fraction"):
-        yield row("together", None, shrink["closed_fraction"])
-    ranks = _by_cause(diagnosis["causes"])
+    for measure in _UNITS:
+        if shrink.get(measure):
+            yield row(measure, "together", None, shrink[measure])
+    ranks = [(rank, cause["effect"], cause["scope"]) for rank, cause in enumerate(diagnosis["causes"], start=1)]
     for item in shrink.get("by_cause") or []:
-        rank = ranks(item)
-        for part, key in (("alone", "alone"), ("without", "left_out")):
-            if rank is not None and item.get(key):
-                yield row(part, rank, item[key])
+        found = next((one for one in ranks if one[1:] == (item["effect"], item["scope"])), None)
+        if found is None:
+            continue
+        ranks.remove(found)  # the same effect may be a cause again, on another joint
+        for part, key in (("alone", "rmse_alone"), ("without", "rmse_when_left_out")):
+            change = {"before": _pooled(item["rmse_before"]), "after": _pooled(item[key])}
+            yield row(f"{item['channel']}_rmse", part, found[0], change)
 
 
-def _by_cause(causes: Sequence[Json]) -> Callable[[Json], int | None]:
-    ranks = {(cause["effect"], *cause["joints"]): rank for rank, cause in enumerate(causes, start=1)}
-    return lambda item: ranks.get((item.get("effect"), *item.get("joints", ())))
+def _pooled(values: Sequence[float]) -> float:
+    """Return the root of the mean square over joints."""
+    return math.sqrt(sum(value**2 for value in values) / len(values))
+
+
+def _shrinkage(diagnosis_id: str, closed: Json | None) -> Iterator[Base]:
+    if closed:
+        lower, upper = closed.get("interval95") or (None, None)
+        yield gap_schema.GapShrinkage(
+            diagnosis_id=diagnosis_id, closed_fraction=closed["value"], lower=lower, upper=upper
+        )

@@ -24,7 +24,7 @@ def figures(answers: Answers, evidence: Evidence) -> dict[str, Figure]:
     for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
         if name == "runs_power" or joint is not None:
             drawn[name] = runs(evidence.get("runs") or [], joint)
-    drawn["closed"] = closed(answers)
+    drawn["by_cause"] = by_cause(answers)
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
@@ -139,29 +139,32 @@ def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis}}
 
 
-def closed(answers: Answers) -> Figure | None:
-    """Draw the closed fraction of all causes, of each alone and of all without it, with 95 % intervals."""
-    rows = answers["shrinkages"].rows
-    if len(rows) < 2:
+def by_cause(answers: Answers) -> Figure | None:
+    """Draw the RMSE that is left with each cause alone, and with all causes but it; the foremost channel's."""
+    of_any = answers["changes_by_cause"].rows
+    rows = [row for row in of_any if row["measure"] == of_any[0]["measure"]]
+    if not rows:
         return None
-    titles = {"together": "all causes", "alone": "{} alone", "without": "all without {}"}
-    names = [plain(titles[row["part"]].format(row["label"] or row["rank"])) for row in rows]
-    error = {
-        "type": "data", "symmetric": False, "color": "#1c2733", "thickness": 1.2,
-        "array": [_span(row["closed"], row["upper"]) for row in rows],
-        "arrayminus": [_span(row["lower"], row["closed"]) for row in rows],
+    unit = rows[0]["unit"]
+    data = []
+    for name, part, colour in (("alone", "alone", AFTER), ("all causes but it", "without", PALETTE[4])):
+        of_part = [row for row in rows if row["part"] == part]
+        bars = {
+            "type": "bar", "name": name, "x": [plain(f"{row['rank']}. {row['label']}") for row in of_part],
+            "y": [row["after"] for row in of_part], "marker": {"color": colour},
+            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
+        }  # fmt: skip
+        data.append(bars)
+    line = {"color": BEFORE, "width": 1.5, "dash": "dash"}
+    before = rows[0]["before"]
+    shape = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": before, "y1": before, "line": line}
+    note = {
+        "x": 0.995, "xref": "paper", "xanchor": "right", "y": before, "yanchor": "bottom", "showarrow": False,
+        "text": "before", "font": {"color": BEFORE}, "bgcolor": "rgba(255,255,255,0.85)",
     }  # fmt: skip
-    bars = {
-        "type": "bar", "name": "closed", "x": names, "y": [100 * row["closed"] for row in rows],
-        "marker": {"color": [AFTER if row["part"] == "together" else PALETTE[4] for row in rows]}, "error_y": error,
-        "hovertemplate": "%{x}: %{y:.3~g} %<extra></extra>",
-    }  # fmt: skip
-    return {"data": [bars], "layout": {"yaxis": {"title": {"text": "of the gap closed, %"}, "rangemode": "tozero"}}}
+    yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
+    return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
 
 
 def _cell(value: float | None) -> str:
     return "" if value is None else f"{value:.2f}"
-
-
-def _span(low: float | None, high: float | None) -> float:
-    return 0.0 if low is None or high is None else max(100 * (high - low), 0.0)

@@ -77,12 +77,9 @@ def _where(answers: Answers) -> str:
 
 
 def _closes(answers: Answers) -> str:
-    for row in answers["shrinkages"].rows:
-        if row["part"] == "together":
-            within = (
-                f" (95 % interval {wording.share(row['lower'])} to {wording.share(row['upper'])})"
-                if row["lower"] is not None
-                else ""
-            )
-            return f"; with that in the twin, {wording.share(row['closed'])}{within} of the gap closes on runs held out"
-    return ""
+    row = answers["closed"].first
+    if row is None:
+        return ""
+    ends = f" (95 % interval {wording.share(row['lower'])} to {wording.share(row['upper'])})"
+    within = "" if row["lower"] is None else ends
+    return f"; with that in the twin, {wording.share(row['closed'])}{within} of the gap closes on runs held out"

@@ -134,12 +134,15 @@ class GapCauseParameter(Base):
 
 
 class GapChange(Base):
-    """What all causes together change on runs outside the fit."""
+    """What changes on runs outside the fit: by all causes, by one alone, or by all but one."""
 
     __tablename__ = "gap_change"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     measure: Mapped[str] = mapped_column(primary_key=True)  # "torque_rmse", "power_rmse" or "energy_error_percent"
+    part: Mapped[str] = mapped_column(primary_key=True)  # "together", "alone" or "without"
+    place: Mapped[int] = mapped_column(primary_key=True)  # the cause's rank, 0 for all of them
+    rank: Mapped[int | None]
     before: Mapped[float]
     after: Mapped[float]
     noise_floor: Mapped[float | None]
@@ -150,14 +153,11 @@ class GapChange(Base):
 
 
 class GapShrinkage(Base):
-    """Share of the gap above the floor that closes: by all causes, by one alone, or by all but one."""
+    """Share of the gap above the floor that closes with all causes added."""
 
     __tablename__ = "gap_shrinkage"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    part: Mapped[str] = mapped_column(primary_key=True)  # "together", "alone" or "without"
-    place: Mapped[int] = mapped_column(primary_key=True)  # the cause's rank, 0 for all of them
-    rank: Mapped[int | None]
     closed_fraction: Mapped[float]
     lower: Mapped[float | None]
     upper: Mapped[float | None]
