@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rdflib
 
 from irtwin.effects.effect import BASELINE, Predicted, catalogue
 from irtwin.effects.rigid_body import NAMES
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.resources import folder
 from irtwin.robot.urdf import parse_urdf
 from synthetic import arm, rigid_torque, swing, truth, with_constants
 
@@ -35,6 +37,50 @@ def test_effects_are_as_the_contract_says():
         per_joint = all(term.joint for term in effect.terms(robot))
         assert per_joint == (entry["per"] != "robot" or name == "mechanical_power")
     assert catalogue().keys() == contract.keys()
+
+
+QUDT_UNITS = {
+    "KiloGM-M2": "kg m^2",
+    "N-M": "Nm",
+    "N-M-SEC-PER-RAD": "Nm s/rad",
+    "RAD-PER-SEC": "rad/s",
+    "UNITLESS": "1",
+    "PER-K": "1/K",
+    "RAD": "rad",
+    "N-M-PER-RAD": "Nm/rad",
+    "PER-REV": "1/rev",
+    "KiloGM": "kg",
+    "M": "m",
+    "N": "N",
+    "W": "W",
+    "OHM": "ohm",
+    "K": "K",
+    "W-SEC-PER-RAD": "W s/rad",
+    "W-SEC2-PER-RAD2": "W s^2/rad^2",
+    "V": "V",
+    "J": "J",
+    "N-M-PER-SEC": "Nm/s",
+    "SEC": "s",
+}
+
+
+def test_effects_are_as_the_ontology_says():
+    graph = rdflib.Graph().parse(folder("ontology") / "effects.ttl")
+    irt, effect_iri = rdflib.Namespace("https://w3id.org/irtwin#"), "https://w3id.org/irtwin/effect/"
+    unit_of = rdflib.URIRef("http://qudt.org/schema/qudt/hasUnit")
+    robot = with_constants(arm(3))
+    individuals = {str(one).removeprefix(effect_iri): one for one in graph.subjects(rdflib.RDF.type, irt.Effect)}
+    assert catalogue().keys() == individuals.keys()
+    for name, effect in catalogue().items():
+        one = individuals[name]
+        assert str(graph.value(one, irt.has_Channel)).rpartition("/")[2] == effect.channel
+        stated = {
+            str(graph.value(parameter, irt.Parameter_Name)): QUDT_UNITS[
+                str(graph.value(parameter, unit_of)).rpartition("/")[2]
+            ]
+            for parameter in graph.objects(one, irt.has_Effect_Parameter)
+        }
+        assert units(effect, robot).items() >= stated.items(), name
 
 
 def units(effect, robot):
@@ -144,6 +190,10 @@ def test_a_joint_feels_the_links_that_it_carries():
     [
         (["rigid_body", "magic"], 'there is no effect "magic"; use some of rigid_body'),
         (["rigid_body", "rigid_body"], 'effect "rigid_body" stands there twice; name it once'),
+        (
+            [catalogue()["cable_drag"].on("elbow")],
+            'effect "cable_drag": there is no joint "elbow"; use some of joint_1',
+        ),
     ],
 )
 def test_wrong_lists_of_effects(effects, message):

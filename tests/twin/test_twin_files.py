@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from irtwin.effects.effect import BASELINE
+from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
 from irtwin.twin.files import load, save
 from irtwin.twin.identify import identify
@@ -80,3 +82,29 @@ def test_files_that_are_no_twin(tmp_path, content):
         load(path)
     with pytest.raises(InputError, match=r"none\.json: cannot be read"):
         load(tmp_path / "none.json")
+
+
+def test_an_effect_of_a_shape_is_written_with_it(tmp_path):
+    shaped = ExternalContact(start=-np.inf, stop=4.0, joints=("joint_2",), runs=("swing_1",))
+    twin = identify(ROBOT, [MOTION], (*BASELINE, shaped))
+    save(twin, tmp_path / "twin.json")
+    written = json.loads((tmp_path / "twin.json").read_text())["effects"]
+    assert written[:-1] == list(BASELINE)
+    assert written[-1] == {
+        "id": "external_contact",
+        "joints": ["joint_2"],
+        "runs": ["swing_1"],
+        "shape": {"start": "-inf", "stop": 4.0},
+    }
+    assert load(tmp_path / "twin.json").effects[-1] == shaped
+
+
+@pytest.mark.parametrize("shape", [{}, {"start": "early", "stop": 1.0}])
+def test_a_wrong_shape_is_named(tmp_path, shape):
+    path = tmp_path / "twin.json"
+    save(TWIN, path)
+    document = json.loads(path.read_text())
+    document["effects"][0] = {"id": "external_contact", "joints": None, "runs": None, "shape": shape}
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match='in "effects", entry 1: "shape"'):
+        load(path)

@@ -86,7 +86,8 @@ class Effect(ABC):
     computed over the whole motion that it is given, as it depends on what went before.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
-    `joints` are those that it acts on, `runs` those in which (None: all). To teach the twin a new effect, write a
+    `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
+    it acts (None: all). To teach the twin a new effect, write a
     class and list it in `catalogue`.
     """
 
