@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
+from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(3)
 

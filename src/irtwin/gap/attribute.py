@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from irtwin.effects.effect import BASELINE
 from irtwin.gap.hypotheses import Hypothesis, Variant
 from irtwin.gap.significance import p_values
 from irtwin.gap.system import System, Trial, attempt, scores
@@ -18,6 +19,7 @@ _LEAST_T = 2.5  # mean gain over its standard error between groups
 _NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
 _RIVAL = 0.8  # of the cause's gain a rival explains
 _APART = 2.0  # standard errors between groups that tell rivals apart
+_PLAIN = {"missing": 0.5, "changed": 0.9}  # of the best gain: a form of the default twin goes before what refines it
 _SAME = 0.03  # of the gain: less does not
 
 
@@ -140,7 +142,8 @@ def _round(
                 continue
             rivals = [gain[j] for j in plausible if left[j].joint == other.joint]
             robot = [gain[j] for j in plausible if left[j].joint is None]
-            if gain[k] >= _NEAR * max(rivals) and (not robot or max(robot) < gain[best]):
+            near = _PLAIN[other.scope] if other.effect in BASELINE else _NEAR
+            if gain[k] >= near * max(rivals) and (not robot or max(robot) < gain[best]):
                 taken_now.append(int(k))
     return [
         _Found(left[k], left[k].variants[_variant(trial, left, k)], float(gain[k]), float(t[k]), float(p[k]))
@@ -149,8 +152,17 @@ def _round(
 
 
 def _leader(plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis], found: Sequence[_Found]) -> int:
-    """Return the place of the best hypothesis; one of an effect that was found before goes before a rival to it."""
+    """Return the place of the best hypothesis; plain forms and effects found before go first."""
     best = int(plausible[np.argmax(gain[plausible])])
+    plain = [
+        int(k)
+        for k in plausible
+        if left[k].effect in BASELINE
+        and (left[k].scope, left[k].joint) == (left[best].scope, left[best].joint)
+        and gain[k] >= _PLAIN[left[k].scope] * gain[best]
+    ]
+    if plain:
+        return max(plain, key=lambda k: gain[k])
     before = {(one.hypothesis.effect, one.hypothesis.scope) for one in found}
     known = [int(k) for k in plausible if (left[k].effect, left[k].scope) in before and left[k].joint]
     if known and (nearest := max(known, key=lambda k: gain[k])) != best and gain[nearest] >= _RIVAL * gain[best]:
