@@ -28,6 +28,9 @@ from irtwin.storage.database import Workspace
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 
 
+_FEW = 3  # of many rivals the foremost are shown; the file of the diagnosis has them all
+
+
 def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path) -> None:
     """Write the gap report of a robot (its IRI) to `out`.
 
@@ -114,5 +117,6 @@ def _said(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(_said(one) for one in value)
     if isinstance(value, dict):
-        return "; ".join(f"{name.replace('_', ' ')} {_said(one)}" for name, one in value.items())
+        foremost = sorted(value.items(), key=lambda pair: -pair[1] if isinstance(pair[1], float) else 0.0)[:_FEW]
+        return "; ".join(f"{name.replace('_', ' ')} {_said(one)}" for name, one in foremost)
     return str(value).replace("_", " ") if isinstance(value, str) and " " not in value else str(value)
