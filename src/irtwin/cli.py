@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -100,6 +101,86 @@ def query(question: str | None, workspace: Path, database: str | None, form: str
         show(answer)
     else:
         click.echo(to_json(answer) if form == "json" else to_csv(answer), nl=form == "json")
+
+
+@cli.command()
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option(
+    "--json", "out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Diagnosis to write."
+)
+@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML page to write.")
+@click.option(
+    "--save-twin", type=click.Path(path_type=Path, dir_okay=False), help="Twin with the causes added, to write."
+)
+@click.option("--withhold", metavar="EFFECT", multiple=True, help="Take an effect out of the twin first; repeatable.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the random draws behind the intervals.")
+@click.option("--repair", is_flag=True, help="Drop bad samples, and say how many and which.")
+@click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Keep the diagnosis there, too.")
+@_database
+def diagnose(
+    dataset: Path,
+    out: Path,
+    report: Path | None,
+    save_twin: Path | None,
+    withhold: tuple[str, ...],
+    seed: int,
+    repair: bool,
+    workspace: Path | None,
+    database: str | None,
+) -> None:
+    """Say where a twin and its robot differ, and why.
+
+    Where the gap lies, which unmodelled effect causes it, and how far it shrinks once that effect is added.
+    """
+    from irtwin import workflow
+    from irtwin.storage.files import write
+    from irtwin.twin.files import save
+
+    found = workflow.diagnose(
+        dataset,
+        withhold=withhold,
+        seed=seed,
+        repair=repair,
+        workspace=workspace,
+        database=database,
+        report=report,
+        announce=_say,
+    )
+    document = found.to_json()
+    write(out, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+    if save_twin is not None and found.twin is not None:
+        save(found.twin, save_twin)
+    causes = [f"{cause['effect']} at {', '.join(cause['joints']) or 'the robot'}" for cause in document["causes"]]
+    click.echo(f"{document['verdict']}: {'; '.join(causes) or 'no cause named'}")
+
+
+@cli.command()
+@click.argument("twin", type=click.Path(path_type=Path))
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
+def predict(twin: Path, run: Path, out: Path) -> None:
+    """Say what a saved twin expects of a run.
+
+    Torque and power for the motion in RUN, by the TWIN that `irtwin diagnose --save-twin` wrote.
+    """
+    from irtwin.gap.predict import predict as predict_run
+
+    predict_run(twin, run, out)
+    click.echo(out)
+
+
+@cli.command()
+@click.argument("robot")
+@_workspace
+@_database
+def adopt(robot: str, workspace: Path, database: str | None) -> None:
+    """Make a diagnosis' twin the robot's own.
+
+    What the graph holds of the robot's energy is then populated anew; the page of it is written again.
+    """
+    from irtwin import workflow
+
+    click.echo(workflow.adopt(robot, workspace, database=database))
 
 
 @cli.command()

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 from irtwin import resources
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.gap import diagnosis as gap
+from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge import graph as knowledge
 from irtwin.knowledge import queries
 from irtwin.knowledge.export import export_owl
@@ -19,12 +21,16 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.validation import validate
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.providers.gap import adopt as adopt_twin
+from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
 from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
+from irtwin.report.gap import render_alone
 from irtwin.report.render import render
 from irtwin.report.scene import draw_scene
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
+from irtwin.twin.files import to_json
 
 Announce = Callable[[str], None]
 WORKSPACE = Path("irtwin-workspace")
@@ -64,6 +70,60 @@ def run(
             announce(f"  {violation}")
         announce("Writing the report")
         return _report(place, graph, identifier(data_set.robot.name))
+
+
+def diagnose(
+    dataset: Path | str,
+    *,
+    withhold: Sequence[str] = (),
+    seed: int = 0,
+    repair: bool = False,
+    workspace: Path | str | None = None,
+    database: str | None = None,
+    report: Path | None = None,
+    announce: Announce = lambda line: None,
+) -> Diagnosis:
+    """Diagnose the gap between a robot's twin and its runs.
+
+    `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
+    kept there, in the graph too, so that `adopt` can make its twin the robot's; `report` is an HTML file to write.
+    Raises InputError on bad input, before anything is written.
+    """
+    announce = _clocked(announce)
+    announce("Reading the data set")
+    data_set = read_data_set(Path(dataset), repair=repair)
+    _check_effects(data_set)
+    found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
+    if workspace is not None:
+        announce("Keeping the diagnosis")
+        with Workspace(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+            ingest(place, data_set)
+            record(
+                place,
+                identifier(data_set.robot.name),
+                found.to_json(),
+                found.evidence,
+                None if found.twin is None else to_json(found.twin),
+            )
+            graph.load_ontology()
+            _map(place, graph)
+            reason(graph)
+    if report is not None:
+        announce("Writing the report")
+        render_alone(data_set, found.to_json(), found.evidence, report)
+    return found
+
+
+def adopt(robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> Path:
+    """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
+    robot_id = identifier(robot)
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+        adopt_twin(place, robot_id)
+        graph.load_ontology()
+        _map(place, graph)
+        populate(place, graph, lambda: _map(place, graph), lambda line: None)
+        reason(graph)
+        return _report(place, graph, robot_id)
 
 
 def ask(question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> knowledge.Table:
