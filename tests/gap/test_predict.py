@@ -18,6 +18,7 @@ def test_a_saved_twin_predicts_a_run(tmp_path):
     save(twin, tmp_path / "twin.json")
     new = measure(robot, swing(robot, 3, seconds=10.0))
     columns = {"time": new.time} | {f"q_{j}": new.q[:, k] for k, j in enumerate(robot.joint_names)}
+    columns |= {f"tau_{j}": new.torque[:, k] for k, j in enumerate(robot.joint_names)}
     pa.parquet.write_table(pa.table(columns), tmp_path / "run.parquet")
     predict(tmp_path / "twin.json", tmp_path / "run.parquet", tmp_path / "out.parquet")
     found = pa.parquet.read_table(tmp_path / "out.parquet")
