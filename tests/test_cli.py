@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from irtwin.workflow import unpack_demo
@@ -46,7 +47,7 @@ def test_help_imports_nothing_heavy():
     code = f"import sys, irtwin.cli; print([m for m in sys.modules if m in {HEAVY!r}])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
     text = irtwin("--help").stdout
-    for command in ("run", "demo", "query", "export", "excite", "map"):
+    for command in ("run", "demo", "diagnose", "predict", "adopt", "query", "export", "excite", "map"):
         assert f"  {command} " in text
 
 
@@ -85,6 +86,35 @@ def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
     motion = np.genfromtxt(out, delimiter=",", names=True)
     assert len(motion) == 201
     assert motion["dq_joint_a1"][[0, -1]] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_path):
+    out, twin, page, workspace = (tmp_path / name for name in ("out.json", "twin.json", "out.html", "workspace"))
+    options = ["--json", out, "--save-twin", twin, "--report", page, "--withhold", "viscous_friction"]
+    done = irtwin("diagnose", small_data_set, *options, "--workspace", workspace)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(out.read_text())
+    assert "viscous_friction" in {cause["effect"] for cause in found["causes"]}
+    assert "viscous" in page.read_text()
+    predicted = tmp_path / "predicted.parquet"
+    run = small_data_set / "runs/exciting_3.parquet"
+    assert irtwin("predict", twin, run, "--out", predicted).returncode == 0
+    said, measured = pq.read_table(predicted), pq.read_table(run)
+    assert said.num_rows == measured.num_rows
+    for joint in ("joint_a1", "joint_a2", "joint_a3"):
+        error = np.std(np.array(said[f"tau_{joint}"]) - np.array(measured[f"tau_{joint}"]))
+        assert error < 0.2 * np.std(np.array(measured[f"tau_{joint}"]))
+    assert irtwin("query", "why_more_energy", "--workspace", workspace, "--format", "csv").stdout.count("\n") > 1
+    adopted = irtwin("adopt", "KUKA_KR6_R700", "--workspace", workspace)
+    assert adopted.returncode == 0, adopted.stderr
+    assert "viscous friction" in irtwin("query", "twin", "--workspace", workspace, "--format", "csv").stdout
+
+
+def test_an_unknown_effect_cannot_be_withheld(small_data_set, tmp_path):
+    done = irtwin("diagnose", small_data_set, "--json", tmp_path / "out.json", "--withhold", "phlogiston")
+    assert done.returncode == 2
+    assert "phlogiston" in done.stderr
+    assert not (tmp_path / "out.json").exists()
 
 
 @pytest.mark.parametrize(
