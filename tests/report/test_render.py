@@ -3,9 +3,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from robots import Factory, power_only, six_axis
+from robots import Factory, PageOf, power_only, six_axis
 
-from conftest import PageOf
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.report.render import content_policy, render
