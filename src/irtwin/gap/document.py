@@ -1,0 +1,143 @@
+"""The diagnosis' parts in the form of `diagnosis.schema.json`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from irtwin.effects.effect import Quantity, Term
+from irtwin.gap.attribute import Cause
+from irtwin.gap.confidence import confidence
+from irtwin.gap.energy_errors import EnergyErrors
+from irtwin.gap.finding import Finding, noise_before
+from irtwin.gap.floor import Floor
+from irtwin.gap.shrink import closed_fraction, held_out, pooled_interval
+from irtwin.identification.estimators import Estimate
+from irtwin.robot.description import Robot
+
+Json = dict[str, Any]
+
+_LEAST = 0.03  # gain that matters
+
+
+def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> Json:
+    """Return the gap before anything is added."""
+    document: Json = {"energy_error_percent": energies.mean[0] if energies else None}
+    for finding in findings:
+        numbers = [
+            {
+                "rmse": float(rmse),
+                "noise_floor": None if finding.floor is None else float(finding.floor[k]),
+                "excess": None if finding.excess is None else float(finding.excess[k]),
+            }
+            for k, rmse in enumerate(finding.rmse)
+        ]
+        document[finding.name] = dict(zip(joints, numbers, strict=True)) if finding.name == "torque" else numbers[0]
+    return document
+
+
+def cause(robot: Robot, finding: Finding, one: Cause) -> Json:
+    """Return a cause with its parameters and evidence."""
+    return {
+        "effect": one.effect,
+        "joints": list(one.joints),
+        "scope": one.scope,
+        "confidence": confidence(one.gain, _LEAST, one.t, len(one.rivals)),
+        "parameters": parameters(robot, finding, one),
+        "indistinguishable_from": list(one.rivals),
+        "evidence": {
+            "channel": finding.name,
+            "gain_on_groups_left_out": one.gain,
+            "t_between_groups": one.t,
+            "p_adjusted_for_the_catalogue": one.p,
+            "gain_of_rivals": one.rival_gains,
+        },
+    }
+
+
+def parameters(robot: Robot, finding: Finding, one: Cause) -> list[Json]:
+    """Return a cause's parameters as the catalogue states them, with 95 % intervals."""
+    found, used = finding.estimate, finding.used
+    known = {
+        (effect.id, term.joint, term.name): float(found.values[k])
+        for k, (effect, term) in enumerate(finding.system.terms)
+        if term.link is None
+    }
+    stated: list[Json] = []
+    for variant in one.variants:
+        places = [used.index(k) for k in variant.columns]
+        joint = variant.terms[0].joint if variant.terms[0].link is None and len(variant.terms) else None
+        effect = variant.effect
+        if joint is not None and len(one.joints) > 0:
+            effect = effect.on(joint)
+        if len(effect.terms(robot)) == len(places):
+            covariance = found.covariance[np.ix_(places, places)]
+            quantities = effect.parameters(robot, found.values[places], covariance, known)
+            stated += [_quantity(each) for each in quantities if np.isfinite(each.value)]
+        else:
+            stated += [_coefficient(variant.terms[k], found, place) for k, place in enumerate(places)]
+    return stated
+
+
+def shrink(
+    runs: Sequence[str], findings: Sequence[Finding], floor: Floor, energies: EnergyErrors | None, seed: int
+) -> Json:
+    """Return how far the gap shrinks on runs that took no part in the fit."""
+    document: Json = {
+        "held_out_runs": list(runs),
+        "noise_floor_from": floor.source,
+        "torque_rmse": None,
+        "power_rmse": None,
+        "energy_error_percent": None,
+        "closed_fraction": None,
+        "by_cause": [],
+    }
+    parts = []
+    for finding in findings:
+        judged = finding.held_out
+        rows = judged.rows.sum()
+        document[f"{finding.name}_rmse"] = {
+            "before": float(np.sqrt(judged.before.sum() / rows)),
+            "after": float(np.sqrt(judged.after.sum() / rows)),
+            "noise_floor": None if finding.floor is None else float(np.sqrt(np.mean(finding.floor**2))),
+            "interval95_after": pooled_interval(judged.after, judged.rows, seed),
+        }
+        if finding.floor is not None and finding.causes:
+            parts.append((judged, finding.floor))
+        document["by_cause"] += [_by_cause(finding, one) for one in finding.causes]
+    if energies:
+        document["energy_error_percent"] = energies.to_json(seed)
+    closed = closed_fraction(parts, seed) if parts else None
+    if closed:
+        document["closed_fraction"] = {"value": closed[0], "interval95": closed[1]}
+    return document
+
+
+def _by_cause(finding: Finding, one: Cause) -> Json:
+    """Return what a cause closes alone, and what is lost without it."""
+    system, noise = finding.system, noise_before(finding.system)
+    alone = held_out(system, noise, noise, one.columns)
+    others = [k for other in finding.causes if other is not one for k in other.columns]
+    without = held_out(system, noise, finding.attribution.noise, others)
+    return {
+        "effect": one.effect,
+        "scope": one.scope,
+        "channel": finding.name,
+        "rmse_before": [float(value) for value in alone.rmse(alone.before)],
+        "rmse_alone": [float(value) for value in alone.rmse(alone.after)],
+        "rmse_when_left_out": [float(value) for value in without.rmse(without.after)],
+        "rmse_with_all": [float(value) for value in finding.held_out.rmse(finding.held_out.after)],
+    }
+
+
+def _quantity(one: Quantity) -> Json:
+    ends = None if one.lower is None or one.upper is None else [one.lower, one.upper]
+    return {"name": one.name, "joint": one.joint, "value": one.value, "unit": one.unit, "interval95": ends}
+
+
+def _coefficient(term: Term, found: Estimate, place: int) -> Json:
+    value, half = float(found.values[place]), 1.96 * float(np.sqrt(max(found.covariance[place, place], 0.0)))
+    ends = [value - half, value + half]
+    return {"name": term.name, "joint": term.joint, "value": value, "unit": term.unit, "interval95": ends}

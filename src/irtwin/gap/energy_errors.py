@@ -1,0 +1,63 @@
+"""How far the energy of runs is off that took no part in the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irtwin.gap.finding import Finding
+from irtwin.signals.motion import Motion
+
+_RESAMPLED = 1000
+
+
+@dataclass(frozen=True)
+class EnergyErrors:
+    """Energy error of each observed group when it was left out of the fit, %: (G,) before and after."""
+
+    before: np.ndarray
+    after: np.ndarray
+
+    @property
+    def mean(self) -> tuple[float, float]:
+        """Over groups, before and after."""
+        return float(self.before.mean()), float(self.after.mean())
+
+    def to_json(self, seed: int) -> dict[str, Any]:
+        """Return the change in the form of the schema."""
+        generator = np.random.default_rng(seed)
+        drawn = [generator.choice(self.after, len(self.after)).mean() for _ in range(_RESAMPLED)]
+        low, high = np.quantile(drawn, [0.025, 0.975])
+        before, after = self.mean
+        return {
+            "before": before,
+            "after": after,
+            "noise_floor": None,
+            "interval95_after": [float(low), float(high)],
+        }
+
+
+def energy_errors(finding: Finding, motions: Sequence[Motion]) -> EnergyErrors:
+    """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones."""
+    system = finding.system
+    ones = next(k for k, column in enumerate(system.columns) if column.effect.id == "standby_power") + system.base
+    mean = {m.run: float(np.mean(m.power)) for m in motions if m.power is not None}
+    errors = []
+    for columns, noise in (((), finding.rmse), (finding.chosen, finding.attribution.noise)):
+        moments = system.moments(noise)
+        total = np.sum(moments, axis=0)
+        part = []
+        for group in np.flatnonzero(system.group_observed):
+            vector = system.solution(columns, total - moments[group])
+            residual, energy = 0.0, 0.0
+            for block in np.flatnonzero(system.group == group):
+                factor, used = system.factor(int(block), 0)
+                left = factor @ np.append(-vector[used], 1.0)
+                residual += float(factor[:, int(np.flatnonzero(used == ones)[0])] @ left) / system.scale[ones]
+                energy += mean[system.blocks[block].run] * float(system.blocks[block].rows[0])
+            part.append(100 * abs(residual) / max(abs(energy), 1e-9))
+        errors.append(np.array(part))
+    return EnergyErrors(*errors)

@@ -1,0 +1,108 @@
+"""What the twin says a run takes: without the run, and with the causes found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from irtwin.effects.effect import Predicted
+from irtwin.effects.stack import Stack
+from irtwin.gap.attribute import Cause
+from irtwin.gap.channels import Grouping, Torque, power_system
+from irtwin.gap.finding import Finding, noise_before, twin_values
+from irtwin.gap.system import System
+from irtwin.signals.motion import Motion
+
+PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+_PIECE = 8192  # samples whose regressor is held at once
+
+
+def left_out_torque(stack: Stack, system: System) -> Torque:
+    """Return the twin's joint torque for a run, fitted without that run's group."""
+    moments = system.moments(noise_before(system))
+    total = np.sum(moments, axis=0)
+    by_run: dict[str, np.ndarray] = {}
+    for run in {block.run for block in system.blocks}:
+        groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
+        rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
+        by_run[run] = twin_values(system, system.solution((), rest))
+    whole = twin_values(system, system.solution((), total))
+
+    def predicted(motion: Motion) -> np.ndarray:
+        return stack.real_torque(motion, by_run.get(motion.run, whole))
+
+    return predicted
+
+
+def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: Torque) -> PowerOf:
+    """Return the power that the twin predicts for a run, (N,) W, and the part that its axes take."""
+
+    def none(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(torque)), np.zeros(len(torque))
+
+    system = power_system(stack, motions, grouping, (), torque, none)
+    values = np.array([term.expected for _, term in stack.power_terms])
+    total = np.sum(system.moments(noise_before(system)), axis=0)
+    values[~stack.fixed] = twin_values(system, system.solution((), total))
+    standing = np.array([effect.id == "standby_power" for effect, _ in stack.power_terms], dtype=bool)
+
+    def power_of(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        columns = stack.power_columns(motion, torque)
+        return columns @ values, columns @ np.where(standing, 0.0, values)
+
+    return power_of
+
+
+class ExplainedTorque:
+    """The joint torque of the twin refitted with the causes, and what each cause adds to the torque."""
+
+    def __init__(self, stack: Stack, finding: Finding, predicted: Torque):
+        """Take what torque showed, and the torque `predicted` that candidates were built on."""
+        self._stack, self._finding, self._predicted = stack, finding, predicted
+        self._places = {k: place for place, k in enumerate(finding.used)}
+        self._held: tuple[str, np.ndarray] | None = None
+
+    def __call__(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, of a run or a part of one."""
+        whole = motion.whole or motion
+        if self._held is None or self._held[0] != whole.run:
+            torque = self._stack.real_torque(whole, self.values)
+            for cause in self._finding.causes:
+                torque = torque + self.added(cause, whole, real=True)
+            self._held = whole.run, torque
+        return self._held[1][motion.start : motion.start + len(motion.time)]
+
+    @property
+    def values(self) -> np.ndarray:
+        """(K,) the twin's coefficients."""
+        return self._finding.estimate.values[: self._finding.system.base]
+
+    def added(self, cause: Cause, whole: Motion, *, real: bool = False) -> np.ndarray:
+        """Return what a cause adds to the torque over a whole run, (N, n) N m; `real` torque alone or all of it."""
+        system, robot = self._finding.system, self._stack.robot
+        below = Predicted(self._predicted(whole))
+        total = np.zeros(whole.dq.shape)
+        for variant in cause.variants:
+            if real and variant.effect.channel != "torque":
+                continue
+            columns = variant.effect.columns(robot, whole, below)
+            for k in variant.columns:
+                if k < system.changed or _observed(system, whole.run):
+                    source = k - len(system.columns) if k >= system.changed else k
+                    own = columns[:, :, system.columns[source - system.base].index or 0]
+                    total += own * self._finding.estimate.values[self._places[k]]
+        return total
+
+
+def residual(stack: Stack, motion: Motion, values: np.ndarray) -> np.ndarray:
+    """Return measured torque less the twin's with these coefficients (K,): (N, n) N m, NaN where undecided."""
+    assert motion.torque is not None
+    shift = stack.shift(motion)
+    parts = [stack.torque_columns(piece) @ (values + shift) for piece in motion.pieces(_PIECE)]
+    return np.where(stack.undecided(motion), np.nan, motion.torque - np.concatenate(parts))
+
+
+def _observed(system: System, run: str) -> bool:
+    return any(block.run == run and seen for block, seen in zip(system.blocks, system.observed, strict=True))

@@ -1,0 +1,108 @@
+"""The finding: what one channel, torque or power, shows of the gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from irtwin.gap.attribute import Attribution, Cause, attribute
+from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
+from irtwin.gap.shrink import HeldOut, held_out
+from irtwin.gap.system import System
+from irtwin.identification.estimators import Estimate, estimate
+
+_NO_NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
+
+    `floor` (g,) N m or W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together.
+    """
+
+    name: str
+    system: System
+    attribution: Attribution
+    held_out: HeldOut
+    floor: np.ndarray | None
+    estimate: Estimate
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The channel's causes, ranked."""
+        return self.attribution.causes
+
+    @property
+    def chosen(self) -> list[int]:
+        """The indices of the causes' columns."""
+        return [k for cause in self.causes for k in cause.columns]
+
+    @property
+    def used(self) -> list[int]:
+        """The indices of the columns in the estimate."""
+        return [*range(self.system.base), *self.chosen]
+
+    @property
+    def rmse(self) -> np.ndarray:
+        """(g,) before anything is added, on groups left out."""
+        return self.held_out.rmse(self.held_out.before)
+
+    @property
+    def excess(self) -> np.ndarray | None:
+        """(g,) mean square over the floor's, less one."""
+        return None if self.floor is None else np.asarray(self.rmse**2 / self.floor**2 - 1)
+
+    @property
+    def groups(self) -> list[tuple[str, ...]]:
+        """The runs of each observed group."""
+        system = self.system
+        return [
+            tuple(dict.fromkeys(system.blocks[k].run for k in np.flatnonzero(system.group == group)))
+            for group in np.flatnonzero(system.group_observed)
+        ]
+
+
+def find(name: str, system: System, floor: np.ndarray | None, inside: Sequence[str], seed: int) -> Finding:
+    """Find the causes in a channel's equations; effects `inside` the twin cannot be missing."""
+    power = name == "power"
+    candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
+    if system.both:
+        candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
+    found = attribute(system, candidates, seed)
+    chosen = [k for cause in found.causes for k in cause.columns]
+    judged = held_out(system, noise_before(system), found.noise, chosen)
+    return Finding(name, system, found, judged, floor, _estimate(system, chosen))
+
+
+def noise_before(system: System) -> np.ndarray:
+    """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
+    return np.maximum(system.residual_rms((), np.ones(len(system.pattern))), _NO_NOISE)
+
+
+def twin_values(system: System, vector: np.ndarray) -> np.ndarray:
+    """Return the coefficients of the twin's terms, (K,), from a solution (D,) in units of the prior."""
+    return np.asarray(system.expected + vector[: system.base] * system.scale[: system.base])
+
+
+def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
+    """Estimate the twin's terms and the causes' together, with bounds and intervals."""
+    used = [*range(system.base), *chosen]
+    terms = [system.all_terms[k] for k in used]
+    source = [k - len(system.columns) if k >= system.changed else k for k in used]
+    pattern = system.pattern[:, source]
+    blocks = []
+    for block, observed in zip(system.blocks, system.observed, strict=True):
+        factors = []
+        for equation, factor in enumerate(block.factors):
+            place = {int(k): p for p, k in enumerate(np.flatnonzero(system.pattern[equation]))}
+            parts = [
+                factor[:, place[s]] * (observed or k < system.changed)
+                for k, s in zip(used, source, strict=True)
+                if s in place
+            ]
+            factors.append(np.column_stack([*parts, factor[:, -1]]))
+        blocks.append(replace(block, factors=tuple(factors)))
+    return estimate(blocks, pattern, terms)
