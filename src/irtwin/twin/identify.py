@@ -63,7 +63,7 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
             stack = _shaped(stack, open_shapes, "power", lambda trial: _fit_power(trial, with_power, torque_values)[1])
             found.append(_fit_power(stack, with_power, torque_values))
     else:
-        found = _fit_through_power(stack, with_power)
+        found = _found_through_power(stack, with_power)
     if constants:
         found.append((constants.terms, constants.estimate))
     parameters = [parameter for terms, result in found for parameter in _parameters(terms, result)]
@@ -211,14 +211,30 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
     return free, found
 
 
-def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Found]:
+def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the coefficients of torque (K,) and of power (L,) that fit measured power; those not free as expected."""
+    torque_values, power_values, _ = _solve_through_power(stack, motions)
+    return torque_values, power_values
+
+
+def _found_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Found]:
+    torque_terms, free = _open_terms(stack)
+    return [([*torque_terms, *free], _solve_through_power(stack, motions)[2])]
+
+
+def _open_terms(stack: Stack) -> tuple[Terms, Terms]:
+    """Return the terms of real torque, and those of power that are not fixed."""
+    real = [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
+    return real, [(effect, term) for effect, term in stack.power_terms if not term.fixed]
+
+
+def _solve_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray, Estimate]:
     """Fit the coefficients of torque and power together to measured power, which torque carries into it.
 
     Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from no torque, where the first
     step is that of a robot without such losses.
     """
-    real = [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
-    free = [(effect, term) for effect, term in stack.power_terms if not term.fixed]
+    real, free = _open_terms(stack)
     torque_values, power_values = np.zeros(len(stack.torque_terms)), _expected(stack.power_terms)
     spread = np.array([term.spread for _, term in (*real, *free)])
     before = np.full(len(spread), np.inf)
@@ -229,7 +245,7 @@ def _fit_through_power(stack: Stack, motions: Sequence[Motion]) -> list[Found]:
         if np.all(np.abs(found.values - before) < _CONVERGED * spread):
             break
         before = found.values
-    return [([*real, *free], found)]
+    return torque_values, power_values, found
 
 
 def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
@@ -243,18 +259,23 @@ def _linearised(stack: Stack, torque_values: np.ndarray, power_values: np.ndarra
         columns = stack.torque_columns(motion, torque_values)[:, :, stack.real]
         torque = stack.real_torque(motion, torque_values)
         power = stack.predicted_power_columns(motion, torque_values, power_values)
-        slope = np.empty_like(torque)  # of power over torque, (N, n)
-        for joint in range(torque.shape[1]):
-            step = np.zeros(torque.shape[1])
-            step[joint] = _TORQUE_STEP
-            rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
-            slope[:, joint] = rise @ power_values / (2 * _TORQUE_STEP)
-        carried = np.einsum("tj,tjk->tk", slope, columns)
+        carried = np.einsum("tj,tjk->tk", power_slope(stack, motion, torque, power_values), columns)
         known = power[:, stack.fixed] @ power_values[stack.fixed] - carried @ torque_values[stack.real]
         columns = np.concatenate([carried, power[:, ~stack.fixed]], axis=1)
         return Rows(columns[:, None], known[:, None], motion.power[:, None])
 
     return equations
+
+
+def power_slope(stack: Stack, motion: Motion, torque: np.ndarray, power_values: np.ndarray) -> np.ndarray:
+    """Return the slope of power over each joint's torque, (N, n) W/(N m), about `torque` (N, n)."""
+    slope = np.empty_like(torque)
+    for joint in range(torque.shape[1]):
+        step = np.zeros(torque.shape[1])
+        step[joint] = _TORQUE_STEP
+        rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
+        slope[:, joint] = rise @ power_values / (2 * _TORQUE_STEP)
+    return slope
 
 
 def _estimate(motions: Sequence[Motion], equations: Equations, terms: Terms) -> Estimate:
