@@ -79,7 +79,7 @@ def find(name: str, system: System, floor: np.ndarray | None, inside: Sequence[s
 
 def noise_before(system: System) -> np.ndarray:
     """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
-    return np.maximum(system.residual_rms((), np.ones(len(system.pattern))), _NO_NOISE)
+    return np.asarray(np.maximum(system.residual_rms((), np.ones(len(system.pattern))), _NO_NOISE))
 
 
 def twin_values(system: System, vector: np.ndarray) -> np.ndarray:
