@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from plant.machine import Drawings
 from plant.motion import Motion, programme
 
 HARMONICS = 5
+JERK_TIME = 0.08  # s
 
 
 def exciting(drawings: Drawings, seconds: float, reach: float, speed: float, rng: np.random.Generator) -> Motion:
@@ -47,4 +49,11 @@ def work(drawings: Drawings, seconds: float, joints: int, speed: float, rng: np.
     ]
     motion = programme(moves, limits, drawings.step, cycles=12)
     rows = round(seconds / drawings.step)
-    return Motion(motion.q[:rows], motion.dq[:rows], motion.ddq[:rows])
+    smooth = [_without_jerks(getattr(motion, name), round(JERK_TIME / drawings.step)) for name in ("q", "dq", "ddq")]
+    return Motion(*(signal[:rows] for signal in smooth))
+
+
+def _without_jerks(signal: np.ndarray, steps: int) -> np.ndarray:
+    """Return the mean over the last `steps` steps: accelerations then change no faster than a controller lets them."""
+    before = np.repeat(signal[:1], steps - 1, axis=0)
+    return sliding_window_view(np.concatenate([before, signal]), steps, axis=0).mean(axis=-1)

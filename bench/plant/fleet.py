@@ -12,6 +12,11 @@ from plant.effects import LEVEL, PASSIVE, Effect, State
 from plant.machine import Machine
 from plant.motion import Motion
 
+_ONLY_FRICTION = int(
+    mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_EQUALITY
+)
+_DRY_FORWARD = 0.9  # of the drawings' Coulomb friction is fed forward
+_DRY_WIDTH = 0.005  # rad/s
 SETTLE = 0.4  # s, at the first pose before the log starts
 
 
@@ -62,7 +67,9 @@ class Fleet:
         low = blend.astype(int)
         high, share = np.minimum(low + 1, len(rows) - 1), (blend - low)[:, None, None]
         torque = torque[low] * (1 - share) + torque[high] * share
-        return torque + self.machine.drawings.control.friction_forward * dq, inertia[low]
+        drawings = self.machine.drawings
+        dry = _DRY_FORWARD * drawings.friction.coulomb * np.tanh(dq / _DRY_WIDTH)
+        return torque + drawings.control.friction_forward * dq + dry, inertia[low]
 
     def run(self, effects: tuple[Effect, ...] = ()) -> Traces:  # noqa: C901 - one loop, every part of the cell in it
         """Simulate all runs with some effects. Raises RuntimeError where a robot cannot follow."""
@@ -84,19 +91,17 @@ class Fleet:
         rotor = np.tile(drive.joint_inertia, (runs, 1))
         stiffness, gap = self._transmission(by_id, elastic)
         damping = 0.15 * np.sqrt(stiffness * rotor)
-        deflection = np.tile(friction.deflection, (runs, 1))
-        if "presliding_hysteresis" in by_id:
-            mask = by_id["presliding_hysteresis"].mask(n)
-            deflection = np.where(mask > 0, np.maximum(mask, deflection), deflection)
         coulomb, viscous = friction.coulomb * self.jitter[:, 0], friction.viscous * self.jitter[:, 1]
-        bristle_stiffness = coulomb / deflection
+        bristled = by_id["presliding_hysteresis"].mask(n) if "presliding_hysteresis" in by_id else np.zeros((runs, n))
+        dry = bristled == 0
+        bristle_stiffness = np.where(dry, 0.0, coulomb / np.where(dry, 1.0, bristled))
         bristle_damping = 0.4 * np.sqrt(bristle_stiffness * rotor)
         data = [arm.data for arm in arms]
         for arm, pose in zip(arms, q_wanted[0], strict=True):
             arm.place(pose)
         q, dq, ddq = q_wanted[0].copy(), np.zeros((runs, n)), np.zeros((runs, n))
         motor_q, motor_dq = q.copy(), dq.copy()
-        z, load, integral = np.zeros((runs, n)), np.zeros((runs, n)), np.zeros((runs, n))
+        z, load, integral, held = np.zeros((4, runs, n))
         seen_before, velocity = q.copy(), dq.copy()
         current = self.forward[0].copy()
         integral_gain, lag_blend = step / control.integral_time, 1 - np.exp(-step / control.velocity_filter)
@@ -133,30 +138,32 @@ class Fleet:
                 wound = motor_q - q
                 open_gap = np.sign(wound) * np.maximum(np.abs(wound) - gap, 0)
                 spring = stiffness * open_gap + damping * (np.abs(wound) >= gap) * (motor_dq - dq)
-                motor_dq = np.where(elastic, motor_dq + step * (net - spring) / rotor, 0)
+                free = motor_dq + step * (net - spring) / rotor
+                stopping = np.clip(free * rotor / step, -level * dry, level * dry)  # what stops it, if it can
+                motor_dq = np.where(elastic, free - step * stopping / rotor, 0)
                 applied = np.where(elastic, spring, net)
             else:
                 applied = net
+            sliding = np.where(elastic | ~dry, 0.0, level)
             if contact is not None:
                 self._push(arms, contact, time)
+            at = sample - self.settle
+            if at >= 0:  # before the step: torque then belongs to the second difference of the positions
+                shown = q if encoder is None else q + encoder_mask * (1 + 0.1 * np.sin(q + encoder.shape["phase"]))
+                for name, value in (("q", shown), ("torque", current), ("temperature", temperature)):
+                    kept[name][at] = value
+                kept["dq"][at] = dq / 2
             for run, d in enumerate(data):
+                arms[run].model.dof_frictionloss[:] = sliding[run]
                 d.qfrc_applied[:] = applied[run]
                 mujoco.mj_step(arms[run].model, d)
-                q[run], dq[run], ddq[run] = d.qpos, d.qvel, d.qacc
-            load = np.where(elastic, applied, net - rotor * ddq)
+                q[run], dq[run], ddq[run], held[run] = d.qpos, d.qvel, d.qacc, d.qfrc_constraint
+            if at >= 0:
+                kept["dq"][at] += dq / 2
+                kept["ddq"][at] = ddq
+            load = np.where(elastic, applied, net + held - rotor * ddq)
             motor_q = np.where(elastic, motor_q + step * motor_dq, q)
             motor_dq = np.where(elastic, motor_dq, dq)
-            at = sample - self.settle
-            if at >= 0:
-                kept["q"][at] = (
-                    q if encoder is None else q + encoder_mask * (1 + 0.1 * np.sin(q + encoder.shape["phase"]))
-                )
-                kept["dq"][at], kept["ddq"][at], kept["torque"][at], kept["temperature"][at] = (
-                    dq,
-                    ddq,
-                    current,
-                    temperature,
-                )
             if sample % 100 == 0 and not np.abs(lag).max() < control.following_error:
                 raise RuntimeError(f"a joint cannot follow at {time:.2f} s")
         return Traces(**kept)
@@ -173,6 +180,10 @@ class Fleet:
             arm = self.machine.arm(payload)
             arm.model.opt.timestep = self.step
             arm.model.opt.enableflags = 0
+            arm.model.opt.disableflags = _ONLY_FRICTION
+            arm.model.dof_frictionloss[:] = 1.0
+            arm.model.dof_solimp[:] = (0.9999, 0.9999, 0.001, 0.5, 2)  # at rest it creeps by less than 1e-4 rad/s
+            arm.model.dof_solref[:] = (2 * self.step, 1)
             arm.model.dof_armature[:] = np.where(elastic[run], 0, arm.model.dof_armature)
             tilt = by_id.get("base_tilt")
             if tilt is not None and tilt.runs[run]:

@@ -9,6 +9,8 @@ from plant.effects import Effect
 from plant.fleet import Traces
 from plant.machine import Machine
 
+SENSOR_LAG = 2e-4  # s, of the current sensors: a drive samples at 4 to 16 kHz
+
 
 def lagged(signal: np.ndarray, time_constant: float, step: float) -> np.ndarray:
     """Return a signal (T, ...) behind a first-order lag that starts at its first value."""
@@ -23,7 +25,7 @@ def lagged(signal: np.ndarray, time_constant: float, step: float) -> np.ndarray:
 def torque(traces: Traces, machine: Machine, effects: tuple[Effect, ...], step: float) -> np.ndarray:
     """Return the torque that the log shows, before noise: (T, R, n)."""
     n = traces.q.shape[2]
-    true = lagged(traces.torque, 0.002, step)
+    true = lagged(traces.torque, SENSOR_LAG, step)
     seen = true.copy()
     time = step * np.arange(len(seen))[:, None, None]
     for effect in effects:

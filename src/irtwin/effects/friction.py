@@ -9,14 +9,13 @@ import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity, ratio
 from irtwin.robot.description import Joint, Robot
+from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
-
-_STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
 def direction(dq: np.ndarray) -> np.ndarray:
     """Return the sign of speeds, zero at standstill."""
-    return np.where(np.abs(dq) < _STANDSTILL, 0.0, np.sign(dq))
+    return np.where(np.abs(dq) < STANDSTILL, 0.0, np.sign(dq))
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,9 @@ class CoulombFriction(JointEffect):
         return (direction(motion.dq),)
 
     def undecided(self, motion: Motion) -> np.ndarray:
-        """Return where a joint stands still."""
-        return np.asarray(np.abs(motion.dq) < _STANDSTILL)
+        """Return where a joint stands still, as filtered or as logged: it may stick for a moment as it turns back."""
+        slow = np.abs(motion.dq) < STANDSTILL
+        return np.asarray(slow if motion.standing is None else slow | motion.standing)
 
 
 @dataclass(frozen=True)

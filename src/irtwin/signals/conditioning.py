@@ -20,6 +20,7 @@ _FEWEST_PERIODS = 10  # of the cutoff in a run
 _NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is chosen
 _AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this from those of the positions
 _FEWEST = 20  # samples
+STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
 def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
@@ -59,6 +60,7 @@ def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
         current=clean(signals.current),
         temperature=clean(signals.temperature),
         power=clean(signals.power),
+        standing=_standing(make_interp_spline(signals.time, signals.q, k=1)(time), rate),
         payload_mass=run.payload_mass,
         payload_com=run.payload_com,
         cutoff=cutoff,
@@ -81,6 +83,11 @@ def differentiate(signal: np.ndarray, rate: float) -> np.ndarray:
     """Return the time derivative of an even (N, ...) signal through the quintic spline that interpolates it."""
     time = np.arange(len(signal)) / rate
     return np.asarray(make_interp_spline(time, signal, k=5).derivative()(time))
+
+
+def _standing(q: np.ndarray, rate: float) -> np.ndarray:
+    """Return where unfiltered positions (N, n) do not move: a filter would lend them their surroundings' speed."""
+    return np.asarray(np.abs(np.gradient(q, axis=0)) * rate < STANDSTILL)
 
 
 def _even_time(time: np.ndarray) -> np.ndarray:

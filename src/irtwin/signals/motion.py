@@ -13,7 +13,8 @@ class Motion:
     """What a robot of n joints did over N even samples. Absent measurements are None.
 
     time: (N,) s; q, dq, ddq: (N, n) rad, rad/s, rad/s^2; torque: (N, n) N m on the joint side;
-    current: (N, n) A; temperature: (N, n) degC; power: (N,) W; payload_com: (3,) m in the flange frame.
+    current: (N, n) A; temperature: (N, n) degC; power: (N,) W; payload_com: (3,) m in the flange frame;
+    standing: (N, n) whether a joint stood still, as seen before any filter.
     `cutoff` is that of the zero-phase filter that the signals went through, Hz; None for a planned motion.
     A part knows the `whole` that it was cut from, and its first sample there: what depends on the past is computed
     over the whole.
@@ -28,6 +29,7 @@ class Motion:
     current: np.ndarray | None = None
     temperature: np.ndarray | None = None
     power: np.ndarray | None = None
+    standing: np.ndarray | None = None
     payload_mass: float = 0.0  # kg
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cutoff: float | None = None
@@ -60,6 +62,7 @@ class Motion:
             current=cut(self.current),
             temperature=cut(self.temperature),
             power=cut(self.power),
+            standing=cut(self.standing),
             whole=self.whole or self,
             start=self.start + start,
         )
