@@ -11,6 +11,7 @@ from scipy.signal import oaconvolve
 
 _LOBES = 3  # of the sinc on either side: 1e-4 lost at a tenth of the cutoff, nothing left from twice it on
 _OVERSAMPLING = 4  # samples kept per cutoff period after decimation
+_AT_ONCE = 16  # samples that are filtered and decimated as one product of matrices
 
 
 def kernel(rate: float, cutoff: float) -> np.ndarray:
@@ -53,9 +54,19 @@ def decimate(signal: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
     flat = signal.reshape(len(signal), -1)
     count = max(0, -(-(len(flat) - len(taps) + 1) // step))
     if len(taps) == 1:
-        kept = flat[::step]
-    else:
-        kept = np.empty((count, flat.shape[1]))
-        for row in range(count):
-            kept[row] = taps @ flat[row * step : row * step + len(taps)]
+        return flat[::step].reshape((count, *signal.shape[1:]))
+    kept = np.empty((count, flat.shape[1]))
+    band = _band(taps, step, min(_AT_ONCE, count))
+    for first in range(0, count, _AT_ONCE):
+        rows = min(_AT_ONCE, count - first)
+        length = (rows - 1) * step + len(taps)
+        kept[first : first + rows] = band[:rows, :length] @ flat[first * step : first * step + length]
     return kept.reshape((count, *signal.shape[1:]))
+
+
+def _band(taps: np.ndarray, step: int, rows: int) -> np.ndarray:
+    """Return the matrix that filters and decimates: each row is the taps, `step` further on than in the last."""
+    band = np.zeros((rows, (rows - 1) * step + len(taps)))
+    for row in range(rows):
+        band[row, row * step : row * step + len(taps)] = taps
+    return band
