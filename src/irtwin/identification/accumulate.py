@@ -6,10 +6,12 @@ not read again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
@@ -19,18 +21,27 @@ from irtwin.signals.motion import Motion
 class Rows:
     """g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g).
 
-    Where `undecided` (N, g) the equation does not hold, and is left out.
+    `columns` may also be g arrays (N, k_e), of the columns that each equation has by the `pattern`. Where `undecided`
+    (N, g) the equation does not hold, and is left out.
     """
 
-    columns: np.ndarray
+    columns: np.ndarray | Sequence[np.ndarray]
     known: np.ndarray
     measured: np.ndarray
     undecided: np.ndarray | None = None
 
+    def own(self, equation: int, used: np.ndarray) -> np.ndarray:
+        """Return the columns (N, k_e) of an equation, `used` (K,) by the pattern."""
+        if isinstance(self.columns, np.ndarray):
+            return self.columns[:, equation, used]
+        return self.columns[equation]
+
 
 Equations = Callable[[Motion], Rows]
 
-_CHUNK = 4096  # samples whose columns are held at once
+_CHUNK = 8192  # samples whose columns are held at once,
+_ROWS = 2048  # of which no more than this are left by decimation: they stay in the processor's cache
+_PANEL = 64  # columns that LAPACK takes together
 _BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
@@ -59,16 +70,26 @@ def accumulate(motions: Sequence[Motion], equations: Equations, pattern: np.ndar
     either end of a run is left out, where a filter knows only one side.
     """
     total = sum(float(motion.time[-1] - motion.time[0]) for motion in motions)
-    blocks = []
-    for motion in motions:
-        for start, stop in _stretches(motion, total):
-            blocks.append(_reduce(motion, start, stop, equations, pattern))
-    return [block for block in blocks if block.rows.any()]
+    found = [_Growing(motion, *stretch, pattern) for motion in motions for stretch in _stretches(motion, total)]
+    with ThreadPoolExecutor(1) as other:  # while the next part's columns are computed
+        adding: Future[None] | None = None
+        for one in found:
+            for part in one.parts(equations):
+                if adding:
+                    adding.result()
+                adding = other.submit(one.add, part)
+        if adding:
+            adding.result()
+    return [one.block() for one in found if one.rows.any()]
 
 
 def triangle(rows: np.ndarray) -> np.ndarray:
     """Return the triangular factor of rows (N, k): (min(N, k), k), with the same products of columns."""
-    return np.asarray(np.linalg.qr(rows, mode="r"))
+    if not rows.size:
+        return np.zeros((0, rows.shape[1]))
+    # numpy's keeps other threads waiting
+    factored, _, _, _ = lapack.dgeqrf(rows, lwork=_PANEL * rows.shape[1])
+    return np.triu(factored[: rows.shape[1]])
 
 
 def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
@@ -80,24 +101,45 @@ def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
     return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
 
-def _reduce(motion: Motion, start: int, stop: int, equations: Equations, pattern: np.ndarray) -> Block:
-    taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
-    step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
-    half = len(taps) // 2
-    factors = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
-    rows = np.zeros(len(pattern), dtype=int)
-    size = max(step, _CHUNK // step * step)
-    for first in range(max(start, half), min(stop, len(motion.time) - half), size):
-        last = min(first + size, stop, len(motion.time) - half)
-        sample = equations(motion.part(first - half, last + half))
-        columns = decimate(sample.columns, taps, step)
+class _Growing:
+    """A block, from sample `start` to `stop` (exclusive) of a motion, whose factors grow part by part."""
+
+    def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray):
+        self._motion, self._start, self._stop, self._pattern = motion, start, stop, pattern
+        self._factors = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
+        self.rows = np.zeros(len(pattern), dtype=int)
+
+    def parts(self, equations: Equations) -> Iterator[list[np.ndarray]]:
+        """Yield each equation's rows of [columns | measurement], filtered and decimated, part by part."""
+        motion = self._motion
+        taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
+        step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
+        half = len(taps) // 2
+        size = step * max(1, min(_CHUNK // step, _ROWS))
+        end = min(self._stop, len(motion.time) - half)
+        for first in range(max(self._start, half), end, size):
+            last = min(first + size, end)
+            yield self._part(equations(motion.part(first - half, last + half)), taps, step)
+
+    def _part(self, sample: Rows, taps: np.ndarray, step: int) -> list[np.ndarray]:
+        half = len(taps) // 2
         measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
         keep = np.ones(measured.shape, dtype=bool)
         if sample.undecided is not None:
             keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
-        rows += keep.sum(axis=0)
-        for equation, used in enumerate(pattern):
-            chosen = keep[:, equation]
-            part = np.column_stack([columns[chosen, equation][:, used], measured[chosen, equation]])
-            factors[equation] = triangle(np.concatenate([factors[equation], part]))
-    return Block(motion.run, float(motion.time[start]), float(motion.time[stop - 1]), rows, tuple(factors))
+        rows = []
+        for equation, used in enumerate(self._pattern):
+            columns = decimate(sample.own(equation, used), taps, step)
+            rows.append(np.column_stack([columns, measured[:, equation]])[keep[:, equation]])
+        return rows
+
+    def add(self, parts: Sequence[np.ndarray]) -> None:
+        """Take in each equation's rows."""
+        self.rows += [len(part) for part in parts]
+        self._factors = [triangle(np.concatenate(pair)) for pair in zip(self._factors, parts, strict=True)]
+
+    def block(self) -> Block:
+        """Return what the block has become."""
+        time = self._motion.time
+        ends = float(time[self._start]), float(time[self._stop - 1])
+        return Block(self._motion.run, *ends, self.rows, tuple(self._factors))
