@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from irtwin.effects.effect import BASELINE, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.gap.admission import admit
 from irtwin.gap.channels import Grouping
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
@@ -54,21 +53,22 @@ class Case:
 
     @property
     def with_power(self) -> list[Motion]:
-        """The motions whose power was measured."""
+        """The motions whose power was measured; none where no observed run is among them."""
+        if not any(motion.power is not None for motion in self.seen):
+            return []
         return [motion for motion in self.motions.values() if motion.power is not None]
 
 
 def case_of(data_set: DataSet, withhold: Sequence[str]) -> Case:
     """Prepare a data set; `withhold` takes effects out of the twin.
 
-    Raises InputError on an effect that the catalogue lacks or the twin has not, where no run is to be judged, where no
-    joint moves, and where no torque was measured.
+    Raises InputError on an effect that the catalogue lacks or the twin has not, and where `admit` does.
     """
     effects = twin_effects(data_set, withhold)
     cutoff = choose_cutoff(data_set.runs)
     given = {run.name: condition(run, data_set.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(data_set.robot, given)
-    _check(data_set, motions)
+    admit(data_set, motions)
     return Case(robot, effects, data_set.runs, motions, (data_set.robot, given))
 
 
@@ -103,18 +103,6 @@ def _torque_from_current(robot: Robot, motions: dict[str, Motion]) -> tuple[Robo
         for name, motion in motions.items()
     }
     return replace(robot, joints=joints), found
-
-
-def _check(data_set: DataSet, motions: dict[str, Motion]) -> None:
-    file = data_set.folder / "dataset.toml"
-    if not any(run.role == "observed" for run in data_set.runs):
-        raise InputError(f'{file}: no run has role = "observed"; mark those whose gap is to be diagnosed')
-    if not any(motion.torque is not None for motion in motions.values()):
-        if any(motion.power is not None for motion in motions.values()):
-            raise InputError(f"{file}: power alone was measured; log tau_ or i_ too, so that a gap can be placed")
-        raise InputError(f"{file}: neither torque nor power was measured in any run; log tau_, i_ or power")
-    if not any(np.any(np.abs(motion.dq) > 1e-3) for motion in motions.values()):
-        raise InputError(f"{file}: no joint moves in any run; log runs in motion")
 
 
 def _labels(runs: Sequence[Run]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,8 +22,9 @@ from irtwin.gap.explained import ExplainedTorque, left_out_torque, twin_power
 from irtwin.gap.finding import Finding, find
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
+from irtwin.gap.same_robot import check_same_robot
 from irtwin.gap.verdict import NO_GAP, verdict_of
-from irtwin.gap.visibility import Untestable, untestable
+from irtwin.gap.visibility import Untestable, can_show, untestable
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
@@ -79,8 +80,7 @@ def diagnose(
     """Diagnose the gap between a robot's twin and its runs.
 
     `withhold` takes effects out of the twin and leaves them in the catalogue; `progress` is told each step. Raises
-    InputError on an effect that the catalogue lacks or the twin has not, where no run is to be judged, where no joint
-    moves, and where neither torque nor power was measured.
+    InputError on an effect that the catalogue lacks or the twin has not, and where the data set cannot be diagnosed.
     """
     tell = progress or (lambda line: None)
     tell(f"Filtering {len(data_set.runs)} runs")
@@ -92,7 +92,9 @@ def diagnose(
     predicted: Torque | None = None
     if case.with_torque:
         tell("Fitting the twin")
-        predicted = left_out_torque(stack, torque_system(stack, case.with_torque, case.grouping, (), None))
+        plain = torque_system(stack, case.with_torque, case.grouping, (), None)
+        check_same_robot(case.runs, stack, plain)
+        predicted = left_out_torque(stack, plain)
         tell("Trying every effect on torque")
         findings.append(_torque(case, stack, floor, predicted, seed))
     if case.with_power and predicted is not None:
@@ -102,9 +104,9 @@ def diagnose(
     verdict = verdict_of(findings, floor)
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
-    lacking = untestable(
-        catalogue().values(), case.effects, [(f.name, f.attribution) for f in findings], case.motions.values()
-    )
+    blamed = {cause.effect for cause in causes}
+    silent = [effect for effect in catalogue().values() if effect.id not in blamed]
+    lacking = untestable(silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen)
     locations, evidence = where(findings, stack, case.seen, predicted)
     rivals = [(cause.effect, cause.joints, cause.rivals) for cause in causes]
     return Diagnosis(
@@ -124,23 +126,23 @@ def diagnose(
 
 
 def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int) -> Finding:
-    tried = _variants(case.robot, catalogue().values(), "torque")
+    tried = _variants(case, "torque")
     system = torque_system(stack, case.with_torque, case.grouping, tried, predicted)
     return find("torque", system, floor.torque, case.effects, seed)
 
 
 def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int) -> Finding:
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
-    tried = _variants(case.robot, catalogue().values(), "power")
+    tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of)
     return find("power", system, None if floor.power is None else np.array([floor.power]), case.effects, seed)
 
 
-def _variants(robot: Robot, effects: Iterable[Effect], signal: str) -> list[Effect]:
+def _variants(case: Case, signal: str) -> list[Effect]:
     """Return every effect that shows in a signal, in every shape that is to be tried."""
     return [
         shape
-        for effect in effects
-        if effect.signal == signal and effect.id != "rigid_body"
-        for shape in effect.candidates(robot)
+        for effect in catalogue().values()
+        if effect.signal == signal and effect.id != "rigid_body" and can_show(effect, case.seen)
+        for shape in effect.candidates(case.robot)
     ]

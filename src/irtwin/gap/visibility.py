@@ -22,6 +22,11 @@ class Untestable:
     why: str
 
 
+def can_show(effect: Effect, motions: Iterable[Motion]) -> bool:
+    """Return whether what the effect depends on was measured in some motion."""
+    return "temperature" not in effect.id or any(motion.temperature is not None for motion in motions)
+
+
 def untestable(
     known: Iterable[Effect],
     inside: Sequence[str],
@@ -30,7 +35,7 @@ def untestable(
 ) -> list[Untestable]:
     """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
     measured = {name for name, _ in channels}
-    warm = any(motion.temperature is not None for motion in motions)
+    motions = tuple(motions)
     visible: dict[str, float] = {}
     share: dict[str, float] = {}
     for _, found in channels:
@@ -45,7 +50,7 @@ def untestable(
         channel = effect.signal
         if channel not in measured:
             reasons.append(Untestable(effect.id, f"no {channel} was measured"))
-        elif "temperature" in effect.id and not warm:
+        elif not can_show(effect, motions):
             reasons.append(Untestable(effect.id, "no temperature was measured"))
         elif effect.id not in visible or visible[effect.id] == 0:
             reasons.append(Untestable(effect.id, "nothing in these runs brings it about"))
