@@ -14,15 +14,18 @@ from irtwin.twin.twin import Twin
 BLOCK = 2.0  # s; residuals of measured robots remember 0.1 to 1.8 s (autocorrelation above 0.1)
 
 
-def sham(data_set: DataSet, truth: Twin, full: Twin, seed: int, block: float = BLOCK) -> DataSet:
+def sham(
+    data_set: DataSet, truth: Twin, full: Twin, seed: int, *, block: float = BLOCK, centred: bool = False
+) -> DataSet:
     """Return the data set as it would be if the robot were the twin `truth` and nothing else.
 
     Torque and power become what `truth` predicts plus the residual of the twin `full`, resampled within each run by
     a circular block bootstrap (Politis and Romano 1992) of blocks of `block` seconds, all joints and power alike:
-    autocorrelation and correlation between joints are kept, the tie to the motion is cut.
+    autocorrelation and correlation between joints are kept, the tie to the motion is cut. `centred` takes each run's
+    mean residual out: by it runs differ, which is no noise within them.
     """
     generator = np.random.default_rng(seed)
-    runs = tuple(_sham(run, truth, full, generator, block) for run in data_set.runs)
+    runs = tuple(_sham(run, truth, full, generator, block, centred) for run in data_set.runs)
     return replace(data_set, robot=truth.robot, runs=runs, effects=truth.effect_ids)
 
 
@@ -32,7 +35,7 @@ def circular_blocks(count: int, length: int, generator: np.random.Generator) -> 
     return ((starts[:, None] + np.arange(length)) % count).ravel()[:count]
 
 
-def _sham(run: Run, truth: Twin, full: Twin, generator: np.random.Generator, block: float) -> Run:
+def _sham(run: Run, truth: Twin, full: Twin, generator: np.random.Generator, block: float, centred: bool) -> Run:
     signals, motion = run.signals, condition(run, truth.robot, truth.cutoff)
     step = float(np.median(np.diff(signals.time)))
     place = circular_blocks(len(signals.time), max(1, round(block / step)), generator)
@@ -41,11 +44,16 @@ def _sham(run: Run, truth: Twin, full: Twin, generator: np.random.Generator, blo
         torque = signals.current * [joint.torque_constant for joint in truth.robot.joints]
     if torque is not None:
         residual = torque - _at(signals.time, motion, full.torque(motion))
-        torque = _at(signals.time, motion, truth.torque(motion)) + residual[place]
+        torque = _at(signals.time, motion, truth.torque(motion)) + _drawn(residual, place, centred)
     if power is not None:
         left = power - _at(signals.time, motion, full.power(motion))
-        power = _at(signals.time, motion, truth.power(motion)) + left[place]
+        power = _at(signals.time, motion, truth.power(motion)) + _drawn(left, place, centred)
     return replace(run, signals=replace(signals, torque=torque, current=None, power=power))
+
+
+def _drawn(residual: np.ndarray, place: np.ndarray, centred: bool) -> np.ndarray:
+    drawn = residual[place]
+    return drawn - drawn.mean(axis=0) if centred else drawn
 
 
 def _at(time: np.ndarray, motion: Motion, values: np.ndarray) -> np.ndarray:

@@ -60,6 +60,14 @@ def test_a_sham_keeps_what_noise_remembers_and_loses_what_is_missing():
     assert not diagnose(nothing_missing).causes
 
 
+def test_a_centred_sham_has_no_mean_of_its_own():
+    data_set = logged()
+    full = fitted(data_set)
+    for run, before in zip(sham(data_set, full, full, seed=2, centred=True).runs, data_set.runs, strict=True):
+        left = run.signals.torque - full.torque(condition(before, ROBOT, full.cutoff))
+        assert left.mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
 def test_an_effect_matters_where_the_fit_gets_worse_without_it():
     dry = np.array([0.0, truth(ROBOT)["Fc"][1]])  # joint 2 without its friction
     assert where_it_matters(logged(), "coulomb_friction") == ("joint_1", "joint_2")
@@ -83,11 +91,11 @@ def test_the_page_says_what_came_first_what_was_missed_and_how_often_shams_are_b
         Answer(gap_cases.diagnosis("no_gap"), 1.0),
         {"stribeck_friction": shown, "coulomb_friction": shown},
         {"stribeck_friction": ("joint_a3", "joint_a4"), "coulomb_friction": ("joint_a1",)},
-        {"default": [[], ["payload"], []]},
+        {"default twin": [[], ["payload"], []]},
     )
     text = page([robot], ["ur3_power"], "python bench/withheld.py DATA_FOLDER")
     assert "Of 2 effects withheld, the one withheld is the first cause in 1" in text
     assert "| ur10 | stribeck_friction | attributed | cause 1 | cause 1 | 1 of 2 | joint_a4 | - | 0.96 | none |" in text
     assert "| ur10 | coulomb_friction | attributed | not named |" in text
-    assert "| ur10 | default | 3 | 1 (33 %) | 6 to 79 % | payload 1 |" in text
+    assert "| ur10 | default twin | 3 | 1 (33 %) | 6 to 79 % | payload 1 |" in text
     assert "not run: ur3_power" in text
