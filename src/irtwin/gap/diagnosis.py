@@ -23,6 +23,7 @@ from irtwin.gap.finding import Finding, find
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
 from irtwin.gap.same_robot import check_same_robot
+from irtwin.gap.trial_ground import trial_grounds
 from irtwin.gap.verdict import NO_GAP, verdict_of
 from irtwin.gap.visibility import Untestable, can_show, untestable
 from irtwin.robot.description import Robot
@@ -108,7 +109,9 @@ def diagnose(
     silent = [effect for effect in catalogue().values() if effect.id not in blamed]
     lacking = untestable(silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen)
     locations, evidence = where(findings, stack, case.seen, predicted)
-    rivals = [(cause.effect, cause.joints, cause.rivals) for cause in causes]
+    tell("Designing the next experiment")
+    grounds = trial_grounds(case, stack, findings, predicted)
+    proposal = next_experiment(case.robot, grounds, [catalogue()[one.effect] for one in lacking], case.seen)
     return Diagnosis(
         description=case.robot,
         verdict=verdict,
@@ -118,8 +121,8 @@ def diagnose(
         untestable=tuple(lacking),
         runs=tuple(sorted(case.observed)),
         seed=seed,
-        experiment=next_experiment(rivals, [one.effect for one in lacking]),
-        evidence=evidence,
+        experiment=None if proposal is None else proposal.to_json(),
+        evidence={**evidence, "experiment": None if proposal is None else proposal.curve},
         twin=closed_twin(case, causes),
         energies=energies,
     )
