@@ -17,16 +17,16 @@ _STILL = 1e-3  # rad (m): noise of a joint that stands still spans less
 def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     """Raise InputError, naming the file and what to do, where no diagnosis is possible; `motions` by name of the run.
 
-    There have to be observed runs, with torque, in which some joint moves; references that share a signal with them;
-    and no run twice, which would judge a fit on what it was fitted to.
+    There have to be observed runs, with torque or power, in which some joint moves; references that share a signal with
+    them; and no run twice, which would judge a fit on what it was fitted to.
     """
     file = data_set.folder / "dataset.toml"
     observed = [run for run in data_set.runs if run.role == "observed"]
     if not observed:
         raise InputError(f'{file}: no run has role = "observed"; mark those whose gap is to be diagnosed')
     seen = [motions[run.name] for run in observed]
-    if not any(motion.torque is not None for motion in seen):
-        raise InputError(f"{file}: {_without_torque(seen)}")
+    if not any(motion.torque is not None or motion.power is not None for motion in seen):
+        raise InputError(f"{file}: {_nothing_measured(seen)}")
     if not any(_moves(motion) for motion in seen):
         raise InputError(f"{file}: no joint moves in any observed run; log runs in motion")
     others = [run for run in data_set.runs if run.role != "observed"]
@@ -38,14 +38,12 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     _check_copies(data_set.runs)
 
 
-def _without_torque(motions: Sequence[Motion]) -> str:
+def _nothing_measured(motions: Sequence[Motion]) -> str:
     if any(motion.current is not None for motion in motions):
         return (
             "the observed runs have currents but no torque, and no power beside them that would tell the torque "
             "constants; give torque_constant for each joint, or log tau_"
         )
-    if any(motion.power is not None for motion in motions):
-        return "the observed runs have power alone; log tau_ or i_ too, so that a gap can be placed"
     return "neither torque nor power was measured in any observed run; log tau_, i_ or power"
 
 

@@ -47,16 +47,23 @@ class Case:
         return [motion for run, motion in self.motions.items() if run in self.observed]
 
     @property
+    def others(self) -> list[Motion]:
+        """The motions of the runs that observed ones are held against: reference and simulated."""
+        return [motion for run, motion in self.motions.items() if run not in self.observed]
+
+    @property
     def with_torque(self) -> list[Motion]:
         """The motions whose torque is known."""
         return [motion for motion in self.motions.values() if motion.torque is not None]
 
     @property
     def with_power(self) -> list[Motion]:
-        """The motions whose power was measured; none where no observed run is among them."""
-        if not any(motion.power is not None for motion in self.seen):
-            return []
+        """The motions whose power was measured."""
         return [motion for motion in self.motions.values() if motion.power is not None]
+
+    def shows(self, signal: str) -> bool:
+        """Return whether some observed run has the signal: "torque" or "power"."""
+        return any(getattr(motion, signal) is not None for motion in self.seen)
 
 
 def case_of(data_set: DataSet, withhold: Sequence[str]) -> Case:

@@ -16,16 +16,18 @@ from irtwin.gap.case import Case, case_of
 from irtwin.gap.channels import Torque, power_system, torque_system
 from irtwin.gap.closure import closed_twin
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
-from irtwin.gap.evidence import where
+from irtwin.gap.evidence import cause_curves, drawn
 from irtwin.gap.experiment import next_experiment
 from irtwin.gap.explained import ExplainedTorque, left_out_torque, twin_power
 from irtwin.gap.finding import Finding, find
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
 from irtwin.gap.same_robot import check_same_robot
+from irtwin.gap.through_power import ThroughPower
 from irtwin.gap.trial_ground import trial_grounds
 from irtwin.gap.verdict import NO_GAP, verdict_of
 from irtwin.gap.visibility import Untestable, can_show, untestable
+from irtwin.gap.where import Left, against_reference, left_of_power, left_of_torque, places
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
@@ -90,17 +92,15 @@ def diagnose(
     stack = Stack(case.robot, case.effects)
     findings: list[Finding] = []
     energies: EnergyErrors | None = None
-    predicted: Torque | None = None
-    if case.with_torque:
-        tell("Fitting the twin")
-        plain = torque_system(stack, case.with_torque, case.grouping, (), None)
-        check_same_robot(case.runs, stack, plain)
-        predicted = left_out_torque(stack, plain)
+    tell("Fitting the twin")
+    power_stack, predicted = _torque_source(case, stack)
+    if case.shows("torque"):
         tell("Trying every effect on torque")
         findings.append(_torque(case, stack, floor, predicted, seed))
-    if case.with_power and predicted is not None:
+    torque = ExplainedTorque(stack, findings[0], predicted) if findings else predicted
+    if case.shows("power"):
         tell("Trying every effect on power")
-        findings.append(_power(case, stack, floor, ExplainedTorque(stack, findings[0], predicted), seed))
+        findings.append(_power(case, power_stack, floor, torque, seed))
         energies = energy_errors(findings[-1], case.with_power)
     verdict = verdict_of(findings, floor)
     tell("Identifying the twin with its causes")
@@ -108,7 +108,11 @@ def diagnose(
     blamed = {cause.effect for cause in causes}
     silent = [effect for effect in catalogue().values() if effect.id not in blamed]
     lacking = untestable(silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen)
-    locations, evidence = where(findings, stack, case.seen, predicted)
+    left = _left(case, stack, power_stack, findings, predicted, torque)
+    ranked = sorted(((cause.gain, finding.name) for finding in findings for cause in finding.causes), reverse=True)
+    located = places(left, ranked[0][1] if ranked else None, seed)
+    curves = [line for f in findings if f.name == "torque" for line in cause_curves(stack, f, case.seen, predicted)]
+    evidence = drawn(findings, left, located, curves)
     tell("Designing the next experiment")
     grounds = trial_grounds(case, stack, findings, predicted)
     proposal = next_experiment(case.robot, grounds, [catalogue()[one.effect] for one in lacking], case.seen)
@@ -117,7 +121,7 @@ def diagnose(
         verdict=verdict,
         channels=tuple(findings),
         floor=floor,
-        locations=tuple(locations if verdict != NO_GAP else ()),
+        locations=tuple(located if verdict != NO_GAP else ()),
         untestable=tuple(lacking),
         runs=tuple(sorted(case.observed)),
         seed=seed,
@@ -128,17 +132,43 @@ def diagnose(
     )
 
 
+def _torque_source(case: Case, stack: Stack) -> tuple[Stack, Torque]:
+    """Return the effects that explain power, and the joint torque that they are given.
+
+    It is that of a fit to torque without the run's group; where no run shows torque, that of a fit to power.
+    """
+    if not case.with_torque:
+        through_power = ThroughPower(stack, case.with_power)
+        return through_power, through_power.torque
+    plain = torque_system(stack, case.with_torque, case.grouping, (), None)
+    if case.shows("torque"):
+        check_same_robot(case.runs, stack, plain)
+    return stack, left_out_torque(stack, plain)
+
+
 def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int) -> Finding:
     tried = _variants(case, "torque")
     system = torque_system(stack, case.with_torque, case.grouping, tried, predicted)
-    return find("torque", system, floor.torque, case.effects, seed)
+    return find("torque", case, system, floor.torque, seed)
 
 
 def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int) -> Finding:
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of)
-    return find("power", system, None if floor.power is None else np.array([floor.power]), case.effects, seed)
+    return find("power", case, system, None if floor.power is None else np.array([floor.power]), seed)
+
+
+def _left(
+    case: Case, stack: Stack, power_stack: Stack, findings: Sequence[Finding], predicted: Torque, torque: Torque
+) -> list[Left]:
+    """Return what the twin without causes leaves of each channel; power on the torque that the causes explain."""
+    return [
+        left_of_torque(case, stack, finding, predicted, reference=against_reference(finding))
+        if finding.name == "torque"
+        else left_of_power(case, power_stack, finding, torque, reference=against_reference(finding))
+        for finding in findings
+    ]
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

@@ -9,66 +9,76 @@ import numpy as np
 
 from irtwin.effects.stack import Stack
 from irtwin.gap.channels import Torque
-from irtwin.gap.explained import ExplainedTorque, residual
-from irtwin.gap.finding import Finding, twin_values
-from irtwin.gap.locate import Location, curves, heat_map, locate, locate_power
+from irtwin.gap.excess_map import heat_map
+from irtwin.gap.explained import ExplainedTorque
+from irtwin.gap.finding import Finding
+from irtwin.gap.follows import curve, followed
+from irtwin.gap.locate import Location
+from irtwin.gap.residuals import Trace, as_filtered, torque_residual
+from irtwin.gap.where import Left
 from irtwin.signals.motion import Motion
 
+Json = dict[str, Any]
 
-def where(
-    findings: Sequence[Finding], stack: Stack, motions: Sequence[Motion], predicted: Torque | None
-) -> tuple[list[Location], dict[str, Any]]:
-    """Return the ranked locations of the gap, and the arrays that a page draws; motions are the observed ones."""
+_UNNAMED = 3  # places that no cause explains, drawn
+
+
+def drawn(
+    findings: Sequence[Finding], left: Sequence[Left], places: Sequence[Location], curves: Sequence[Json]
+) -> Json:
+    """Return the arrays that a page draws; curves: those of causes, which come before what none explains."""
+    found: Json = {"follows": [*curves], "runs": [line for finding in findings for line in _per_run(finding)]}
+    for one in left:
+        if one.channel == "torque":
+            found["heat_map"] = heat_map(one.joints, one.seen, one.level)
+    named = {line["joint"] for line in curves}
+    found["follows"] += _unnamed(left, [place for place in places if place.joint not in named])
+    return found
+
+
+def cause_curves(stack: Stack, finding: Finding, motions: Sequence[Motion], predicted: Torque) -> list[Json]:
+    """Return each torque cause's curve on the residual that all the others leave; motions: the observed ones."""
     joints = stack.robot.joint_names
-    locations: list[Location] = []
-    drawn: dict[str, Any] = {"follows": [], "runs": [line for f in findings for line in _per_run(f, joints)]}
-    for finding in findings:
-        if finding.name == "power":
-            judged = finding.held_out
-            locations.extend(locate_power(judged.before, judged.rows, finding.floor, finding.groups))
-            continue
-        assert predicted is not None
-        noise = finding.rmse if finding.floor is None else finding.floor
-        total = np.sum(finding.system.moments(finding.rmse), axis=0)
-        plain = twin_values(finding.system, finding.system.solution((), total))
-        with_torque = [motion for motion in motions if motion.torque is not None]
-        residuals = [(motion, residual(stack, motion, plain)) for motion in with_torque]
-        locations.extend(locate(joints, residuals, noise))
-        drawn["heat_map"] = heat_map(joints, residuals, noise)
-        drawn["follows"] += _curves(stack, finding, with_torque, predicted)
-    return sorted(locations, key=lambda location: -location.share), drawn
-
-
-def _curves(stack: Stack, finding: Finding, motions: Sequence[Motion], predicted: Torque) -> list[dict[str, Any]]:
-    """Return each cause's curve on the residual that all the others leave."""
-    joints = stack.robot.joint_names
+    shown = [motion for motion in motions if motion.torque is not None]
     explained = ExplainedTorque(stack, finding, predicted)
-    drawn = []
+    left = {motion.run: torque_residual(stack, motion, explained.values) for motion in shown}
+    lines = []
     for cause in finding.causes:
         others = [other for other in finding.causes if other is not cause]
-        partial = [
-            (
-                motion,
-                residual(stack, motion, explained.values)
-                - sum((explained.added(other, motion) for other in others), np.zeros(motion.dq.shape)),
-            )
-            for motion in motions
-        ]
-        added = [explained.added(cause, motion) for motion in motions]
-        drawn += curves(cause.effect, cause.joints or joints, joints, partial, added)
-    return drawn
+        added = [as_filtered(motion, explained.added(cause, motion)) for motion in shown]
+        traces = []
+        for motion in shown:
+            rest = sum((explained.added(other, motion) for other in others), np.zeros(motion.dq.shape))
+            traces.append(Trace(motion, left[motion.run] - as_filtered(motion, rest), predicted(motion)))
+        alone = [Trace(trace.motion, part, trace.torque) for trace, part in zip(traces, added, strict=True)]
+        for joint in cause.joints or joints:
+            k = joints.index(joint)
+            if best := followed(alone, k):
+                lines.append({"joint": joint} | curve(traces, k, best[0], cause.effect, added))
+    return lines
 
 
-def _per_run(finding: Finding, joints: Sequence[str]) -> list[dict[str, Any]]:
+def _unnamed(left: Sequence[Left], places: Sequence[Location]) -> list[Json]:
+    """Return the residual against what it follows, at the foremost joints of torque that no cause explains."""
+    lines: list[Json] = []
+    for one in left:
+        for joint in list(dict.fromkeys(p.joint for p in places if p.channel == one.channel == "torque"))[:_UNNAMED]:
+            k = one.joints.index(joint)
+            if best := followed(one.traces, k):
+                lines.append({"joint": joint} | curve(one.traces, k, best[0]))
+    return lines
+
+
+def _per_run(finding: Finding) -> list[Json]:
     judged = finding.held_out
     lines = []
     for group, runs in enumerate(finding.groups):
-        for k in range(judged.rows.shape[1]):
+        for k, joint in enumerate(finding.places):
             rows = max(float(judged.rows[group, k]), 1.0)
             lines += [
                 {
                     "run": run,
-                    "joint": joints[k] if finding.name == "torque" else None,
+                    "joint": joint,
                     "before": float(np.sqrt(judged.before[group, k] / rows)),
                     "after": float(np.sqrt(judged.after[group, k] / rows)),
                     "floor": None if finding.floor is None else float(finding.floor[k]),

@@ -16,8 +16,6 @@ from irtwin.signals.motion import Motion
 
 PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-_PIECE = 8192  # samples whose regressor is held at once
-
 
 def left_out_torque(stack: Stack, system: System) -> Torque:
     """Return the twin's joint torque for a run, fitted without that run's group."""
@@ -89,20 +87,8 @@ class ExplainedTorque:
                 continue
             columns = variant.effect.columns(robot, whole, below)
             for k in variant.columns:
-                if k < system.changed or _observed(system, whole.run):
+                if k < system.changed or whole.run in self._finding.observed:
                     source = k - len(system.columns) if k >= system.changed else k
                     own = columns[:, :, system.columns[source - system.base].index or 0]
                     total += own * self._finding.estimate.values[self._places[k]]
         return total
-
-
-def residual(stack: Stack, motion: Motion, values: np.ndarray) -> np.ndarray:
-    """Return measured torque less the twin's with these coefficients (K,): (N, n) N m, NaN where undecided."""
-    assert motion.torque is not None
-    shift = stack.shift(motion)
-    parts = [stack.torque_columns(piece) @ (values + shift) for piece in motion.pieces(_PIECE)]
-    return np.where(stack.undecided(motion), np.nan, motion.torque - np.concatenate(parts))
-
-
-def _observed(system: System, run: str) -> bool:
-    return any(block.run == run and seen for block, seen in zip(system.blocks, system.observed, strict=True))

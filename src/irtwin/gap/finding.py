@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from irtwin.gap.attribute import Attribution, Cause, attribute
+from irtwin.gap.case import Case
 from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.shrink import HeldOut, held_out
 from irtwin.gap.system import System
@@ -20,10 +21,13 @@ _NO_NOISE = 1e-9
 class Finding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
-    `floor` (g,) N m or W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together.
+    `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
+    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together.
     """
 
     name: str
+    places: tuple[str | None, ...]
+    observed: frozenset[str]
     system: System
     attribution: Attribution
     held_out: HeldOut
@@ -65,16 +69,17 @@ class Finding:
         ]
 
 
-def find(name: str, system: System, floor: np.ndarray | None, inside: Sequence[str], seed: int) -> Finding:
-    """Find the causes in a channel's equations; effects `inside` the twin cannot be missing."""
-    power = name == "power"
+def find(name: str, case: Case, system: System, floor: np.ndarray | None, seed: int) -> Finding:
+    """Find the causes in the equations of a channel, "torque" or "power"; floor: (g,) RMS."""
+    power, inside = name == "power", case.effects
+    places = (None,) if power else case.robot.joint_names
     candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
     found = attribute(system, candidates, seed)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
-    return Finding(name, system, found, judged, floor, _estimate(system, chosen))
+    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen))
 
 
 def noise_before(system: System) -> np.ndarray:

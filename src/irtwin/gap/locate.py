@@ -1,4 +1,4 @@
-"""Where the gap lies: joint by regime, and the variable that the residual follows."""
+"""Where the gap lies: the joints and regimes whose residual is beyond the noise floor, and what is sure of it."""
 
 from __future__ import annotations
 
@@ -7,33 +7,25 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import false_discovery_control, t
 
-from irtwin.signals.motion import Motion
+from irtwin.gap.excess_map import FEWEST, Map
+from irtwin.gap.residuals import Trace
 
-REGIMES = ("standstill", "low_speed", "steady_speed", "accelerating", "braking", "reversal")
-_STANDSTILL = 1e-3  # rad/s
-_SLOW = 0.1  # of the joint's largest speed
-_STEADY = 0.2  # of the joint's largest acceleration
-_REVERSAL = 0.1  # s, around a change of direction
-_BINS = 12
-_LOCATIONS = 12
+_DISCOVERIES = 0.05  # expected share of false ones among the places
 _LEAST_SHARE = 0.02
+_PLACES = 12
 _STANDS_OUT = 1.5  # times the floor's square
-_UNITS = {
-    "angle": "rad",
-    "speed": "rad/s",
-    "acceleration": "rad/s^2",
-    "time": "s",
-    "torque": "N m",
-    "temperature": "degC",
-}
-
-Residuals = Sequence[tuple[Motion, np.ndarray]]
+_RESAMPLED = 1000
 
 
 @dataclass(frozen=True)
 class Location:
-    """A place of the gap with its share of the whole gap in the channel."""
+    """A place of the gap: the excess of its mean square over the floor's, with 95 % intervals over runs.
+
+    `share` of the channel's whole excess; places that overlap (`loaded` with all others) share it. `q`: the rate of
+    false discoveries at which the place is found. `concentration`: the place's share over its share of the samples.
+    """
 
     channel: str
     joint: str | None
@@ -41,9 +33,19 @@ class Location:
     follows: str | None
     runs: tuple[str, ...]
     share: float
+    share_interval: tuple[float, float]
+    excess: float
+    excess_interval: tuple[float, float]
+    concentration: float
+    q: float
+
+    @property
+    def rank(self) -> float:
+        """What ranks it: its share, and how concentrated the gap is there."""
+        return float(self.share * np.sqrt(self.concentration))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the location in the form of the schema."""
+        """Return the location in the form of the schema, with what is sure of it besides."""
         return {
             "channel": self.channel,
             "joint": self.joint,
@@ -51,166 +53,110 @@ class Location:
             "follows": self.follows,
             "runs": list(self.runs),
             "share": self.share,
+            "share_interval95": list(self.share_interval),
+            "excess": self.excess,
+            "excess_interval95": list(self.excess_interval),
+            "concentration": self.concentration,
+            "false_discovery_rate": self.q,
         }
 
 
-def locate(joints: Sequence[str], residuals: Residuals, floor: np.ndarray) -> list[Location]:
-    """Rank joints and regimes by their excess over the floor.
-
-    residuals: each run's motion and torque residual (N, n), NaN where undecided; floor: (n,).
-    """
-    excess = _excess(joints, residuals, floor)
-    total = max(float(excess.sum()), 1e-12)
-    found = []
-    for j, joint in enumerate(joints):
-        variable = follows(residuals, j)
-        runs = _runs(residuals, j, floor[j])
-        for r, regime in enumerate(REGIMES):
-            share = float(excess[j, r]) / total
-            if share >= _LEAST_SHARE:
-                found.append(Location("torque", joint, regime, variable, runs, min(share, 1.0)))
-    return sorted(found, key=lambda location: -location.share)[:_LOCATIONS]
-
-
-def locate_power(
-    squares: np.ndarray, rows: np.ndarray, floor: np.ndarray | None, runs: Sequence[tuple[str, ...]]
+def locate(
+    channel: str,
+    joints: Sequence[str | None],
+    seen: Map,
+    level: np.ndarray,
+    reference: Map | None = None,
+    seed: int = 0,
 ) -> list[Location]:
-    """Return where power is off: the groups of runs that stand out. squares, rows: (G, 1); floor: (1,) W."""
-    if floor is None:
-        return []
-    means = squares[:, 0] / np.maximum(rows[:, 0], 1) / floor[0] ** 2
-    worst = [k for k in np.argsort(-means) if means[k] > _STANDS_OUT]
-    if not worst:
-        return []
-    names = dict.fromkeys(run for k in worst for run in runs[k])
-    return [Location("power", None, None, None, tuple(names), 1.0)]
+    """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first.
 
-
-def curves(
-    effect: str, shown: Sequence[str], joints: Sequence[str], residuals: Residuals, added: Sequence[np.ndarray]
-) -> list[dict[str, Any]]:
-    """Return, for each joint shown, the residual without an effect against the variable that it follows.
-
-    residuals: each run's motion and residual of a fit that has the effect, less what the effect adds (that is, partial
-    residuals); added: (N, n) of each run. Bins hold equal numbers of samples; low and high are their quartiles.
+    The false discovery rate over places is held at 5 % (Benjamini and Hochberg); p-values are Student's over units,
+    of the mean squares' excess, against those of the reference where there is one. `follows` and `runs` are empty.
     """
-    found = []
-    for joint in shown:
-        j = joints.index(joint)
-        name = follows([(m, a) for (m, _), a in zip(residuals, added, strict=True)], j)
-        if name is None:
-            continue
-        values = _variables(residuals, j)[name]
-        residual = np.concatenate([r[:, j] for _, r in residuals])
-        fitted = np.concatenate([a[:, j] for a in added])
-        kept = np.isfinite(residual)
-        place = _places(values[kept])
-        bins = [place == k for k in range(2 * _BINS)]
-        bins = [inside for inside in bins if inside.any()]
-        found.append(
-            {
-                "effect": effect,
-                "joint": joint,
-                "variable": name,
-                "unit": _UNITS[name],
-                "x": [float(np.median(values[kept][inside])) for inside in bins],
-                "residual": [float(np.mean(residual[kept][inside])) for inside in bins],
-                "low": [float(np.quantile(residual[kept][inside], 0.25)) for inside in bins],
-                "high": [float(np.quantile(residual[kept][inside], 0.75)) for inside in bins],
-                "fitted": [float(np.mean(fitted[kept][inside])) for inside in bins],
-            }
+    share, excess = _shares(seen, level, np.ones((1, len(seen.squares))))
+    rng = np.random.default_rng(seed)
+    weights = rng.multinomial(len(seen.squares), np.full(len(seen.squares), 1 / len(seen.squares)), _RESAMPLED)
+    drawn_share, drawn_excess = _shares(seen, level, weights.astype(float))
+    counts = seen.counts.sum(axis=0)
+    part = counts / np.maximum(counts[:, : seen.regimes.parts].sum(axis=1, keepdims=True), 1)
+    within = share[0] / np.maximum(share[0][:, : seen.regimes.parts].sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    q = _false_discovery(_p_values(seen, level, reference))
+    found = [
+        Location(
+            channel,
+            joint,
+            regime,
+            None,
+            (),
+            share=float(min(share[0, place, r], 1.0)),
+            share_interval=_interval(drawn_share[:, place, r]),
+            excess=float(excess[0, place, r]),
+            excess_interval=_interval(drawn_excess[:, place, r]),
+            concentration=float(within[place, r] / part[place, r]),
+            q=float(q[place, r]),
         )
-    return found
+        for place, joint in enumerate(joints)
+        for r, regime in enumerate(seen.regimes.names)
+        if share[0, place, r] >= _LEAST_SHARE and q[place, r] <= _DISCOVERIES
+    ]
+    return sorted(found, key=lambda location: -location.rank)[:_PLACES]
 
 
-def _places(values: np.ndarray) -> np.ndarray:
-    edges = np.quantile(values, np.linspace(0, 1, 2 * _BINS + 1)[1:-1])
-    return np.asarray(np.searchsorted(edges, values))
-
-
-def heat_map(joints: Sequence[str], residuals: Residuals, floor: np.ndarray) -> dict[str, Any]:
-    """Return the mean excess over the floor of each joint and regime, as a page draws it."""
-    squares, counts = _sums(joints, residuals)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        excess = np.where(counts > 0, squares / counts / floor[:, None] ** 2 - 1, 0.0)
-    return {"joints": list(joints), "regimes": list(REGIMES), "excess": excess.tolist()}
-
-
-def follows(residuals: Residuals, joint: int) -> str | None:
-    """Return the variable whose bins explain the most of a joint's residual."""
-    residual = np.concatenate([r[:, joint] for _, r in residuals])
-    kept = np.isfinite(residual)
-    if kept.sum() < 10 * _BINS:
-        return None
-    best, most = None, 0.0
-    for name, values in _variables(residuals, joint).items():
-        share = _binned(values[kept], residual[kept])
-        if share > most:
-            best, most = name, share
-    return best
-
-
-def _variables(residuals: Residuals, joint: int) -> dict[str, np.ndarray]:
-    motions = [motion for motion, _ in residuals]
-
-    def joined(parts: Sequence[np.ndarray]) -> np.ndarray:
-        return np.concatenate(list(parts))
-
-    found = {
-        "angle": joined([m.q[:, joint] for m in motions]),
-        "speed": joined([m.dq[:, joint] for m in motions]),
-        "acceleration": joined([m.ddq[:, joint] for m in motions]),
-        "time": joined([m.time - m.time[0] for m in motions]),
-    }
-    if all(m.torque is not None for m in motions):
-        found["torque"] = joined([m.torque[:, joint] - r[:, joint] for m, r in residuals if m.torque is not None])
-    if all(m.temperature is not None for m in motions):
-        found["temperature"] = joined([m.temperature[:, joint] for m in motions if m.temperature is not None])
-    return found
-
-
-def _binned(values: np.ndarray, residual: np.ndarray) -> float:
-    edges = np.quantile(values[np.isfinite(values)], np.linspace(0, 1, _BINS + 1)[1:-1]) if len(values) else []
-    place = np.searchsorted(edges, values)
-    counts = np.bincount(place, minlength=_BINS)
-    means = np.bincount(place, residual, minlength=_BINS) / np.maximum(counts, 1)
-    return float(np.sum(counts * means**2) / max(float(np.sum(residual**2)), 1e-30))
-
-
-def _regimes(motion: Motion, joint: int, fastest: float, sharpest: float) -> np.ndarray:
-    speed, acceleration = motion.dq[:, joint], motion.ddq[:, joint]
-    regime = np.where(speed * acceleration > 0, 3, 4)
-    regime[np.abs(acceleration) < _STEADY * sharpest] = 2
-    regime[np.abs(speed) < _SLOW * fastest] = 1
-    turns = np.flatnonzero(np.diff(np.sign(speed)) != 0)
-    reach = max(1, round(_REVERSAL * motion.rate))
-    for turn in turns:
-        if np.abs(speed[max(0, turn - reach) : turn + reach]).max(initial=0.0) > _STANDSTILL:
-            regime[max(0, turn - reach) : turn + reach] = 5
-    regime[np.abs(speed) < _STANDSTILL] = 0
-    return regime
-
-
-def _sums(joints: Sequence[str], residuals: Residuals) -> tuple[np.ndarray, np.ndarray]:
-    squares, counts = np.zeros((len(joints), len(REGIMES))), np.zeros((len(joints), len(REGIMES)))
-    for j in range(len(joints)):
-        fastest = max((float(np.abs(m.dq[:, j]).max()) for m, _ in residuals), default=0.0)
-        sharpest = max((float(np.abs(m.ddq[:, j]).max()) for m, _ in residuals), default=0.0)
-        for motion, residual in residuals:
-            kept = np.isfinite(residual[:, j])
-            regime = _regimes(motion, j, fastest, sharpest)[kept]
-            squares[j] += np.bincount(regime, residual[kept, j] ** 2, minlength=len(REGIMES))
-            counts[j] += np.bincount(regime, minlength=len(REGIMES))
-    return squares, counts
-
-
-def _excess(joints: Sequence[str], residuals: Residuals, floor: np.ndarray) -> np.ndarray:
-    squares, counts = _sums(joints, residuals)
-    return np.asarray(np.maximum(squares / floor[:, None] ** 2 - counts, 0.0))
-
-
-def _runs(residuals: Residuals, joint: int, floor: float) -> tuple[str, ...]:
-    """Return the runs that stand out over the floor, the worst first."""
-    means = {motion.run: float(np.nanmean(residual[:, joint] ** 2)) for motion, residual in residuals}
-    above = [run for run, mean in means.items() if mean > _STANDS_OUT * floor**2]
+def standing_out(traces: Sequence[Trace], place: int, level: float) -> tuple[str, ...]:
+    """Return the runs whose mean square stands out over a level, the worst first."""
+    means = {trace.motion.run: float(np.nanmean(trace.residual[:, place] ** 2)) for trace in traces}
+    above = [run for run, mean in means.items() if mean > _STANDS_OUT * level]
     return tuple(sorted(above, key=lambda run: -means[run]))
+
+
+def _shares(seen: Map, level: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shares of the excess and the mean excess, (B, g, R) each, units weighted by (B, U)."""
+    squares = np.einsum("bu,ugr->bgr", weights, seen.squares) / level
+    counts = np.einsum("bu,ugr->bgr", weights, seen.counts)
+    total = np.maximum(squares - counts, 0.0)
+    whole = total[..., : seen.regimes.parts].sum(axis=(1, 2), keepdims=True)
+    share = np.divide(total, whole, out=np.zeros_like(total), where=whole > 0)
+    return share, np.divide(squares, counts, out=np.ones_like(total), where=counts > 0) - 1
+
+
+def _p_values(seen: Map, level: np.ndarray, reference: Map | None) -> np.ndarray:
+    """Return one-sided p-values of the excess, (g, R); NaN where too few units tell."""
+    own = _moments(seen, level)
+    other = _moments(reference, level) if reference is not None else None
+    mean, error, freedom = own
+    with np.errstate(invalid="ignore", divide="ignore"):
+        excess = mean - 1
+        if other is not None and np.isfinite(other[1]).any():
+            spread = np.nan_to_num(other[1])
+            total = error**2 + spread**2
+            parts = error**4 / freedom + np.where(spread > 0, spread**4 / other[2], 0.0)
+            error, freedom = np.sqrt(total), total**2 / parts
+        p = t.sf(excess / np.maximum(error, np.finfo(float).tiny), freedom)
+    return np.asarray(np.where(np.isfinite(error) & (freedom > 0), p, np.nan))
+
+
+def _moments(one: Map, level: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the mean over units of the mean squares over the level, its standard error, and degrees of freedom."""
+    enough = one.counts >= FEWEST
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = np.where(enough, one.squares / one.counts / level, np.nan)
+        number = enough.sum(axis=0)
+        mean = np.nansum(values, axis=0) / number
+        spread = np.nansum(np.where(enough, (values - mean) ** 2, 0.0), axis=0) / (number - 1)
+        error = np.where(number > 1, np.sqrt(spread / number), np.nan)
+    return mean, error, np.maximum(number - 1, 0)
+
+
+def _false_discovery(p: np.ndarray) -> np.ndarray:
+    """Return the rate of false discoveries at which each is one; 1 where p is not known."""
+    known = np.isfinite(p)
+    q = np.ones(p.shape)
+    if known.any():
+        q[known] = false_discovery_control(p[known])
+    return q
+
+
+def _interval(drawn: np.ndarray) -> tuple[float, float]:
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return float(low), float(high)

@@ -1,0 +1,124 @@
+"""The map of the gap: squared residuals summed by joint and regime, run by run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irtwin.gap.regimes import JOINT_PARTS, JOINT_REGIMES, ROBOT_PARTS, ROBOT_REGIMES, joint_regimes, robot_regimes
+from irtwin.gap.residuals import Trace
+
+FEWEST = 20  # samples in a regime that tell anything
+_FEWEST_UNITS = 4  # runs, else stretches of time
+_STRETCHES = 8
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """R names of regimes; the first `parts` of them part the samples, the others overlap with these."""
+
+    names: tuple[str, ...]
+    parts: int
+
+
+@dataclass(frozen=True)
+class Map:
+    """Sums over the samples of U units (runs, or stretches of them), g places (joints, or the robot), R regimes.
+
+    squares: (U, g, R) of residuals, N^2 m^2 or W^2; counts: (U, g, R) of samples.
+    """
+
+    regimes: Regimes
+    squares: np.ndarray
+    counts: np.ndarray
+
+    @property
+    def means(self) -> np.ndarray:
+        """(g, R) mean squares over all units; NaN where there is no sample."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.squares.sum(axis=0) / self.counts.sum(axis=0))
+
+
+def joint_maps(seen: Sequence[Trace], others: Sequence[Trace], labels: Mapping[str, str]) -> tuple[Map, Map | None]:
+    """Sum the squares of torque residuals of the observed runs, and of others if any.
+
+    labels: each run's programmed motion, whose runs make one unit.
+    """
+    traces = [*seen, *others]
+    motions, torques = [trace.motion for trace in traces], [trace.torque for trace in traces]
+    masks = [joint_regimes(motions, torques, joint) for joint in range(traces[0].residual.shape[1])]
+    return _both(seen, others, masks, Regimes(JOINT_REGIMES, JOINT_PARTS), labels)
+
+
+def robot_maps(seen: Sequence[Trace], others: Sequence[Trace], labels: Mapping[str, str]) -> tuple[Map, Map | None]:
+    """Sum the squares of power residuals, as `joint_maps` those of torque."""
+    traces = [*seen, *others]
+    masks = [robot_regimes([trace.motion for trace in traces], [trace.torque for trace in traces])]
+    return _both(seen, others, masks, Regimes(ROBOT_REGIMES, ROBOT_PARTS), labels)
+
+
+def level_of(floor: np.ndarray | None, seen: Map, reference: Map | None) -> np.ndarray:
+    """Return the mean square beyond which a gap lies, (g, R): the floor's, or what the reference runs show if more.
+
+    floor: (g,) RMS; where none is known, the place's own mean over all regimes.
+    """
+    if floor is None:
+        whole = seen.squares[..., : seen.regimes.parts].sum(axis=(0, 2)) / seen.counts[..., : seen.regimes.parts].sum(
+            axis=(0, 2)
+        )
+    else:
+        whole = floor**2
+    level = np.repeat(np.maximum(whole, np.finfo(float).tiny)[:, None], len(seen.regimes.names), axis=1)
+    if reference is None:
+        return level
+    enough = reference.counts.sum(axis=0) >= FEWEST
+    return np.where(enough, np.fmax(level, reference.means), level)
+
+
+def heat_map(joints: Sequence[str | None], seen: Map, level: np.ndarray) -> dict[str, Any]:
+    """Return the mean excess of each joint and regime, as a page draws it."""
+    excess = np.nan_to_num(seen.means / level - 1)
+    return {"joints": list(joints), "regimes": list(seen.regimes.names), "excess": excess.tolist()}
+
+
+def _both(
+    seen: Sequence[Trace],
+    others: Sequence[Trace],
+    masks: Sequence[Sequence[np.ndarray]],
+    regimes: Regimes,
+    labels: Mapping[str, str],
+) -> tuple[Map, Map | None]:
+    first = _sums(seen, [mask[: len(seen)] for mask in masks], regimes, labels)
+    return first, _sums(others, [mask[len(seen) :] for mask in masks], regimes, labels) if others else None
+
+
+def _sums(
+    traces: Sequence[Trace],
+    masks: Sequence[Sequence[np.ndarray]],
+    regimes: Regimes,
+    labels: Mapping[str, str],
+) -> Map:
+    units = _units(traces, labels)
+    count = 1 + max(int(unit.max()) for unit in units)
+    squares = np.zeros((count, len(masks), len(regimes.names)))
+    counts = np.zeros(squares.shape)
+    for k, (trace, unit) in enumerate(zip(traces, units, strict=True)):
+        for place, mask in enumerate(masks):
+            kept = np.isfinite(trace.residual[:, place])
+            inside = mask[k][kept].astype(float)
+            np.add.at(squares[:, place], unit[kept], inside * trace.residual[kept, place, None] ** 2)
+            np.add.at(counts[:, place], unit[kept], inside)
+    return Map(regimes, squares, counts)
+
+
+def _units(traces: Sequence[Trace], labels: Mapping[str, str]) -> list[np.ndarray]:
+    """Return the unit of each trace's samples (N,): the run's programmed motion; few of them are cut in time."""
+    order = {label: k for k, label in enumerate(dict.fromkeys(labels[trace.motion.run] for trace in traces))}
+    pieces = 1 if len(order) >= _FEWEST_UNITS else -(-_STRETCHES // len(order))
+    return [
+        order[labels[trace.motion.run]] * pieces + np.arange(len(trace.residual)) * pieces // len(trace.residual)
+        for trace in traces
+    ]

@@ -1,0 +1,53 @@
+"""Power measured without torque: the torque's coefficients show through the power that the torque carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from irtwin.effects.effect import Effect, Term
+from irtwin.effects.stack import Stack
+from irtwin.effects.supply import MechanicalPower
+from irtwin.signals.motion import Motion
+from irtwin.twin.identify import fit_through_power, power_slope
+
+Terms = tuple[tuple[Effect, Term], ...]
+
+
+class ThroughPower(Stack):
+    """A robot's effects whose power is linearised about the joint torque that fits the power best.
+
+    Its terms of power are those of real torque, by the power that they carry, and after them those of power. What is
+    carried is linear in the deviation of the torque's coefficients from that fit; the fixed last term makes it one in
+    the coefficients themselves.
+    """
+
+    def __init__(self, stack: Stack, motions: Sequence[Motion]):
+        """Fit the effects of `stack` to the power of the motions."""
+        self._own = stack
+        self._values = fit_through_power(stack, motions)
+        super().__init__(stack.robot, stack.effects)
+
+    def _check(self) -> None:
+        """The stack that it is made of was checked; terms of torque stand among those of power on purpose."""
+
+    def torque(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque that fits the power best, (N, n) N m."""
+        return self._own.real_torque(motion, self._values[0])
+
+    @cached_property
+    def power_terms(self) -> Terms:
+        """The coefficients of real torque, those of power, and a fixed one."""
+        carried = [pair for pair, real in zip(self._own.torque_terms, self._own.real, strict=True) if real]
+        return (*carried, *self._own.power_terms, (MechanicalPower(), Term("", "1", expected=1.0, fixed=True)))
+
+    def power_columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
+        """Return the (N, L) regressor of power."""
+        torque_values, power_values = self._values
+        own = self._own.predicted_power_columns(motion, torque_values, power_values)
+        slope = power_slope(self._own, motion, torque, power_values)
+        columns = self._own.torque_columns(motion, torque_values)[:, :, self.real]
+        carried = np.einsum("tj,tjk->tk", slope, columns)
+        return np.column_stack([carried, own, -carried @ torque_values[self.real]])

@@ -1,0 +1,99 @@
+"""Diagnoses where torque was measured in no run, or in some and power in others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irtwin.effects.effect import BASELINE
+from irtwin.gap.diagnosis import diagnose
+from irtwin.signals.log import DataSet
+from synthetic import arm, as_run, measure, swing, truth
+
+ROBOT = arm(3)
+WITH_LOSS = (
+    "rigid_body",
+    "rotor_inertia",
+    "coulomb_friction",
+    "viscous_friction",
+    "torque_offset",
+    "mechanical_power",
+    "standby_power",
+    "copper_loss",
+)
+
+
+def data_set(runs, effects=WITH_LOSS):
+    return DataSet(Path("arm"), ROBOT, tuple(runs), effects, None, "mains", True, {})
+
+
+def runs(shows, role="observed", added=None, first=0, count=6):
+    """Runs that show "torque", "power" or both, in turn; `added` gives N m to joint 1's torque."""
+    made = []
+    for k in range(count):
+        motion = replace(swing(ROBOT, first + k // 2, seconds=10.0), run=f"{role}_{first + k}")
+        shown = measure(ROBOT, motion, noise=0.3, seed=first + k)
+        more = np.zeros_like(motion.dq) if added is None else np.outer(added(motion), [1.0, 0, 0])
+        loss = truth(ROBOT)["R"] / 8.0**2 * ((2 * shown.current * 8.0 + more) * more)
+        kept = shows[k % len(shows)]
+        run = as_run(
+            replace(
+                shown,
+                current=None,
+                torque=shown.torque + more if "torque" in kept else None,
+                power=shown.power + (more * motion.dq + loss).sum(axis=1) if "power" in kept else None,
+            )
+        )
+        made.append(replace(run, role=role, repeat_of=f"{role}_{first + k - 1}" if k % 2 else None))
+    return made
+
+
+def test_power_alone_shows_no_gap_where_there_is_none():
+    diagnosis = diagnose(data_set(runs([["power"]])))
+    assert diagnosis.verdict == "no_gap"
+    document = diagnosis.to_json()
+    assert document["gap"].get("torque") is None
+    assert document["gap"]["power"]["excess"] < 0.5
+    assert {"effect": "stribeck_friction", "why": "no torque was measured"} in document["not_testable"]
+
+
+def test_power_alone_lacks_the_loss_in_the_windings():
+    diagnosis = diagnose(data_set(runs([["power"]])), withhold=["copper_loss"])
+    channel, cause = diagnosis.causes[0]
+    assert channel.name == "power"
+    assert "copper_loss" in (cause.effect, *cause.rivals)
+    shrink = diagnosis.to_json()["shrink"]
+    assert shrink["power_rmse"]["after"] < 0.5 * shrink["power_rmse"]["before"]
+    assert "copper_loss" in diagnosis.twin.effect_ids
+
+
+def test_power_alone_lacks_what_stands_by():
+    diagnosis = diagnose(data_set(runs([["power"]]), BASELINE), withhold=["standby_power"])
+    assert diagnosis.causes[0][1].effect == "standby_power"
+
+
+def test_torque_in_some_runs_and_power_in_others():
+    split = [["torque"], ["torque"], ["power"], ["power"]]
+    grease = [*runs(split, "reference", count=8), *runs(split, added=lambda m: 3 * m.dq[:, 0], first=20, count=8)]
+    diagnosis = diagnose(data_set(grease))
+    named = {(channel.name, cause.effect, cause.scope, cause.joints) for channel, cause in diagnosis.causes}
+    assert named == {("torque", "viscous_friction", "changed", ("joint_1",))}
+    power = diagnosis.to_json()["gap"]["power"]
+    assert power["excess"] < 0.5  # the friction that torque showed explains it in runs without torque too
+
+
+def test_torque_in_the_reference_runs_alone():
+    reference = runs([["torque", "power"]], "reference")
+    diagnosis = diagnose(data_set([*reference, *runs([["power"]], first=20)]))
+    assert [channel.name for channel in diagnosis.channels] == ["power"]
+    assert diagnosis.verdict == "no_gap"
+
+
+@pytest.mark.parametrize("signal", ["torque", "power"])
+def test_the_gap_is_told_of_what_was_measured(signal):
+    document = diagnose(data_set(runs([[signal]]))).to_json()
+    assert (document["shrink"]["torque_rmse"] is None) == (signal == "power")
+    assert (document["shrink"]["power_rmse"] is None) == (signal == "torque")
