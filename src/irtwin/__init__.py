@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["adopt", "ask", "diagnose", "export", "run"]
+__all__ = ["adopt", "ask", "diagnose", "export", "predict", "run"]
 
 if TYPE_CHECKING:
-    from irtwin.workflow import adopt, ask, diagnose, export, run
+    from irtwin.workflow import adopt, ask, diagnose, export, predict, run
 
 
 def __getattr__(name: str) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -133,8 +132,6 @@ def diagnose(
     Where the gap lies, which unmodelled effect causes it, and how far it shrinks once that effect is added.
     """
     from irtwin import workflow
-    from irtwin.storage.files import write
-    from irtwin.twin.files import save
 
     found = workflow.diagnose(
         dataset,
@@ -143,13 +140,12 @@ def diagnose(
         repair=repair,
         workspace=workspace,
         database=database,
+        json_file=out,
         report=report,
+        twin_file=save_twin,
         announce=_say,
     )
     document = found.to_json()
-    write(out, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
-    if save_twin is not None and found.twin is not None:
-        save(found.twin, save_twin)
     causes = [f"{cause['effect']} at {', '.join(cause['joints']) or 'the robot'}" for cause in document["causes"]]
     click.echo(f"{document['verdict']}: {'; '.join(causes) or 'no cause named'}")
 
@@ -158,14 +154,18 @@ def diagnose(
 @click.argument("twin", type=click.Path(path_type=Path))
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
-def predict(twin: Path, run: Path, out: Path) -> None:
+@click.option("--payload-mass", type=click.FloatRange(min=0.0), help="kg; as the run's data set says if not given.")
+@click.option("--payload-com", type=float, nargs=3, metavar="X Y Z", help="m in the flange frame; likewise.")
+def predict(
+    twin: Path, run: Path, out: Path, payload_mass: float | None, payload_com: tuple[float, float, float] | None
+) -> None:
     """Say what a saved twin expects of a run.
 
     Torque and power for the motion in RUN, by the TWIN that `irtwin diagnose --save-twin` wrote.
     """
-    from irtwin.gap.predict import predict as predict_run
+    from irtwin import workflow
 
-    predict_run(twin, run, out)
+    workflow.predict(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
     click.echo(out)
 
 

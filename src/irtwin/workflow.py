@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import io
+import json
 import shutil
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet
+
 from irtwin import resources
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
+from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge import graph as knowledge
 from irtwin.knowledge import queries
@@ -30,7 +36,8 @@ from irtwin.report.render import render
 from irtwin.report.scene import draw_scene
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
-from irtwin.twin.files import to_json
+from irtwin.storage.files import check_place, write
+from irtwin.twin.files import load, to_json
 
 Announce = Callable[[str], None]
 WORKSPACE = Path("irtwin-workspace")
@@ -80,20 +87,35 @@ def diagnose(
     repair: bool = False,
     workspace: Path | str | None = None,
     database: str | None = None,
+    json_file: Path | None = None,
     report: Path | None = None,
+    twin_file: Path | None = None,
     announce: Announce = lambda line: None,
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
     `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
-    kept there, in the graph too, so that `adopt` can make its twin the robot's; `report` is an HTML file to write.
+    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
+    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added.
     Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
+    for file in filter(None, (json_file, report, twin_file)):
+        check_place(file)
     announce("Reading the data set")
     data_set = read_data_set(Path(dataset), repair=repair)
     _check_effects(data_set)
+    for line in data_set.repairs:
+        announce(f"  {line}")
     found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
+    document = found.to_json()
+    if json_file is not None:
+        write(json_file, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+    if twin_file is not None and found.twin is not None:
+        write(twin_file, to_json(found.twin).encode())
+    if report is not None:
+        announce("Writing the report")
+        render_alone(data_set, document, found.evidence, report)
     if workspace is not None:
         announce("Keeping the diagnosis")
         with Workspace(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
@@ -101,17 +123,35 @@ def diagnose(
             record(
                 place,
                 identifier(data_set.robot.name),
-                found.to_json(),
+                document,
                 found.evidence,
                 None if found.twin is None else to_json(found.twin),
             )
             graph.load_ontology()
             _map(place, graph)
             reason(graph)
-    if report is not None:
-        announce("Writing the report")
-        render_alone(data_set, found.to_json(), found.evidence, report)
     return found
+
+
+def predict(
+    twin: Path | str,
+    run_file: Path | str,
+    out: Path | str,
+    *,
+    payload_mass: float | None = None,
+    payload_com: tuple[float, float, float] | None = None,
+) -> None:
+    """Write to a Parquet file what a saved twin expects of a run's motion: time, `tau_J` of each joint, `power`.
+
+    payload_mass kg, payload_com m in the flange frame: what the controller was told; None takes it from the data set
+    that lists the run. Raises InputError on a file that is no twin or no run of its robot.
+    """
+    check_place(Path(out))
+    saved = load(Path(twin))
+    table = predicted.predict(saved, predicted.read_motion(saved, Path(run_file), payload_mass, payload_com))
+    buffer = io.BytesIO()
+    pa.parquet.write_table(table, buffer)
+    write(Path(out), buffer.getvalue())
 
 
 def adopt(robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> Path:

@@ -2,26 +2,112 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet
+from dataclasses import replace
 
-from irtwin.gap.predict import predict
+import numpy as np
+import pinocchio as pin
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from data_sets import irtwin, write
+from irtwin.effects.rigid_body import flange_frame
 from irtwin.twin.files import save
 from irtwin.twin.identify import identify
-from synthetic import arm, measure, swing
+from synthetic import arm, as_run, measure, swing
+
+ROBOT = arm(2)
+MASS, COM = 3.0, (0.02, -0.01, 0.1)
 
 
-def test_a_saved_twin_predicts_a_run(tmp_path):
-    robot = arm(2)
-    twin = identify(robot, [measure(robot, swing(robot, seed, seconds=10.0)) for seed in (1, 2)])
-    save(twin, tmp_path / "twin.json")
-    new = measure(robot, swing(robot, 3, seconds=10.0))
-    columns = {"time": new.time} | {f"q_{j}": new.q[:, k] for k, j in enumerate(robot.joint_names)}
-    columns |= {f"tau_{j}": new.torque[:, k] for k, j in enumerate(robot.joint_names)}
-    pa.parquet.write_table(pa.table(columns), tmp_path / "run.parquet")
-    predict(tmp_path / "twin.json", tmp_path / "run.parquet", tmp_path / "out.parquet")
-    found = pa.parquet.read_table(tmp_path / "out.parquet")
+def loaded(motion):
+    """The motion as measured with a payload of which the controller was told."""
+    robot = ROBOT
+    frame = flange_frame(robot)
+    model = robot.model.copy()
+    load = pin.Inertia(MASS, frame.placement.act(np.array(COM)), np.zeros((3, 3)))
+    model.inertias[frame.parentJoint] += load
+    data, bare = model.createData(), robot.model.createData()
+    states = list(zip(motion.q, motion.dq, motion.ddq, strict=True))
+    added = np.array([pin.rnea(model, data, *s) - pin.rnea(robot.model, bare, *s) for s in states])
+    shown = measure(robot, motion)
+    return replace(shown, torque=shown.torque + added, payload_mass=MASS, payload_com=COM)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A twin, and a data set whose runs it has not seen: bare, and with a payload."""
+    place = tmp_path_factory.mktemp("predict")
+    save(
+        identify(ROBOT, [measure(ROBOT, swing(ROBOT, seed, seconds=10.0)) for seed in (1, 2)]),
+        place / "twin.json",
+    )
+    bare = as_run(replace(measure(ROBOT, swing(ROBOT, 3, seconds=10.0)), run="bare"))
+    heavy = as_run(replace(loaded(swing(ROBOT, 4, seconds=10.0)), run="loaded"))
+    write(place / "data", ROBOT, [bare, heavy])
+    return place
+
+
+def error(folder, run, *options):
+    """The median error of the first joint's predicted torque, over its deviation."""
+    out = folder / "out.parquet"
+    said = irtwin("predict", folder / "twin.json", run, "--out", out, *options)
+    assert said.status == 0, said.err
+    found, measured = pq.read_table(out), pq.read_table(run)
+    assert found.num_rows == measured.num_rows
+    torque = measured["tau_joint_2"].to_numpy()
+    return np.median(np.abs(found["tau_joint_2"].to_numpy() - torque)) / torque.std()
+
+
+def test_a_saved_twin_predicts_a_run(folder):
+    assert error(folder, folder / "data/runs/bare.parquet") < 0.02
+    found = pq.read_table(folder / "out.parquet")
     assert found.column_names == ["time", "tau_joint_1", "tau_joint_2", "power"]
-    error = found["tau_joint_1"].to_numpy() - new.torque[:, 0]
-    assert np.median(np.abs(error)) < 0.02 * new.torque[:, 0].std()
+
+
+def test_the_payload_is_that_of_the_data_set_unless_told(folder):
+    run = folder / "data/runs/loaded.parquet"
+    assert error(folder, run) < 0.02
+    assert error(folder, run, "--payload-mass", "0") > 0.1
+    lonely = folder / "lonely.parquet"
+    pq.write_table(pq.read_table(run), lonely)
+    assert error(folder, lonely) > 0.1
+    assert error(folder, lonely, "--payload-mass", MASS, "--payload-com", *COM) < 0.02
+
+
+def test_the_motion_of_a_run_is_enough(folder, tmp_path):
+    run = pq.read_table(folder / "data/runs/bare.parquet")
+    pq.write_table(run.select(["time", "q_joint_1", "q_joint_2"]), tmp_path / "planned.parquet")
+    with_torque, alone = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    irtwin("predict", folder / "twin.json", folder / "data/runs/bare.parquet", "--out", with_torque)
+    assert irtwin("predict", folder / "twin.json", tmp_path / "planned.parquet", "--out", alone).status == 0
+    assert pq.read_table(alone).equals(pq.read_table(with_torque))
+
+
+def broken(folder, tmp_path, fault):
+    """The arguments of a command that has one fault, and what is said of it."""
+    twin, run, out = folder / "twin.json", tmp_path / "run.parquet", tmp_path / "out.parquet"
+    table = pq.read_table(folder / "data/runs/bare.parquet")
+    pq.write_table(table, run)
+    if fault == "another robot":
+        pq.write_table(table.rename_columns([n.replace("joint_2", "elbow") for n in table.column_names]), run)
+        return (twin, run, "--out", out), 'run.parquet: column q_elbow: the URDF has no moving joint "elbow"'
+    if fault == "no twin":
+        return (run, run, "--out", out), "name a twin that irtwin saved"
+    if fault == "no run":
+        return (twin, tmp_path / "nowhere.csv", "--out", out), "nowhere.csv: cannot be read"
+    if fault == "a bad sample":
+        q = np.array(table["q_joint_1"]).copy()
+        q[17] = np.inf
+        pq.write_table(table.set_column(1, "q_joint_1", pa.array(q)), run)
+        return (twin, run, "--out", out), "run.parquet, row 17, column q_joint_1: is not a finite number"
+    return (twin, run, "--out", run / "out.parquet"), "cannot be written"
+
+
+@pytest.mark.parametrize("fault", ["another robot", "no twin", "no run", "a bad sample", "no place"])
+def test_a_fault_is_one_line_and_leaves_nothing(folder, tmp_path, fault):
+    arguments, message = broken(folder, tmp_path, fault)
+    said = irtwin("predict", *arguments)
+    assert said.status == 2
+    assert message in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["run.parquet"]

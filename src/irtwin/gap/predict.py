@@ -1,4 +1,4 @@
-"""What a twin says of a run: torque and power as a Parquet file."""
+"""What a twin says of a run: torque and power, sample by sample."""
 
 from __future__ import annotations
 
@@ -6,38 +6,47 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet
 
-from irtwin.errors import InputError
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import Run
+from irtwin.signals.log import Run, payload_told
 from irtwin.signals.samples import read_signals
-from irtwin.twin.files import load
 from irtwin.twin.twin import Twin
 
 
-def predict(twin_file: Path, run_file: Path, out: Path) -> None:
-    """Write time (s), `tau_J` (N m) of each joint and `power` (W) that a saved twin predicts for a run's motion.
+def read_motion(
+    twin: Twin, file: Path, payload_mass: float | None = None, payload_com: tuple[float, float, float] | None = None
+) -> Run:
+    """Read a run of the twin's robot, of which the motion is enough.
 
-    One row per sample of the run, as it was logged. Raises InputError on a file that is no twin or no run of its robot.
+    payload_mass kg, payload_com m in the flange frame: what the controller was told; None takes it from the data set
+    that lists the file. Raises InputError on a file that is no run of the robot.
     """
-    twin = load(twin_file)
-    signals, _ = read_signals(run_file, twin.robot)
-    run = Run(run_file.stem, run_file, "", "observed", 0.0, (0.0, 0.0, 0.0), None, None, {}, signals)
+    signals, _ = read_signals(file, twin.robot, measured=False)
+    mass, com = payload_told(file) if payload_mass is None or payload_com is None else (0.0, (0.0, 0.0, 0.0))
+    return Run(
+        name=file.stem,
+        file=file,
+        sha256="",
+        role="observed",
+        payload_mass=mass if payload_mass is None else payload_mass,
+        payload_com=com if payload_com is None else payload_com,
+        repeat_of=None,
+        started=None,
+        notes={},
+        signals=signals,
+    )
+
+
+def predict(twin: Twin, run: Run) -> pa.Table:
+    """Return time (s), `tau_J` (N m) of each joint and `power` (W) that a twin predicts for a run's motion.
+
+    One row per sample of the run, as it was logged; power only where the twin has an effect of it.
+    """
+    time = run.signals.time
     motion = condition(run, twin.robot, twin.cutoff)
-    columns = {"time": signals.time}
-    torque = twin.torque(motion)
-    for joint, values in zip(twin.robot.joint_names, torque.T, strict=True):
-        columns[f"tau_{joint}"] = np.interp(signals.time, motion.time, values)
-    if _has_power(twin):
-        columns["power"] = np.interp(signals.time, motion.time, twin.power(motion))
-    partial = out.with_name(out.name + ".part")
-    try:
-        pa.parquet.write_table(pa.table(columns), partial)
-        partial.replace(out)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); name a file in a folder that exists") from error
-
-
-def _has_power(twin: Twin) -> bool:
-    return any(effect.channel == "power" for effect, _ in twin.stack.power_terms)
+    columns = {"time": time}
+    for joint, values in zip(twin.robot.joint_names, twin.torque(motion).T, strict=True):
+        columns[f"tau_{joint}"] = np.interp(time, motion.time, values)
+    if any(effect.channel == "power" for effect, _ in twin.stack.power_terms):
+        columns["power"] = np.interp(time, motion.time, twin.power(motion))
+    return pa.table(columns)

@@ -24,6 +24,7 @@ from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_que
 from irtwin.report.render import content_policy, embedded_json, environment
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import write
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 
@@ -43,8 +44,7 @@ def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path)
     bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
     answers = ask(graph, _questions(), bindings)
     evidence = json.loads(read_document(found["evidence_file"], found["evidence_checksum"]))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(_page(answers, bindings, evidence), encoding="utf-8")
+    write(out, _page(answers, bindings, evidence).encode())
 
 
 def render_alone(data_set: DataSet, diagnosis: Mapping[str, Any], evidence: Mapping[str, Any], out: Path) -> None:

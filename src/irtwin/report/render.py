@@ -20,6 +20,7 @@ from irtwin.report import tables, verdict, wording
 from irtwin.report.explorer import Columns, ReadSeries, explorer, opening_run
 from irtwin.report.figures import figures
 from irtwin.report.questions import Answers, Graph, Question, ask, read_questions
+from irtwin.storage.files import write
 
 DrawScene = Callable[[Columns], str]  # a run's modelled series -> an HTML fragment with its scripts
 
@@ -43,8 +44,7 @@ def render(
     if draw_scene is not None and opens is not None:
         scene = draw_scene(Columns.of(read_series(opens["file"], opens["checksum"])))
     page = _page(answers, bindings, explorer(answers, read_series), scene)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(page, encoding="utf-8")
+    write(out, page.encode())
 
 
 def _questions() -> dict[str, Question]:

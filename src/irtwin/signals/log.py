@@ -85,6 +85,22 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     )
 
 
+def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
+    """Return a run's payload, kg and m in the flange frame, by the data set around it; none where none lists the file.
+
+    Raises InputError where that data set's dataset.toml cannot be read.
+    """
+    for folder in list(file.absolute().parents)[:2]:
+        toml = folder / "dataset.toml"
+        runs = _read_toml(toml).get("run") if toml.is_file() else None
+        for number, values in enumerate(runs if isinstance(runs, list) else [], start=1):
+            table = _Table(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
+            named = table.text("file")
+            if named is not None and (folder / named).resolve() == file.resolve():
+                return table.number("payload_mass", least=0.0) or 0.0, _centre(table)
+    return 0.0, (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class _Table:
     """A TOML table whose faults name it."""

@@ -49,10 +49,11 @@ class Signals:
     power: np.ndarray | None = None
 
 
-def read_signals(path: Path, robot: Robot, *, repair: bool = False) -> tuple[Signals, list[str]]:
+def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bool = True) -> tuple[Signals, list[str]]:
     """Read a run's file; return its signals and, with `repair`, a line for each kind of sample that was dropped.
 
-    Raises InputError, naming file, line or row and column, on anything `LOG_FORMAT.md` calls bad input.
+    `measured`: whether torque or power has to be there, or the motion is enough. Raises InputError, naming file, line
+    or row and column, on anything `LOG_FORMAT.md` calls bad input.
     """
     table, first_line, repairs = _read_table(path, repair)
     columns = _columns(table, robot, path)
@@ -64,7 +65,10 @@ def read_signals(path: Path, robot: Robot, *, repair: bool = False) -> tuple[Sig
         raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {_FEWEST}")
     for joint in robot.joints:
         _check_unit(columns["time"], columns[f"q_{joint.name}"], joint, path)
-    return _signals(columns, robot, path), repairs + dropped
+    signals = _signals(columns, robot, path)
+    if measured and signals.torque is None and signals.power is None:
+        raise InputError(f"{path}: neither torque nor power can be told; {_remedy(signals)}")
+    return signals, repairs + dropped
 
 
 @dataclass(frozen=True)
@@ -231,11 +235,10 @@ def _signals(columns: dict[str, np.ndarray], robot: Robot, path: Path) -> Signal
             torque = current * np.array(constants, dtype=float)
     if power is None and {"voltage", "current"} <= columns.keys():
         power = columns["voltage"] * columns["current"]
-    if torque is None and power is None:
-        remedy = (
-            "give torque_constant for each joint in dataset.toml, or log tau_ or power"
-            if current is not None
-            else "log tau_, i_ or power"
-        )
-        raise InputError(f"{path}: neither torque nor power can be told; {remedy}")
     return Signals(columns["time"], q, stack("dq"), stack("ddq"), torque, current, stack("temp"), power)
+
+
+def _remedy(signals: Signals) -> str:
+    if signals.current is not None:
+        return "give torque_constant for each joint in dataset.toml, or log tau_ or power"
+    return "log tau_, i_ or power"

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from irtwin.errors import InputError
+
 
 @contextmanager
 def temporary_beside(folder: Path) -> Iterator[Path]:
@@ -31,10 +33,22 @@ def put_in_place(temporary: Path, path: Path) -> None:
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file whole, replacing what was there."""
-    with temporary_beside(path.parent) as temporary:
-        temporary.write_bytes(content)
-        put_in_place(temporary, path)
+    """Write a file whole, replacing what was there. Raises InputError where it cannot be written."""
+    try:
+        with temporary_beside(path.parent) as temporary:
+            temporary.write_bytes(content)
+            put_in_place(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def check_place(path: Path) -> None:
+    """Raise InputError where no file can be written, before the work whose result it is to hold."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it")
+    folder = next(folder for folder in path.absolute().parents if folder.exists())
+    if not (folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)):
+        raise InputError(f"{path}: cannot be written, as {folder} is no folder that one may write to")
 
 
 def _sync(path: Path) -> None:
