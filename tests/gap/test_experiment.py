@@ -62,7 +62,10 @@ def ground_of(motions, tried, cause=None, rivals=()):
         causes = (Cause(cause, MISSING, ("joint_2",), own.variants[-1:], 1.0, 9.0, 0.0, tuple(rivals)),)
     attribution = Attribution(causes, noise, found, np.zeros(len(found)), np.zeros(len(found)))
     nothing = Estimate.__new__(Estimate)
-    finding = Finding("torque", system, attribution, held_out(system, noise, noise, ()), None, nothing)
+    observed = frozenset(m.run for m in motions)
+    finding = Finding(
+        "torque", ROBOT.joint_names, observed, system, attribution, held_out(system, noise, noise, ()), None, nothing
+    )
     return TrialGround(finding, stack, lambda motion: Predicted(predicted(motion)))
 
 

@@ -28,6 +28,7 @@ from irtwin.gap.trial_ground import trial_grounds
 from irtwin.gap.verdict import NO_GAP, verdict_of
 from irtwin.gap.visibility import Untestable, can_show, untestable
 from irtwin.gap.where import Left, against_reference, left_of_power, left_of_torque, places
+from irtwin.gap.yardstick import yardstick
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
@@ -51,6 +52,7 @@ class Diagnosis:
     evidence: dict[str, Any] = field(default_factory=dict)
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
+    yardstick: dict[str, Any] = field(default_factory=dict)  # each channel's, what could be closed at all
 
     @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
@@ -68,7 +70,10 @@ class Diagnosis:
             "locations": [location.to_json() for location in self.locations],
             "causes": [document.cause(robot, finding, cause) for finding, cause in self.causes],
             "not_testable": [{"effect": one.effect, "why": one.why} for one in self.untestable],
-            "shrink": document.shrink(self.runs, self.channels, self.floor, self.energies, self.seed),
+            "shrink": {
+                **document.shrink(self.runs, self.channels, self.floor, self.energies, self.seed),
+                "yardstick": self.yardstick,
+            },
             "next_experiment": self.experiment,
         }
 
@@ -114,7 +119,8 @@ def diagnose(
     curves = [line for f in findings if f.name == "torque" for line in cause_curves(stack, f, case.seen, predicted)]
     evidence = drawn(findings, left, located, curves)
     tell("Designing the next experiment")
-    grounds = trial_grounds(case, stack, findings, predicted)
+    grounds = trial_grounds(case, (stack, power_stack), findings, (predicted, torque))
+    measures = {ground.finding.name: yardstick(ground, case.seen, seed) for ground in grounds}
     proposal = next_experiment(case.robot, grounds, [catalogue()[one.effect] for one in lacking], case.seen)
     return Diagnosis(
         description=case.robot,
@@ -129,6 +135,7 @@ def diagnose(
         evidence={**evidence, "experiment": None if proposal is None else proposal.curve},
         twin=closed_twin(case, causes),
         energies=energies,
+        yardstick={name: one.shares() for name, one in measures.items() if one is not None},
     )
 
 

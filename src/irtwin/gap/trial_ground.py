@@ -12,10 +12,11 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.case import Case
 from irtwin.gap.channels import Torque
-from irtwin.gap.explained import ExplainedTorque, PowerOf, twin_power
+from irtwin.gap.explained import PowerOf, twin_power
 from irtwin.gap.finding import Finding
 from irtwin.gap.hypotheses import Column
 from irtwin.gap.programme import Programme
+from irtwin.gap.residuals import as_filtered
 from irtwin.gap.separation import dispersion, projected
 from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.robot.description import Robot
@@ -92,6 +93,47 @@ class TrialGround:
         at = {column: base + place for place, column in enumerate(tried)}
         return Products(existing, existing + self._planned(programme, tried), at, system.base)
 
+    def residuals(self, part: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what the twin leaves of a measured part of a run, what it leaves with its causes, (N, g) each.
+
+        Both are fitted to all runs, and filtered as the measurement was. The third, (N, g): where it is undecided.
+        """
+        finding, system = self.finding, self.finding.system
+        columns = [system.columns[self._plain(k) - system.base] for k in finding.chosen]
+        rows = self._equations(part, columns, ())
+        base = system.base
+        plain = system.expected + system.solution((), self._total)[:base] * system.scale[:base]
+        measured = part.torque if finding.name == "torque" else part.power
+        assert measured is not None
+        own = np.asarray(rows.columns)[..., :base]
+        known = self._known(part, own)
+        both = [own @ plain + known, np.asarray(rows.columns) @ finding.estimate.values + known]
+        both = [as_filtered(part, values) for values in both]
+        measured = measured.reshape(len(part.time), -1)
+        undecided = np.zeros(measured.shape, dtype=bool) if rows.undecided is None else rows.undecided
+        return measured - both[0], measured - both[1], undecided
+
+    def load(self, part: Motion) -> np.ndarray:
+        """Return the joint torque that the twin predicts for a part of a run, (N, n) N m."""
+        return self._below(part.whole or part).torque[part.start : part.start + len(part.time)]
+
+    def groups(self, run: str, time: np.ndarray) -> np.ndarray:
+        """Return (N,) the group in which samples of a run are left out; -1 for none."""
+        system = self.finding.system
+        found = np.full(len(time), -1)
+        for block, group in zip(system.blocks, system.group, strict=True):
+            if block.run == run:
+                found[(time >= block.start) & (time <= block.stop)] = group
+        return found
+
+    def _known(self, part: Motion, own: np.ndarray) -> np.ndarray:
+        """Return what is known to be added, (N, g); `own`: the twin's columns (N, g, K)."""
+        stack = self._stack
+        if self.finding.name == "torque":
+            return np.asarray(own @ stack.shift(part))
+        values = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
+        return np.asarray(stack.power_columns(part, self.load(part))[:, stack.fixed] @ values)[:, None]
+
     def _planned(self, programme: Programme, tried: Sequence[int | Column]) -> np.ndarray:
         system, base = self.finding.system, self.finding.system.base
         columns = [system.columns[self._plain(k) - base] if isinstance(k, int) else k for k in tried]
@@ -149,25 +191,30 @@ class TrialGround:
 
 
 def trial_grounds(
-    case: Case, stack: Stack, findings: Sequence[Finding], predicted: Torque | None
+    case: Case,
+    stacks: tuple[Stack, Stack],
+    findings: Sequence[Finding],
+    torques: tuple[Torque, Torque],
 ) -> tuple[TrialGround, ...]:
-    """Return each channel's trial ground; `predicted` is the twin's joint torque for a run."""
-    by_name = {finding.name: finding for finding in findings}
-    if predicted is None or "torque" not in by_name:
-        return ()
-    torque = ExplainedTorque(stack, by_name["torque"], predicted)
+    """Return each channel's trial ground.
+
+    stacks: the effects that explain torque and power; torques: the joint torque that candidates of either are built on.
+    """
 
     @cache
     def power() -> PowerOf:
-        return twin_power(stack, case.with_power, case.grouping, torque)
+        return twin_power(stacks[1], case.with_power, case.grouping, torques[1])
 
     def below(whole: Motion) -> Predicted:
-        return Predicted(predicted(whole))
+        return Predicted(torques[0](whole))
 
     def below_power(whole: Motion) -> Predicted:
-        real = torque(whole)
+        real = torques[1](whole)
         return Predicted(real, *power()(whole, real))
 
     return tuple(
-        TrialGround(finding, stack, below if name == "torque" else below_power) for name, finding in by_name.items()
+        TrialGround(finding, stacks[0], below)
+        if finding.name == "torque"
+        else TrialGround(finding, stacks[1], below_power)
+        for finding in findings
     )
