@@ -264,7 +264,7 @@ def make(plan: Plan, folder: Path) -> dict[str, Any]:
     temporary = folder / f".{plan.name}"
     shutil.rmtree(temporary, ignore_errors=True)
     (temporary / "runs").mkdir(parents=True)
-    _write(case, temporary, traces, *case.noisy(seen, drawn_power))
+    write_runs(case, temporary, traces, *case.noisy(seen, drawn_power))
     shutil.rmtree(folder / plan.name, ignore_errors=True)
     temporary.rename(folder / plan.name)
     return label
@@ -298,7 +298,7 @@ def _run_name(index: int) -> str:
     return f"run_{index:02d}"
 
 
-def _write(case: Case, folder: Path, traces: Traces, seen: np.ndarray, drawn: np.ndarray) -> None:
+def write_runs(case: Case, folder: Path, traces: Traces, seen: np.ndarray, drawn: np.ndarray) -> None:
     machine, drawings = case.machine, case.machine.drawings
     names, stride = drawings.joints, case.stride
     resolution = 2 * np.pi / 2**drawings.sensors.encoder_bits / machine.drive.gear_ratio

@@ -53,7 +53,7 @@ REFUSED = {
     "nothing moves": (lambda: runs(q=still), "dataset.toml: no joint moves in any observed run; log runs in motion"),
     "nothing in common": (
         lambda: [*runs("reference", torque=nothing), *runs(seeds=range(5, 9), power=nothing)],
-        "the reference runs have power alone and the observed runs torque alone; log one signal in both",
+        "dataset.toml: the reference runs share neither torque nor power with the observed runs; log one",
     ),
     "one run twice": (
         lambda: [*runs(seeds=range(3)), replace(runs(seeds=range(1))[0], name="again")],

@@ -32,7 +32,7 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     others = [run for run in data_set.runs if run.role != "observed"]
     if others and not _overlap(seen, [motions[run.name] for run in others]):
         raise InputError(
-            f"{file}: the {others[0].role} runs have power alone and the observed runs torque alone; "
+            f"{file}: the {others[0].role} runs share neither torque nor power with the observed runs; "
             "log one signal in both, or leave these runs out"
         )
     _check_copies(data_set.runs)
