@@ -30,7 +30,9 @@ STEPS = 20  # of forward selection, at most
 STRONG = 6.0  # of BIC (Kass and Raftery 1995): rivals that are nearer are not told apart
 ALPHA = 0.01  # of the F-test, over all hypotheses (Bonferroni)
 BOOTSTRAPS = 50
-THRESHOLD = 0.03  # of the residual's mean square: columns that add less are set to zero
+# both chosen on 20 development cases, torque alone: first right most often, then fewest alarms on clean nulls
+THRESHOLD = 0.01  # of the residual's mean square: columns that add less are set to zero
+RIDGE = 0.01  # of a column's own square
 INCLUDED = 0.6  # of the bootstraps (Fasel et al. 2022)
 
 
@@ -92,19 +94,19 @@ def thresholded(products: np.ndarray) -> np.ndarray:
     """Return the share of the mean square that each of M columns adds, by STLSQ on (M + 1, M + 1) products.
 
     Sequentially thresholded least squares (Brunton, Proctor and Kutz 2016): what adds less than THRESHOLD is set to
-    zero, the rest fitted again.
+    zero, the rest fitted again; ridge as in PySINDy.
     """
     normal, right, square = products[:-1, :-1], products[:-1, -1], products[-1, -1]
-    inside, share = np.arange(len(right)), np.zeros(len(right))
-    while len(inside):
-        values = np.linalg.solve(normal[np.ix_(inside, inside)] + np.eye(len(inside)), right[inside])
-        share[:] = 0.0
-        share[inside] = values**2 * np.diag(normal)[inside] / square
-        kept = inside[share[inside] >= THRESHOLD]
-        if len(kept) == len(inside):
+    inside = np.arange(len(right))
+    while True:
+        own = normal[np.ix_(inside, inside)]
+        values = np.linalg.solve(own + np.diag(1 + RIDGE * np.diag(own)), right[inside])
+        adds = values**2 * np.diag(own) / square
+        if (adds >= THRESHOLD).all():
             break
-        inside = kept
-        share[np.setdiff1d(np.arange(len(right)), inside)] = 0.0
+        inside = inside[adds >= THRESHOLD]
+    share = np.zeros(len(right))
+    share[inside] = adds
     return share
 
 
