@@ -63,14 +63,9 @@ def robot_maps(seen: Sequence[Trace], others: Sequence[Trace], labels: Mapping[s
 def level_of(floor: np.ndarray | None, seen: Map, reference: Map | None) -> np.ndarray:
     """Return the mean square beyond which a gap lies, (g, R): the floor's, or what the reference runs show if more.
 
-    floor: (g,) RMS; where none is known, the place's own mean over all regimes.
+    floor: (g,) RMS; where none is known, the mean square in the regime that has the least stands in for its square.
     """
-    if floor is None:
-        whole = seen.squares[..., : seen.regimes.parts].sum(axis=(0, 2)) / seen.counts[..., : seen.regimes.parts].sum(
-            axis=(0, 2)
-        )
-    else:
-        whole = floor**2
+    whole = _least(seen) if floor is None else floor**2
     level = np.repeat(np.maximum(whole, np.finfo(float).tiny)[:, None], len(seen.regimes.names), axis=1)
     if reference is None:
         return level
@@ -82,6 +77,12 @@ def heat_map(joints: Sequence[str | None], seen: Map, level: np.ndarray) -> dict
     """Return the mean excess of each joint and regime, as a page draws it."""
     excess = np.nan_to_num(seen.means / level - 1)
     return {"joints": list(joints), "regimes": list(seen.regimes.names), "excess": excess.tolist()}
+
+
+def _least(seen: Map) -> np.ndarray:
+    parts = slice(seen.regimes.parts)
+    enough = seen.counts.sum(axis=0)[:, parts] >= FEWEST
+    return np.asarray(np.min(np.where(enough, seen.means[:, parts], np.inf), axis=1))
 
 
 def _both(

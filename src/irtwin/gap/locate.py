@@ -10,6 +10,16 @@ import numpy as np
 from scipy.stats import false_discovery_control, t
 
 from irtwin.gap.excess_map import FEWEST, Map
+from irtwin.gap.regimes import (
+    ACCELERATING,
+    BRAKING,
+    LOADED,
+    LOW_SPEED,
+    REGENERATING,
+    REVERSAL,
+    STANDSTILL,
+    STEADY_SPEED,
+)
 from irtwin.gap.residuals import Trace
 
 _DISCOVERIES = 0.05  # expected share of false ones among the places
@@ -17,6 +27,15 @@ _LEAST_SHARE = 0.02
 _PLACES = 12
 _STANDS_OUT = 1.5  # times the floor's square
 _RESAMPLED = 1000
+_LOADS = ("torque", "torque_squared")  # what the residual has to follow so that its place is the load
+_UNSUITED = 0.5  # of the rank, where a regime does not suit the variable that the residual follows
+_SUITS = {
+    "speed": (LOW_SPEED, REVERSAL, STEADY_SPEED, STANDSTILL),
+    "acceleration": (ACCELERATING, BRAKING),
+    "torque": (LOADED, ACCELERATING, BRAKING, STANDSTILL),
+    "torque_squared": (LOADED, ACCELERATING, BRAKING, STANDSTILL),
+    "mechanical_power": (REGENERATING, ACCELERATING, BRAKING),
+}
 
 
 @dataclass(frozen=True)
@@ -24,7 +43,8 @@ class Location:
     """A place of the gap: the excess of its mean square over the floor's, with 95 % intervals over runs.
 
     `share` of the channel's whole excess; places that overlap (`loaded` with all others) share it. `q`: the rate of
-    false discoveries at which the place is found. `concentration`: the place's share over its share of the samples.
+    false discoveries at which the place is found. `concentration`: the place's share of its joint's excess over its
+    share of the samples. `rank` orders them.
     """
 
     channel: str
@@ -38,11 +58,7 @@ class Location:
     excess_interval: tuple[float, float]
     concentration: float
     q: float
-
-    @property
-    def rank(self) -> float:
-        """What ranks it: its share, and how concentrated the gap is there."""
-        return float(self.share * np.sqrt(self.concentration))
+    rank: float
 
     def to_json(self) -> dict[str, Any]:
         """Return the location in the form of the schema, with what is sure of it besides."""
@@ -64,43 +80,56 @@ class Location:
 def locate(
     channel: str,
     joints: Sequence[str | None],
+    follows: Sequence[str | None],
     seen: Map,
     level: np.ndarray,
     reference: Map | None = None,
     seed: int = 0,
 ) -> list[Location]:
-    """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first.
+    """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first; `runs` are empty.
 
-    The false discovery rate over places is held at 5 % (Benjamini and Hochberg); p-values are Student's over units,
-    of the mean squares' excess, against those of the reference where there is one. `follows` and `runs` are empty.
+    joints, follows: of each of the g places its joint and the variable that its residual follows. The false discovery
+    rate over places is held at 5 % (Benjamini and Hochberg); p-values are Student's over units, of the logarithm of
+    the mean square over the level, against that of the reference where there is one. A place ranks high where its
+    joint has much of the excess, its regime much of the joint's in few samples, and suits the variable.
     """
     share, excess = _shares(seen, level, np.ones((1, len(seen.squares))))
     rng = np.random.default_rng(seed)
     weights = rng.multinomial(len(seen.squares), np.full(len(seen.squares), 1 / len(seen.squares)), _RESAMPLED)
     drawn_share, drawn_excess = _shares(seen, level, weights.astype(float))
-    counts = seen.counts.sum(axis=0)
-    part = counts / np.maximum(counts[:, : seen.regimes.parts].sum(axis=1, keepdims=True), 1)
-    within = share[0] / np.maximum(share[0][:, : seen.regimes.parts].sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    of_joint = share[0][:, : seen.regimes.parts].sum(axis=1)
+    concentration = _concentration(seen, share[0], of_joint)
     q = _false_discovery(_p_values(seen, level, reference))
     found = [
         Location(
             channel,
             joint,
             regime,
-            None,
+            follows[place],
             (),
             share=float(min(share[0, place, r], 1.0)),
             share_interval=_interval(drawn_share[:, place, r]),
             excess=float(excess[0, place, r]),
             excess_interval=_interval(drawn_excess[:, place, r]),
-            concentration=float(within[place, r] / part[place, r]),
+            concentration=float(concentration[place, r]),
             q=float(q[place, r]),
+            rank=float(of_joint[place] * share[0, place, r] * np.sqrt(concentration[place, r]))
+            * (1.0 if regime in _SUITS.get(follows[place] or "", seen.regimes.names) else _UNSUITED),
         )
         for place, joint in enumerate(joints)
         for r, regime in enumerate(seen.regimes.names)
-        if share[0, place, r] >= _LEAST_SHARE and q[place, r] <= _DISCOVERIES
+        if share[0, place, r] >= _LEAST_SHARE
+        and q[place, r] <= _DISCOVERIES
+        and (regime != LOADED or follows[place] in _LOADS)
     ]
     return sorted(found, key=lambda location: -location.rank)[:_PLACES]
+
+
+def _concentration(seen: Map, share: np.ndarray, of_joint: np.ndarray) -> np.ndarray:
+    counts = seen.counts.sum(axis=0)
+    part = counts / np.maximum(counts[:, : seen.regimes.parts].sum(axis=1, keepdims=True), 1)
+    within = np.divide(share, of_joint[:, None], out=np.zeros_like(share), where=of_joint[:, None] > 0)
+    return np.asarray(np.divide(within, part, out=np.zeros_like(share), where=part > 0))
 
 
 def standing_out(traces: Sequence[Trace], place: int, level: float) -> tuple[str, ...]:
@@ -122,30 +151,27 @@ def _shares(seen: Map, level: np.ndarray, weights: np.ndarray) -> tuple[np.ndarr
 
 def _p_values(seen: Map, level: np.ndarray, reference: Map | None) -> np.ndarray:
     """Return one-sided p-values of the excess, (g, R); NaN where too few units tell."""
-    own = _moments(seen, level)
-    other = _moments(reference, level) if reference is not None else None
-    mean, error, freedom = own
-    with np.errstate(invalid="ignore", divide="ignore"):
-        excess = mean - 1
-        if other is not None and np.isfinite(other[1]).any():
-            spread = np.nan_to_num(other[1])
-            total = error**2 + spread**2
-            parts = error**4 / freedom + np.where(spread > 0, spread**4 / other[2], 0.0)
-            error, freedom = np.sqrt(total), total**2 / parts
-        p = t.sf(excess / np.maximum(error, np.finfo(float).tiny), freedom)
-    return np.asarray(np.where(np.isfinite(error) & (freedom > 0), p, np.nan))
+    mean, variance, freedom = _moments(seen, level)
+    if reference is not None:
+        _, other, of_other = _moments(reference, level)
+        parts = variance**2 / np.maximum(freedom, 1) + np.where(of_other > 0, other**2 / np.maximum(of_other, 1), 0.0)
+        variance = variance + np.where(of_other > 0, other, 0.0)
+        freedom = np.where(freedom > 0, variance**2 / np.maximum(parts, np.finfo(float).tiny), 0)
+    with np.errstate(invalid="ignore"):
+        p = t.sf(mean / np.sqrt(np.maximum(variance, np.finfo(float).tiny)), freedom)
+    return np.asarray(np.where(freedom > 0, p, np.nan))
 
 
 def _moments(one: Map, level: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the mean over units of the mean squares over the level, its standard error, and degrees of freedom."""
+    """Return the mean over units of the logarithm of mean square over level, its variance, and degrees of freedom."""
     enough = one.counts >= FEWEST
-    with np.errstate(invalid="ignore", divide="ignore"):
-        values = np.where(enough, one.squares / one.counts / level, np.nan)
-        number = enough.sum(axis=0)
-        mean = np.nansum(values, axis=0) / number
-        spread = np.nansum(np.where(enough, (values - mean) ** 2, 0.0), axis=0) / (number - 1)
-        error = np.where(number > 1, np.sqrt(spread / number), np.nan)
-    return mean, error, np.maximum(number - 1, 0)
+    ratio = np.divide(one.squares, one.counts * level, out=np.ones_like(one.squares), where=enough)
+    values = np.log(np.maximum(ratio, np.finfo(float).tiny))
+    number = np.maximum(enough.sum(axis=0), 1)
+    mean = values.sum(axis=0) / number
+    spread = np.where(enough, (values - mean) ** 2, 0.0).sum(axis=0)
+    freedom = enough.sum(axis=0) - 1
+    return mean, spread / np.maximum(freedom, 1) / number, np.maximum(freedom, 0)
 
 
 def _false_discovery(p: np.ndarray) -> np.ndarray:

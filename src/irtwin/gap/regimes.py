@@ -40,8 +40,8 @@ def joint_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], join
         slow = np.asarray(np.abs(speed) < _SLOW * fastest)
         steady = np.asarray(np.abs(acceleration) < _STEADY * sharpest)
         gaining = speed * acceleration > 0
-        taken = _first_true([standing, turning, slow, steady, gaining, ~gaining])
-        parts = [taken[:, place] for place in (0, 2, 3, 4, 5, 1)]
+        taken = _first_true([turning, standing, slow, steady, gaining, ~gaining])
+        parts = [taken[:, place] for place in (1, 2, 3, 4, 5, 0)]
         found.append(np.stack([*parts, np.abs(torque[:, joint]) > _LOADED * heaviest], axis=1))
     return found
 

@@ -68,12 +68,12 @@ def places(left: Sequence[Left], first: str | None, seed: int) -> list[Location]
 
 
 def _places(left: Left, seed: int) -> list[Location]:
-    located = locate(left.channel, left.joints, left.seen, left.level, left.reference, seed)
-    follows: dict[str | None, str | None] = {}
-    runs: dict[str | None, tuple[str, ...]] = {}
-    for joint in dict.fromkeys(place.joint for place in located):
-        k = left.joints.index(joint)
-        best = followed(left.traces, None if joint is None else k)
-        follows[joint] = best[0] if best else None
-        runs[joint] = standing_out(left.traces, k, float(left.level[k].min()))
-    return [replace(place, follows=follows[place.joint], runs=runs[place.joint]) for place in located]
+    best = [followed(left.traces, None if joint is None else k) for k, joint in enumerate(left.joints)]
+    follows = [found[0] if found else None for found in best]
+    located = locate(left.channel, left.joints, follows, left.seen, left.level, left.reference, seed)
+    return [replace(place, runs=_standing_out(left, place)) for place in located]
+
+
+def _standing_out(left: Left, place: Location) -> tuple[str, ...]:
+    k = left.joints.index(place.joint)
+    return standing_out(left.traces, k, float(left.level[k].min()))
