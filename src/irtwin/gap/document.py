@@ -49,6 +49,7 @@ def cause(robot: Robot, finding: Finding, one: Cause) -> Json:
         "indistinguishable_from": list(one.rivals),
         "evidence": {
             "channel": finding.name,
+            "share_of_what_is_closed": finding.share(one),
             "gain_on_groups_left_out": one.gain,
             "t_between_groups": one.t,
             "p_adjusted_for_the_catalogue": one.p,
@@ -125,6 +126,7 @@ def _by_cause(finding: Finding, one: Cause) -> Json:
         "effect": one.effect,
         "scope": one.scope,
         "channel": finding.name,
+        "share": finding.share(one),
         "rmse_before": [float(value) for value in alone.rmse(alone.before)],
         "rmse_alone": [float(value) for value in alone.rmse(alone.after)],
         "rmse_when_left_out": [float(value) for value in without.rmse(without.after)],

@@ -10,6 +10,7 @@ import numpy as np
 from irtwin.gap.attribute import Attribution, Cause, attribute
 from irtwin.gap.case import Case
 from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
+from irtwin.gap.shares import shares
 from irtwin.gap.shrink import HeldOut, held_out
 from irtwin.gap.system import System
 from irtwin.identification.estimators import Estimate, estimate
@@ -22,7 +23,8 @@ class Finding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
-    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together.
+    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
+    part of what they close together, none where they close nothing.
     """
 
     name: str
@@ -33,11 +35,16 @@ class Finding:
     held_out: HeldOut
     floor: np.ndarray | None
     estimate: Estimate
+    shares: tuple[float, ...] = ()
 
     @property
     def causes(self) -> tuple[Cause, ...]:
         """The channel's causes, ranked."""
         return self.attribution.causes
+
+    def share(self, cause: Cause) -> float | None:
+        """Return a cause's part of what all close together, None where they close nothing."""
+        return self.shares[self.causes.index(cause)] if self.shares else None
 
     @property
     def chosen(self) -> list[int]:
@@ -79,7 +86,8 @@ def find(name: str, case: Case, system: System, floor: np.ndarray | None, seed: 
     found = attribute(system, candidates, seed)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
-    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen))
+    parts = shares(system, found, seed)
+    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), parts)
 
 
 def noise_before(system: System) -> np.ndarray:

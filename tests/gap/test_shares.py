@@ -1,0 +1,80 @@
+"""Shares of causes in systems whose squares are known."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from irtwin.effects.effect import Term, catalogue
+from irtwin.gap.attribute import Attribution, Cause
+from irtwin.gap.hypotheses import MISSING, Column, Variant
+from irtwin.gap.shares import shares
+from irtwin.gap.system import System
+from irtwin.identification.accumulate import Block, triangle
+
+ROWS, RUNS = 400, 5
+EFFECT = catalogue()["cable_drag"]
+
+
+def system_of(mix, coefficients, noise=1.0, size=30.0):
+    """Columns that are mixtures (rows of `mix`) of independent ones, each a cause, and what they add up to."""
+    generator = np.random.default_rng(0)
+    blocks = []
+    for run in range(RUNS):
+        independent = np.linalg.qr(generator.standard_normal((ROWS, len(mix[0]))))[0] * np.sqrt(ROWS)
+        columns = size * independent @ np.array(mix).T
+        constant = np.ones((ROWS, 1))
+        measured = columns @ coefficients + noise * generator.standard_normal(ROWS)
+        factor = triangle(np.column_stack([constant, columns, measured]))
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+    names = [f"k{k}" for k in range(len(mix))]
+    columns = tuple(Column(EFFECT, k, Term(name, "1")) for k, name in enumerate(names))
+    terms = ((EFFECT, Term("constant", "1")),)
+    pattern = np.ones((1, 1 + len(mix)), dtype=bool)
+    system = System(terms, columns, pattern, tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
+    causes = tuple(
+        Cause(f"effect_{k}", MISSING, (), (Variant(EFFECT, (1 + k,), (column.term,)),), 1.0, 9.0, 0.0)
+        for k, column in enumerate(columns)
+    )
+    return system, Attribution(causes, np.array([noise]), (), np.zeros(0), np.zeros(0))
+
+
+def test_independent_causes_share_by_their_squares():
+    found = shares(*system_of(np.eye(2), [2.0, 1.0]), seed=0)
+    assert found == pytest.approx([0.8, 0.2], abs=0.02)
+
+
+def test_shares_add_up_to_one_in_any_order_of_the_causes():
+    mix = [[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.3, 1.0]]
+    system, attribution = system_of(mix, [1.0, 2.0, -1.0])
+    found = shares(system, attribution, 0)
+    assert sum(found) == pytest.approx(1)
+    turned = SimpleNamespace(causes=attribution.causes[::-1], noise=attribution.noise)
+    assert shares(system, turned, 0) == pytest.approx(found[::-1])
+
+
+def test_twins_share_alike():
+    """Either closes nearly all alone: the one that is added first would take it."""
+    found = shares(*system_of([[1.0, 0.02], [1.0, -0.02]], [1.0, 1.0]), seed=0)
+    assert found == pytest.approx([0.5, 0.5], abs=0.02)
+
+
+def test_many_causes_are_shared_by_orders_drawn():
+    count = 10
+    system, attribution = system_of(np.eye(count), np.arange(1.0, count + 1))
+    found = shares(system, attribution, 0)
+    squares = np.arange(1.0, count + 1) ** 2
+    assert found == pytest.approx(squares / squares.sum(), abs=0.01)
+    assert found == shares(system, attribution, 0)
+
+
+def test_one_cause_has_it_all_and_none_has_nothing():
+    system, attribution = system_of([[1.0]], [1.0])
+    assert shares(system, attribution, 0) == (1.0,)
+    assert shares(system, SimpleNamespace(causes=(), noise=attribution.noise), 0) == ()
+
+
+def test_where_nothing_is_closed_nothing_is_shared():
+    assert shares(*system_of(np.eye(2), [0.0, 0.0], size=1.0), seed=0) == ()
