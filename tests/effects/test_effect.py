@@ -200,3 +200,15 @@ def test_wrong_lists_of_effects(effects, message):
     with pytest.raises(InputError) as error:
         Stack(arm(2), effects)
     assert str(error.value).startswith(message)
+
+
+@pytest.mark.parametrize("name", [name for name, effect in catalogue().items() if effect.signal == "torque"])
+def test_a_contribution_is_columns_by_coefficients(name):
+    robot = arm(4)
+    motion = swing(robot, 8, seconds=2)
+    motion = replace(motion, temperature=np.full_like(motion.q, 40.0))
+    predicted = Predicted(10 * np.sin(motion.q))
+    effect = catalogue()[name]
+    values = np.random.default_rng(0).uniform(0.5, 1.5, len(effect.terms(robot)))
+    expected = effect.columns(robot, motion, predicted) @ values
+    np.testing.assert_allclose(effect.contribution(robot, motion, values, predicted), expected, rtol=1e-9, atol=1e-9)

@@ -44,13 +44,16 @@ class Predicted:
 
     torque: (N, n) N m, real joint torque (for an effect of measurement: what is shown); power: (N,) W, all of it;
     axes: (N,) W, the part that the joints' drives take from their bus; bodies: (10 n,) inertial parameters with
-    payload, None for those of the URDF.
+    payload, None for those of the URDF; load: (N, n) N m, what the links of these bodies take beyond the gears, None
+    where nobody has computed it. A part knows the `whole` that it was cut from.
     """
 
     torque: np.ndarray
     power: np.ndarray | None = None
     axes: np.ndarray | None = None
     bodies: np.ndarray | None = None
+    load: np.ndarray | None = None
+    whole: Predicted | None = field(default=None, repr=False, compare=False)
 
     def part(self, start: int, stop: int) -> Predicted:
         """Return what is predicted for samples start..stop (exclusive)."""
@@ -60,6 +63,8 @@ class Predicted:
             None if self.power is None else self.power[cut],
             None if self.axes is None else self.axes[cut],
             self.bodies,
+            None if self.load is None else self.load[cut],
+            self.whole or self,
         )
 
 
@@ -109,6 +114,12 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return the columns per unit of the coefficients: (N, n, k) N m where `signal` is torque, else (N, k) W."""
+
+    def contribution(
+        self, robot: Robot, motion: Motion, values: np.ndarray, predicted: Predicted | None = None
+    ) -> np.ndarray:
+        """Return columns @ values (k,): (N, n) N m where `signal` is torque, else (N,) W."""
+        return np.asarray(self.columns(robot, motion, predicted) @ values)
 
     def undecided(self, motion: Motion) -> np.ndarray | None:
         """Return (N, n) where the effect cannot say the joint's torque, so that a fit leaves these samples out."""
@@ -186,6 +197,18 @@ class JointEffect(Effect):
             for number, part in enumerate(parts):
                 columns[:, joint, place * len(parts) + number] = part[:, joint]
         return columns
+
+    def contribution(
+        self, robot: Robot, motion: Motion, values: np.ndarray, predicted: Predicted | None = None
+    ) -> np.ndarray:
+        """Return columns @ values (k,), without the zeros of other joints."""
+        parts = self.samples(robot, motion, predicted)
+        weights = np.zeros((len(parts), motion.dq.shape[1]))
+        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        weights[:, acting] = values.reshape(len(acting), len(parts)).T
+        if self.signal == "power":
+            return np.asarray(sum(part @ weight for part, weight in zip(parts, weights, strict=True)))
+        return np.asarray(sum(part * weight for part, weight in zip(parts, weights, strict=True)))
 
 
 def quantity(

@@ -52,6 +52,12 @@ class RigidBody(Effect):
             regressor[row] = regress(model, data, *state)
         return regressor
 
+    def contribution(
+        self, robot: Robot, motion: Motion, values: np.ndarray, predicted: Predicted | None = None
+    ) -> np.ndarray:
+        """Return the (N, n) torque of bodies of these inertial parameters (10 n,), by recursive Newton-Euler."""
+        return inverse_dynamics(model_of(robot, values), motion)
+
     def shift(self, robot: Robot, motion: Motion) -> np.ndarray:
         """Return the payload that the controller was told, as a point mass on the last body."""
         model = robot.model
@@ -82,6 +88,15 @@ def model_of(robot: Robot, bodies: np.ndarray | None) -> pin.Model:
             mass = values[0] if abs(values[0]) > _LIGHT else _LIGHT
             model.inertias[index] = pin.Inertia.FromDynamicParameters(np.append(mass, values[1:]))
     return model
+
+
+def inverse_dynamics(model: pin.Model, motion: Motion) -> np.ndarray:
+    """Return the (N, n) joint torque, N m, that the model's bodies take in the motion."""
+    data = model.createData()
+    torque = np.empty(motion.q.shape)
+    for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        torque[row] = pin.rnea(model, data, *state)
+    return torque
 
 
 def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:

@@ -37,7 +37,6 @@ class TorqueDrift(JointEffect):
 
     id: ClassVar[str] = "torque_drift"
     channel: ClassVar[str] = "measurement"
-    memory: ClassVar[bool] = True  # it knows when the run began
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return r."""
@@ -45,7 +44,8 @@ class TorqueDrift(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return the time since the run's start."""
-        return (np.broadcast_to((motion.time - motion.time[0])[:, None], motion.dq.shape),)
+        began = (motion.whole or motion).time[0]
+        return (np.broadcast_to((motion.time - began)[:, None], motion.dq.shape),)
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,6 @@ class TimeDelay(JointEffect):
     channel: ClassVar[str] = "measurement"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 3
-    memory: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (5e-4, 0.6)}
 
     d: float = 0.005  # s
@@ -124,7 +123,11 @@ class TimeDelay(JointEffect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return (tau(t - d) - tau(t))/d; before the run's start torque is what it was there."""
         assert predicted is not None
-        late = [np.interp(motion.time - self.d, motion.time, torque) for torque in predicted.torque.T]
+        whole, before, start = motion, predicted.torque, 0
+        if motion.whole is not None and predicted.whole is not None:
+            whole, before, start = motion.whole, predicted.whole.torque, motion.start
+        near = slice(max(0, start - int(self.d * whole.rate) - 2), start + len(motion.time))
+        late = [np.interp(motion.time - self.d, whole.time[near], torque) for torque in before[near].T]
         return ((np.array(late).T - predicted.torque) / self.d,)
 
 

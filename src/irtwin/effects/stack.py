@@ -127,7 +127,12 @@ class Stack:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients."""
         if self.coupled:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
-        return np.asarray(self.torque_columns(motion) @ np.where(self.real, values + self.shift(motion), 0.0))
+        total = values + self.shift(motion)
+        torque = np.zeros(motion.dq.shape)
+        for effect, own in _slices(self._torque, self.robot):
+            if effect.channel == "torque":
+                torque += self._contribution(effect, motion, total[own], None)
+        return torque
 
     def predicted_power_columns(
         self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None = None
@@ -194,6 +199,13 @@ class Stack:
             self._last_columns[id(effect)] = last
         return last[2][motion.start : stop]
 
+    def _contribution(self, effect: Effect, motion: Motion, values: np.ndarray, below: Predicted | None) -> np.ndarray:
+        """Return what (k,) coefficients of an effect of torque add, (N, n) N m; `below` as in `columns`."""
+        if effect.memory or not effect.acts_in(motion):
+            return np.asarray(self.columns(effect, motion, below) @ values)
+        stop = motion.start + len(motion.time)
+        return effect.contribution(self.robot, motion, values, below and below.part(motion.start, stop))
+
     def _bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
         total = values + self.shift(motion)
         for effect, own in _slices(self._torque, self.robot):
@@ -224,7 +236,7 @@ class Stack:
                 for effect, own in now:
                     if not total[own].any():
                         continue
-                    part = self.columns(effect, piece, below[stage]) @ total[own]
+                    part = self._contribution(effect, piece, total[own], below[stage])
                     shown[cut] += part
                     if effect.channel == "torque":
                         real[cut] += part

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import ClassVar
 
 import numpy as np
@@ -79,11 +80,9 @@ class BusCapacitor(Effect):
         """Return (N, 1) the flow into the store, over E."""
         assert predicted is not None and predicted.axes is not None
         step = 1 / motion.rate
-        stored = 0.0
-        flow = np.zeros(len(motion.time))
-        for place, power in enumerate(predicted.axes.tolist()):
-            flow[place] = min(max(-power, -stored / step), (self.E - stored) / step)
-            stored += flow[place] * step
+        given = (-step * predicted.axes).tolist()
+        stored = accumulate(given, lambda before, more: min(max(before + more, 0.0), self.E), initial=0.0)
+        flow = np.diff(np.fromiter(stored, dtype=float, count=len(given) + 1)) / step
         return flow[:, None] / self.E
 
 

@@ -22,7 +22,7 @@ from irtwin.effects.effect import (
     size,
 )
 from irtwin.effects.friction import direction
-from irtwin.effects.rigid_body import model_of
+from irtwin.effects.rigid_body import inverse_dynamics, model_of
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import differentiate
 from irtwin.signals.motion import Motion
@@ -32,10 +32,9 @@ _GEARS = (50.0, 80.0, 100.0, 101.0, 120.0, 121.0, 160.0)  # common ratios of str
 
 def load_torque(robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
     """Return (N, n) the torque that the links take beyond the gears."""
-    model = model_of(robot, None if predicted is None else predicted.bodies)
-    data = model.createData()
-    states = zip(motion.q, motion.dq, motion.ddq, strict=True)
-    return np.array([pin.rnea(model, data, *state) for state in states])
+    if predicted is not None and predicted.load is not None:
+        return predicted.load
+    return inverse_dynamics(model_of(robot, None if predicted is None else predicted.bodies), motion)
 
 
 @dataclass(frozen=True)
@@ -127,10 +126,9 @@ class JointElasticity(Effect):
         model = model_of(robot, None if predicted is None else predicted.bodies)
         data = model.createData()
         for row, q in enumerate(motion.q):
-            lower = np.triu(pin.crba(model, data, q))
-            mass = lower + lower.T - np.diag(np.diag(lower))
-            slope = pin.computeGeneralizedGravityDerivatives(model, data, q)
-            columns[row] = -(mass * jerked[row] + slope * load[row])[:, acting]
+            mass = pin.crba(model, data, q) * jerked[row]
+            slope = pin.computeGeneralizedGravityDerivatives(model, data, q) * load[row]
+            columns[row] = -(mass + slope)[:, acting]
         return columns
 
     def parameters(
