@@ -155,7 +155,7 @@ def draw(name: str, machine: Machine, runs: np.ndarray, everywhere: bool, rng: n
     elif name == "time_delay":
         guess, most = 0.02, 0.6
     elif name == "winding_temperature":
-        shape, guess, most = {"warmth": rng.permutation(np.linspace(0, 1, len(runs)))}, 1.0, 6.0
+        shape, guess, most = {"warmth": rng.permutation(np.linspace(0, 1, len(runs)))}, 1.0, 2.5
     elif name == "no_regeneration":
         guess, most = 0.5, 1.0
     elif name == "bus_capacitor":

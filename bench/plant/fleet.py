@@ -149,7 +149,9 @@ class Fleet:
                 self._push(arms, contact, time)
             at = sample - self.settle
             if at >= 0:  # before the step: torque then belongs to the second difference of the positions
-                shown = q if encoder is None else q + encoder_mask * (1 + 0.1 * np.sin(q + encoder.shape["phase"]))
+                shown = motor_q  # as industrial robots do: encoders sit on the motors
+                if encoder is not None:
+                    shown = motor_q + encoder_mask * (1 + 0.1 * np.sin(motor_q + encoder.shape["phase"]))
                 for name, value in (("q", shown), ("torque", current), ("temperature", temperature)):
                     kept[name][at] = value
                 kept["dq"][at] = dq / 2

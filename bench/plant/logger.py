@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from plant.drive import COPPER_COEFFICIENT
@@ -57,7 +59,7 @@ def power(traces: Traces, machine: Machine, effects: tuple[Effect, ...], step: f
 
     copper = drive.resistance * current**2
     losses = strength("copper_loss") * copper * (1 + 0.05 * (1 - np.exp(-speed)))
-    losses = losses + _winding(by_id, copper, step)
+    losses = losses + COPPER_COEFFICIENT * winding_rise(effects, traces, step) * copper
     losses = losses + strength("iron_loss") * drive.iron_loss * (speed * drive.gear_ratio / 314.16) ** 1.5
     losses = losses + strength("inverter_loss") * 2.0 * current**2 / (current + 0.15)
     axes = (traces.torque * traces.dq + losses).sum(axis=2)
@@ -74,14 +76,15 @@ def power(traces: Traces, machine: Machine, effects: tuple[Effect, ...], step: f
     return np.where(lag.runs, lagged(lagged(seen, lag.strength / 2, step), lag.strength / 2, step), seen)
 
 
-def _winding(by_id: dict[str, Effect], copper: np.ndarray, step: float) -> np.ndarray:
-    """Copper loss known to the twin, and the winding's warmth on top, which is not: (T, R, n) W."""
-    effect = by_id.get("winding_temperature")
-    if effect is None:
-        return np.zeros_like(copper)
-    rise = 12 * (1 - np.exp(-step * np.arange(len(copper)) / 5))[:, None, None]
-    warm = (45 * effect.shape["warmth"][:, None] + rise) * effect.runs[:, None]
-    return np.asarray(effect.strength * COPPER_COEFFICIENT * warm * copper)
+def winding_rise(effects: Iterable[Effect], traces: Traces, step: float) -> np.ndarray:
+    """Return how much warmer the windings are than their twin thinks: (T, R, 1) K."""
+    time = step * np.arange(len(traces.q))[:, None, None]
+    rise = np.zeros((*traces.q.shape[:2], 1))
+    for effect in effects:
+        if effect.id == "winding_temperature":
+            warm = 45 * effect.shape["warmth"][:, None] + 12 * (1 - np.exp(-time / 5))
+            rise += effect.strength * warm * effect.runs[:, None]
+    return rise
 
 
 def _bus(axes: np.ndarray, burnt: np.ndarray, capacity: np.ndarray, step: float) -> np.ndarray:

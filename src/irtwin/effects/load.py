@@ -24,7 +24,16 @@ from irtwin.effects.rigid_body import flange_frame, last_body_columns, model_of,
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
+_UPRIGHT = 0.7  # of an axis' length that is vertical
 _TURN = np.linspace(0, 2 * np.pi, 181)
+
+
+def balanced_joint(robot: Robot) -> str:
+    """Return the joint that makers balance: the first whose axis is not upright."""
+    data = robot.model.createData()
+    axes = pin.computeJointJacobians(robot.model, data, pin.neutral(robot.model))[3:]
+    lying = np.abs(axes[2]) < _UPRIGHT
+    return robot.joint_names[int(np.argmax(lying)) if lying.any() else 0]
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,10 @@ class GravityCompensation(JointEffect):
 
     id: ClassVar[str] = "gravity_compensation"
     channel: ClassVar[str] = "torque"
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return the effect at the joint that makers balance: the first that gravity loads."""
+        return (self,) if robot is None else (self.on(balanced_joint(robot)),)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the torques that go with cos q, sin q, cos 2 q and sin 2 q."""

@@ -161,7 +161,7 @@ class TorqueRipple(JointEffect):
         """Return low orders, and once and twice per turn of a motor: of the robot's gears, or of common ones."""
         gears = {joint.gear_ratio for joint in robot.joints if joint.gear_ratio} if robot else set()
         fast = [order * gear for gear in sorted(gears or _GEARS) for order in (1, 2)]
-        orders = sorted({1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, *fast})
+        orders = sorted({*map(float, range(1, 25)), *fast})
         return self.variants(N=tuple(order for order in orders if order <= self.ranges["N"][1]))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -8,19 +8,21 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from irtwin.effects.effect import BASELINE
-from irtwin.gap.hypotheses import Hypothesis, Variant
+from irtwin.gap.hypotheses import MISSING, Hypothesis, Variant
 from irtwin.gap.significance import p_values
 from irtwin.gap.system import System, Trial, attempt, scores
 
 _ROUNDS = 12
 _MATTERS = 0.03  # of the mean square of one equation's residual: less than this a cause has to explain
+_LEAST_SHARE = 0.01  # of what the largest cause explains
 _ALPHA = 0.01  # of the whole catalogue
 _LEAST_T = 2.5  # mean gain over its standard error between groups
 _NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
 _RIVAL = 0.8  # of the cause's gain a rival explains
 _APART = 2.0  # standard errors between groups that tell rivals apart
-_PLAIN = {"missing": 0.5, "changed": 0.9}  # of the best gain: a form of the default twin goes before what refines it
-_SAME = 0.03  # of the gain: less does not
+_PLAIN = 0.5  # of the best gain: a form of the default twin that is missing goes before what refines it
+_SAME = 0.01  # of the gain: a smaller difference is none
+_AT_MOST = 0.1  # of the gain: a larger difference is one, whatever its error
 
 
 @dataclass(frozen=True)
@@ -96,16 +98,26 @@ def _columns(found: Sequence[_Found]) -> list[int]:
 
 
 def _gains(system: System, trial: Trial, candidates: Sequence[Hypothesis]) -> tuple[np.ndarray, np.ndarray]:
-    """Return each hypothesis' gain per row and its t between groups, (H,)."""
+    """Return each hypothesis' gain per row and its t between groups, (H,): of the gain, or of its share in each group.
+
+    A group in which little happens has little to gain, which speaks not against an effect.
+    """
     rows = np.maximum(system.rows.max(axis=1), 1.0)
     gain = (trial.start - trial.loss) / rows  # (H, G)
     mean, t = np.empty(len(candidates)), np.empty(len(candidates))
     for k, hypothesis in enumerate(candidates):
         own = system.group_observed if hypothesis.scope == "changed" else np.ones(len(rows), dtype=bool)
         mean[k] = np.average(gain[k, own], weights=rows[own])
-        spread = float(np.std(gain[k, own], ddof=1)) if own.sum() > 1 else np.inf
-        t[k] = mean[k] / max(spread / np.sqrt(own.sum()), 1e-12)
+        share = gain[k, own] * rows[own] / np.maximum(trial.start[own], 1e-12)
+        t[k] = max(_t(gain[k, own]), _t(share))
     return mean, t
+
+
+def _t(values: np.ndarray) -> float:
+    """Return the mean over its standard error; none of one value."""
+    if len(values) < 2:
+        return 0.0
+    return float(values.mean() / max(values.std(ddof=1) / np.sqrt(len(values)), 1e-12))
 
 
 def _round(
@@ -132,7 +144,7 @@ def _round(
     plausible = plausible[p[plausible] <= _ALPHA]
     if not len(plausible):
         return []
-    best = _leader(plausible, gain, left, found)
+    best = _leader(plausible, gain, _per_row(system, trial), left, found)
     leader = left[best]
     taken_now = [int(best)]
     if leader.joint is not None:
@@ -142,7 +154,7 @@ def _round(
                 continue
             rivals = [gain[j] for j in plausible if left[j].joint == other.joint]
             robot = [gain[j] for j in plausible if left[j].joint is None]
-            near = _PLAIN[other.scope] if other.effect in BASELINE else _NEAR
+            near = _PLAIN if other.effect in BASELINE and other.scope == MISSING else _NEAR
             if gain[k] >= near * max(rivals) and (not robot or max(robot) < gain[best]):
                 taken_now.append(int(k))
     return [
@@ -151,15 +163,30 @@ def _round(
     ]
 
 
-def _leader(plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis], found: Sequence[_Found]) -> int:
-    """Return the place of the best hypothesis; plain forms and effects found before go first."""
+def _per_row(system: System, trial: Trial) -> np.ndarray:
+    """Return each hypothesis' gain per row in each group, (H, G); groups that are not observed are NaN for a change."""
+    return np.asarray((trial.start - trial.loss) / np.maximum(system.rows.max(axis=1), 1.0))
+
+
+def _leader(
+    plausible: np.ndarray,
+    gain: np.ndarray,
+    per_group: np.ndarray,
+    left: Sequence[Hypothesis],
+    found: Sequence[_Found],
+) -> int:
+    """Return the place of the hypothesis to take: of those that do as well as the best, the least flexible.
+
+    A form of the default twin that is missing goes before what refines it; an effect found before goes before another.
+    """
     best = int(plausible[np.argmax(gain[plausible])])
     plain = [
         int(k)
         for k in plausible
         if left[k].effect in BASELINE
-        and (left[k].scope, left[k].joint) == (left[best].scope, left[best].joint)
-        and gain[k] >= _PLAIN[left[k].scope] * gain[best]
+        and left[k].scope == MISSING == left[best].scope
+        and left[k].joint == left[best].joint
+        and gain[k] >= _PLAIN * gain[best]
     ]
     if plain:
         return max(plain, key=lambda k: gain[k])
@@ -167,7 +194,19 @@ def _leader(plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis],
     known = [int(k) for k in plausible if (left[k].effect, left[k].scope) in before and left[k].joint]
     if known and (nearest := max(known, key=lambda k: gain[k])) != best and gain[nearest] >= _RIVAL * gain[best]:
         return nearest
-    return best
+    equal = [int(k) for k in plausible if _equals(per_group[best] - per_group[k], gain[best])]
+    equal = [k for k in equal if left[k].scope == left[best].scope and _overlap(left[k], left[best])]
+    return min(equal, key=lambda k: (left[k].flexibility, -gain[k]), default=best)
+
+
+def _equals(behind: np.ndarray, gain: float) -> bool:
+    """Return whether a hypothesis is behind the best (whose gain is given) by no more than chance, over groups."""
+    error = float(behind.std(ddof=1)) / np.sqrt(len(behind)) if len(behind) > 1 else 0.0
+    return float(behind.mean()) <= max(_SAME * gain, min(error, _AT_MOST * gain))
+
+
+def _overlap(one: Hypothesis, other: Hypothesis) -> bool:
+    return one.joint == other.joint or None in (one.joint, other.joint)
 
 
 def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
@@ -208,7 +247,9 @@ def _causes(
         members = [one for one in found if (one.hypothesis.effect, one.hypothesis.scope) == (effect, scope)]
         others = _columns([one for one in found if one not in members])
         causes.append(_with_rivals(system, moments, candidates, members, others))
-    return tuple(sorted(causes, key=lambda cause: -cause.gain))
+    most = max((cause.gain for cause in causes), default=0.0)
+    matter = [cause for cause in causes if cause.gain >= _LEAST_SHARE * most]
+    return tuple(sorted(matter, key=lambda cause: -cause.gain))
 
 
 def _with_rivals(
@@ -241,18 +282,20 @@ def _with_rivals(
     for k, (name, _, _) in enumerate(rivals[1:], start=1):
         apart = per_group[0] - per_group[k]
         error = float(np.std(apart, ddof=1)) / np.sqrt(len(apart))
-        near = gain[0] - gain[k] < max(_SAME * gain[0], _APART * error)
-        if name != effect and gain[k] >= _RIVAL * gain[0] and near:
+        near = gain[0] - gain[k] < max(_SAME * gain[0], min(_APART * error, (1 - _RIVAL) * gain[0]))
+        if name != effect and near:
             equal.append(name)
-    known = {name: float(gain[k]) for k, (name, _, _) in enumerate(rivals) if k}
-    spread = float(np.std(per_group[0], ddof=1)) / np.sqrt(per_group.shape[1])
+    known: dict[str, float] = {}
+    for k, (name, _, _) in enumerate(rivals):
+        if name != effect:
+            known[name] = max(known.get(name, -np.inf), float(gain[k]))
     return Cause(
         effect=effect,
         scope=scope,
         joints=joints,
         variants=tuple(one.variant for one in members),
         gain=float(gain[0]),
-        t=float(gain[0] / max(spread, 1e-12)),
+        t=max(_t(per_group[0]), _t(per_group[0] * rows[own] / np.maximum(trial.start[own], 1e-12))),
         p=max(one.p for one in members),
         rivals=tuple(dict.fromkeys(sorted(equal, key=lambda name: -known[name]))),
         rival_gains=known,

@@ -35,6 +35,11 @@ class Hypothesis:
     variants: tuple[Variant, ...]
 
     @property
+    def flexibility(self) -> float:
+        """How much it could fit: its coefficients, and the choice among its shapes in bits."""
+        return len(self.variants[0].columns) + float(np.log2(len(self.variants)))
+
+    @property
     def name(self) -> str:
         """Readable, unique within a diagnosis."""
         return f"{self.effect} {self.scope} at {self.joint or 'the robot'}"
