@@ -185,7 +185,7 @@ def page(robots: Sequence[Robot], missing: Sequence[str], command: str) -> str:
         *_shams(robots),
     ]
     if missing:
-        lines += ["", f"Not in the data folder, so not run: {', '.join(missing)}."]
+        lines += ["", f"Not in the data folder, or not run yet: {', '.join(missing)}."]
     return "\n".join(lines) + "\n"
 
 
@@ -350,15 +350,16 @@ def main() -> None:
     there = [name for name in WITHHELD if (arguments.data / name / "dataset.toml").is_file()]
     if not there:
         parser.error(f"{arguments.data}: holds none of {', '.join(WITHHELD)}")
-    robots = []
+    missing = [name for name in WITHHELD if name not in there]
+    command = f"python bench/withheld.py DATA_FOLDER --shams {arguments.shams}"
+    robots: list[Robot] = []
     with ProcessPoolExecutor(arguments.workers) as pool:
         for name in there:
             robots.append(examine(arguments.data / name, arguments.shams, pool))
+            text = page(robots, missing + there[len(robots) :], command)
+            if arguments.out:
+                arguments.out.write_text(text, encoding="utf-8")
             print(f"{name} done", flush=True)
-    missing = [name for name in WITHHELD if name not in there]
-    text = page(robots, missing, f"python bench/withheld.py DATA_FOLDER --shams {arguments.shams}")
-    if arguments.out:
-        arguments.out.write_text(text, encoding="utf-8")
     print(text)
 
 

@@ -98,4 +98,4 @@ def test_the_page_says_what_came_first_what_was_missed_and_how_often_shams_are_b
     assert "| ur10 | stribeck_friction | attributed | cause 1 | cause 1 | 1 of 2 | joint_a4 | - | 0.96 | none |" in text
     assert "| ur10 | coulomb_friction | attributed | not named |" in text
     assert "| ur10 | default twin | 3 | 1 (33 %) | 6 to 79 % | payload 1 |" in text
-    assert "not run: ur3_power" in text
+    assert "not run yet: ur3_power" in text
