@@ -11,6 +11,7 @@ from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.effects.transmission import load_torque
 from irtwin.gap.candidates import Candidates, candidate_pattern
+from irtwin.gap.headway import Tell, watched
 from irtwin.gap.hypotheses import candidate_columns
 from irtwin.gap.system import System
 from irtwin.identification.accumulate import Block, Rows, accumulate
@@ -53,9 +54,17 @@ Torque = Callable[[Motion], np.ndarray]
 
 
 def torque_system(
-    stack: Stack, motions: Sequence[Motion], grouping: Grouping, effects: Sequence[Effect], predicted: Torque | None
+    stack: Stack,
+    motions: Sequence[Motion],
+    grouping: Grouping,
+    effects: Sequence[Effect],
+    predicted: Torque | None,
+    tell: Tell | None = None,
 ) -> System:
-    """Reduce the equations of measured torque; `predicted` gives the joint torque that candidates may need."""
+    """Reduce the equations of measured torque; `predicted` gives the joint torque that candidates may need.
+
+    `tell` is told how far that has come, where it takes long.
+    """
     robot = stack.robot
     columns = candidate_columns(robot, effects)
     tried = candidate_pattern(robot, effects, columns)
@@ -78,7 +87,7 @@ def torque_system(
         ]
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
-    blocks = accumulate(motions, equations, pattern)
+    blocks = accumulate(motions, watched(equations, motions, tell), pattern)
     group, observed = grouping.of(blocks)
     return System(stack.torque_terms, columns, pattern, tuple(blocks), group, observed)
 
@@ -90,8 +99,9 @@ def power_system(
     effects: Sequence[Effect],
     predicted: Torque,
     power_of: Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    tell: Tell | None = None,
 ) -> System:
-    """Reduce the equation of measured power, on top of the joint torque that is predicted."""
+    """Reduce the equation of measured power, on top of the joint torque that is predicted; `tell` as above."""
     robot = stack.robot
     columns = candidate_columns(robot, effects)
     free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
@@ -111,6 +121,6 @@ def power_system(
         joined = np.concatenate([own[:, ~stack.fixed], *candidates.part(motion)], axis=1)
         return Rows([joined], known[:, None], motion.power[:, None])
 
-    blocks = accumulate(motions, equations, pattern)
+    blocks = accumulate(motions, watched(equations, motions, tell), pattern)
     group, observed = grouping.of(blocks)
     return System(free, columns, pattern, tuple(blocks), group, observed)
