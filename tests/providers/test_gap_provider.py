@@ -17,7 +17,7 @@ from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import Workspace
-from irtwin.twin.files import to_json
+from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
 from synthetic import arm, as_run, measure, swing, with_constants
 
@@ -97,20 +97,40 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
     with workspace.reading() as session:
         twin = session.scalars(select(schema.Twin)).one()
         assert twin.twin_id == twin_id
-        assert (workspace.folder / twin.file).read_text() == workspace.better
+        assert "a diagnosis of all these runs" in twin.split
         assert set(session.scalars(select(schema.TwinEffect.effect))) == set(FULL)
-        parts = {row.run_id: row.part for row in session.scalars(select(schema.TwinRun))}
-        assert parts == {f"{ROBOT}.swing_{k}": part for k, part in ((1, "fit"), (2, "fit"), (3, "held_out"))}
         used = session.scalars(
             select(schema.ActivityUse.entity).where(schema.ActivityUse.activity_id == twin.activity_id)
         )
         assert f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}" in set(used)
-        assert session.scalars(select(schema.TorqueFit.r_squared)).all()
     assert count(workspace, schema.RunEnergy) == 0
     assert count(workspace, gap_schema.GapDiagnosis) == 1
     keep(workspace, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))
     assert count(workspace, schema.RunEnergy) == 1
     assert adopt(workspace, ROBOT) == twin_id
+
+
+def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Workspace) -> None:
+    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    adopt(workspace, ROBOT)
+    with workspace.reading() as session:
+        row = session.scalars(select(schema.Twin)).one()
+        assert set(load(workspace.folder / row.file).fitted) == {"swing_1", "swing_2"}
+        parts = {one.run_id: one.part for one in session.scalars(select(schema.TwinRun))}
+        fits = session.scalars(select(schema.TorqueFit)).all()
+    # of the two runs that the diagnosis took for the twin, each is cut in time; the third is not of its time
+    assert parts == {f"{ROBOT}.swing_{k}": part for k, part in ((1, "both"), (2, "both"), (3, "apart"))}
+    assert {(fit.run_id[-1], fit.part) for fit in fits} == {(k, part) for k in "12" for part in ("fit", "held_out")}
+    assert all(fit.r_squared > 0.9 for fit in fits if fit.part == "held_out")
+
+
+def test_a_run_apart_from_its_twin_has_energy_but_no_error(workspace: Workspace) -> None:
+    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    adopt(workspace, ROBOT)
+    for name in ("swing_1", "swing_3"):
+        made = energy.provide(workspace, f"{ROBOT}.{name}")
+        (row,) = (row for row in made.rows if isinstance(row, schema.RunEnergy))
+        assert (row.energy_error_percent is None) is (name == "swing_3")
 
 
 def test_nothing_to_adopt_is_an_error(workspace: Workspace) -> None:

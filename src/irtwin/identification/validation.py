@@ -9,7 +9,7 @@ import numpy as np
 
 from irtwin.signals.motion import Motion
 
-FIT, HELD_OUT = "fit", "held_out"
+FIT, HELD_OUT, APART = "fit", "held_out", "apart"
 _FEW = 3  # runs that differ; fewer are cut in time instead
 _FIT_SHARE = 2 / 3
 _GOLDEN = (1 + 5**0.5) / 2
@@ -24,10 +24,10 @@ class Split:
     rule: str
 
     def part(self, run: str) -> str:
-        """Return the run's part: "fit", "held_out", or "both" where it was cut in time."""
+        """Return the run's part: "fit", "held_out", "both" where it was cut in time, "apart" where it is neither."""
         fitted = any(motion.run == run for motion in self.fit)
         judged = any(motion.run == run for motion in self.held_out)
-        return "both" if fitted and judged else FIT if fitted else HELD_OUT
+        return "both" if fitted and judged else FIT if fitted else HELD_OUT if judged else APART
 
 
 def split(motions: Sequence[Motion], repeats: dict[str, str] | None = None) -> Split:

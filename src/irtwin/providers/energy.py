@@ -9,6 +9,7 @@ import pyarrow as pa
 from scipy.integrate import cumulative_trapezoid
 from sqlalchemy import select
 
+from irtwin.identification.validation import APART
 from irtwin.providers.provider import Made
 from irtwin.providers.records import load_robot, load_run, run_iri, twin_iri
 from irtwin.signals.conditioning import condition
@@ -112,8 +113,8 @@ def _run_energy(
         peak_power_w=float(np.max(power)),
         measured_energy_j=whole.measured_energy,
         modelled_energy_j=whole.modelled_energy,
-        energy_error_percent=judged.energy_error,
-        power_rmse_w=judged.power_rmse,
+        energy_error_percent=None if role.part == APART else judged.energy_error,
+        power_rmse_w=None if role.part == APART else judged.power_rmse,
         standby_energy_j=standby if has_standby else None,
         standby_share=standby / whole.modelled_energy if has_standby and whole.modelled_energy > 0 else None,
         returned_energy_j=returned_energy(twin, motion),

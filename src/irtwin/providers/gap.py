@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 from sqlalchemy import select
 
 from irtwin.errors import InputError
-from irtwin.identification.validation import Split
+from irtwin.identification.validation import split
 from irtwin.providers.identification import twin_made
 from irtwin.providers.provider import Made
 from irtwin.providers.records import identifier, load_robot, load_run, robot_iri, run_iri
@@ -23,6 +24,7 @@ from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.schema import Base
 from irtwin.storage.series import inside
 from irtwin.twin.files import from_json
+from irtwin.twin.identify import identify
 
 Json = Mapping[str, Any]
 
@@ -73,7 +75,9 @@ def record(
 def adopt(workspace: Workspace, robot_id: str) -> str:
     """Make the twin with the diagnosis' causes added the robot's twin; return its twin_id.
 
-    The earlier twin and what was made with it are dropped: providers populate anew. The diagnosis stays.
+    Its effects are the diagnosis'; its numbers are fitted again without the runs that then judge it, as every twin's
+    are. Runs that the diagnosis left out, as from before a change, are neither. The earlier twin and what was made with
+    it are dropped: providers populate anew. The diagnosis stays.
     Raises InputError where there is no diagnosis, or it added nothing to the twin.
     """
     started = datetime.now(UTC)
@@ -90,14 +94,13 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     twin = from_json(text, inside(workspace.folder, found.twin_file))
     robot = load_robot(workspace, robot_id)
     keys = _run_ids(workspace, robot_id)
-    motions = [condition(load_run(workspace, robot, run_id), robot, twin.cutoff) for run_id in keys.values()]
-    parts = Split(
-        tuple(motion for motion in motions if motion.run in twin.fitted),
-        tuple(motion for motion in motions if motion.run not in twin.fitted),
-        "adopted from a diagnosis, which kept runs out to judge each cause and fitted again once it was sure",
-    )
-    by_name = {name: run_id for run_id, name in zip(keys.values(), [motion.run for motion in motions], strict=True)}
-    made = twin_made(robot_id, twin, by_name, parts)
+    runs = {run_id: load_run(workspace, robot, run_id) for run_id in keys.values()}
+    runs = dict(sorted(runs.items(), key=lambda item: (item[1].started, item[0])))  # as every twin's are split
+    motions = [condition(run, robot, twin.cutoff) for run in runs.values() if run.name in twin.fitted]
+    parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
+    parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
+    by_name = {run.name: run_id for run_id, run in runs.items()}
+    made = twin_made(robot_id, identify(robot, parts.fit, twin.effects), by_name, parts)
     used = [*made.used, f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")

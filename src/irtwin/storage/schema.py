@@ -202,7 +202,7 @@ class TwinEffect(Base):
 
 
 class TwinRun(Base):
-    """The part that a run took in a twin: "fit", "held_out", or "both" where it was cut in time."""
+    """The part that a run took in a twin: "fit", "held_out", "both" where it was cut in time, "apart" where neither."""
 
     __tablename__ = "twin_run"
 
@@ -268,7 +268,7 @@ class RunEnergy(Base):
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
-    part: Mapped[str]  # "fit", "held_out" or "both": the run's part in the twin
+    part: Mapped[str]  # the run's part in the twin; one "apart" is not judged by it
     energy_consumption_j: Mapped[float]
     energy_from: Mapped[str]  # "measured", "modelled", or "mechanical": modelled without the electrical losses
     run_power_w: Mapped[float]  # its mean
