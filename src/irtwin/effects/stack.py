@@ -70,6 +70,10 @@ class Stack:
         return tuple((effect, term) for effect in self._power for term in effect.terms(self.robot))
 
     @cached_property
+    def _torque_places(self) -> tuple[tuple[Effect, slice], ...]:
+        return tuple(_slices(self._torque, self.robot))
+
+    @cached_property
     def real(self) -> np.ndarray:
         """(K,) whether the coefficient makes real torque, which carries power, or only shows in the measurement."""
         return np.array([effect.channel == "torque" for effect, _ in self.torque_terms], dtype=bool)
@@ -129,7 +133,7 @@ class Stack:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
         total = values + self.shift(motion)
         torque = np.zeros(motion.dq.shape)
-        for effect, own in _slices(self._torque, self.robot):
+        for effect, own in self._torque_places:
             if effect.channel == "torque":
                 torque += self._contribution(effect, motion, total[own], None)
         return torque
@@ -174,7 +178,7 @@ class Stack:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""
         parts = [
             np.broadcast_to(effect.shift(self.robot, motion), (own.stop - own.start,))
-            for effect, own in _slices(self._torque, self.robot)
+            for effect, own in self._torque_places
         ]
         return np.concatenate([np.zeros(0), *parts])
 
@@ -208,7 +212,7 @@ class Stack:
 
     def _bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
         total = values + self.shift(motion)
-        for effect, own in _slices(self._torque, self.robot):
+        for effect, own in self._torque_places:
             if effect.id == "rigid_body":
                 return np.asarray(total[own])
         return None
@@ -226,7 +230,7 @@ class Stack:
         total, bodies = values + self.shift(whole), self._bodies(whole, values)
         real, shown = np.zeros(whole.dq.shape), np.zeros(whole.dq.shape)
         below: dict[int, Predicted] = {}
-        owned = list(_slices(self._torque, self.robot))
+        owned = self._torque_places
         for stage in sorted({effect.stage for effect in self._torque}):
             now = [(effect, own) for effect, own in owned if effect.stage == stage]
             measured = any(effect.channel == "measurement" for effect, _ in now) and stage > 1
