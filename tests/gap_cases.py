@@ -44,7 +44,10 @@ def evidence(verdict: str) -> dict[str, Any]:
         for k, run in enumerate(RUNS[2:])
         for joint in ("joint_a3", None)
     ]
-    return {"heat_map": _heat_map(3.0), "follows": [curve], "runs": judged}
+    found = {"heat_map": _heat_map(3.0), "follows": [curve], "runs": judged}
+    time = [0.5 * step for step in range(100)]
+    move = {"time": time, "joints": ["joint_a3"], "q": [[math.sin(value) for value in time]]}
+    return found | ({"experiment": move} if verdict == "ambiguous" else {})
 
 
 def _gap(verdict: str) -> dict[str, Any]:
@@ -99,15 +102,35 @@ def _shrink(closed: float | None, after: float, scope: str = "changed") -> dict[
         "power_rmse": {"before": 21.0, "after": 17.0, "noise_floor": None, "interval95_after": None},
         "energy_error_percent": {"before": 8.4, "after": 2.1, "interval95_after": [1.0, 3.3]},
         "closed_fraction": None if closed is None else {"value": closed, "interval95": [closed - 0.05, closed + 0.04]},
+        "yardstick": {
+            "torque": {
+                "closed": 0.9,
+                "closeable": 0.95,
+                "by_regression": 0.7,
+                "nameless": 0.04,
+                "of": "the gap above the floor",
+            },
+            "power": {"closed": None, "closeable": None, "by_regression": None, "nameless": None},
+        },
         "by_cause": [
+            {
+                "effect": "viscous_friction",
+                "scope": scope,
+                "channel": "torque",
+                "share": 0.7,
+                "rmse_before": [1.4, 1.5],
+                "rmse_alone": [0.8, 0.72],
+                "rmse_when_left_out": [1.2, 1.25],
+            },
             {
                 "effect": "stribeck_friction",
                 "scope": scope,
                 "channel": "torque",
+                "share": 0.3,
                 "rmse_before": [1.4, 1.5],
                 "rmse_alone": [0.6, 0.62],
                 "rmse_when_left_out": [1.3, 1.45],
-            }
+            },
         ],
     }
 
@@ -143,8 +166,35 @@ _CASES: dict[str, dict[str, Any]] = {
             "purpose": "tell stribeck_friction from nonlinear_viscous_friction",
             "effects": ["stribeck_friction", "nonlinear_viscous_friction"],
             "joints": ["joint_a3"],
-            "motions": ["speed ladder: 0.01 to 0.5 rad/s, 12 steps of 4 s"],
-            "expected_separation": 4.2,
+            "motions": ["joint_a3: a ladder of 8 constant speeds, each both ways"],
+            "expected_separation": 7.24,
+            "separation_now": 1.1,
+            "separation_that_is_enough": 5.0,
+            "questions": [
+                {
+                    "effects": ["stribeck_friction", "nonlinear_viscous_friction"],
+                    "separation_now": 1.1,
+                    "expected_separation": 7.24,
+                    "not_imitated_now": 0.01,
+                    "expected_not_imitated": 0.4,
+                }
+            ],
+            "programme": {
+                "kind": "speed_ladder",
+                "joints": ["joint_a3"],
+                "seconds": 55.8,
+                "set_up_seconds": 0.0,
+                "payload_mass": [0.0],
+                "taken_off": [],
+                "pose": {joint: 0.1 for joint in JOINTS},
+                "speeds": {"joint_a3": [0.005, 0.05, 0.5]},
+                "amplitudes": {"joint_a3": [0.01, 0.1, 1.0]},
+            },
+            "considered": [
+                {"kind": "speed_ladder", "minutes": 0.9, "expected_separation": 7.24},
+                {"kind": "payload", "minutes": 5.7, "expected_separation": 250.0},
+            ],
+            "note": None,
         },
     },
     "unexplained": {"locations": _LOCATED, "not_testable": _UNTESTABLE, "shrink": _shrink(None, 1.4)},

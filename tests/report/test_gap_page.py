@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import html
 import json
+import math
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -81,7 +84,7 @@ def verdict_of(page: str) -> str:
         ),
         (
             "attributed",
-            "Stribeck friction on joint_a3 (confidence 96 %) and viscous friction on joint_a3 (confidence 70 %) changed"
+            "Viscous friction on joint_a3 (confidence 70 %) and Stribeck friction on joint_a3 (confidence 96 %) changed"
             " since the reference runs; with that in the twin, 93 % (95 % interval 88 % to 97 %) of the gap closes on"
             " runs held out.",
         ),
@@ -115,6 +118,77 @@ def test_nothing_is_drawn_of_nothing(pages: dict[str, Path]) -> None:
     found = re.search(r'id="page-data">(.*?)</script>', pages["no_gap"].read_text())
     assert found
     assert set(json.loads(found[1])["figures"]) == {"heat_map"}
+
+
+def test_causes_stand_in_the_order_of_their_shares(pages: dict[str, Path]) -> None:
+    page = pages["attributed"].read_text().replace("\N{NO-BREAK SPACE}", " ")
+    assert re.findall(r"<h3>(\d\. [^<]*) on joint_a3</h3>", page) == ["1. Viscous friction", "2. Stribeck friction"]
+    assert "70 % of what is closed" in page
+
+
+def test_the_gap_is_parted_into_causes_what_has_no_name_and_the_rest(pages: dict[str, Path]) -> None:
+    page = pages["attributed"].read_text().replace("\N{NO-BREAK SPACE}", " ")
+    assert "the causes close 90 % of the gap above the floor; 4.0 % could be closed and has no name" in page
+    drawn = figures_of(pages["attributed"])["budget"]["data"]
+    assert [bar["x"][0] for bar in drawn] == pytest.approx([63, 27, 4, 6])
+    assert drawn[0]["name"].startswith("1. ")
+
+
+def test_the_next_experiment_is_said_and_drawn(pages: dict[str, Path]) -> None:
+    page = html.unescape(pages["ambiguous"].read_text()).replace("\N{NO-BREAK SPACE}", " ")
+    assert "The next experiment, to tell Stribeck friction from nonlinear viscous friction" in page
+    assert "Joint_a3: a ladder of 8 constant speeds, each both ways." in page
+    assert re.search(r"nonlinear viscous friction\?</th><td class=.number.>1.1</td><td class=.number.>7.2</td>", page)
+    assert "0.005, 0.05, 0.5 rad/s" in page
+    assert re.search(r"a ladder of constant speeds \(chosen\)</th><td class=.number.>0.9 min", page)
+    assert ">over 100<" in page
+    assert figures_of(pages["ambiguous"])["experiment"]["data"][0]["name"] == "joint_a3"
+
+
+def test_small_and_large_excesses_are_told_apart_by_their_shade(pages: dict[str, Path]) -> None:
+    (cells,) = figures_of(pages["attributed"])["heat_map"]["data"]
+    shades = sorted(value for row in cells["z"] for value in row)
+    assert shades[-1] == pytest.approx(math.log10(4)) and cells["zmax"] >= shades[-1]
+
+
+def test_places_carry_their_intervals_where_there_are_any(tmp_path: Path) -> None:
+    said = copy.deepcopy(gap_cases.diagnosis("attributed"))
+    said["locations"][0] |= {"share_interval95": [0.7, 0.9], "excess": 12.0, "excess_interval95": [8.0, 15.0]}
+    page = page_of(tmp_path, said).replace("\N{NO-BREAK SPACE}", " ")
+    assert "<small>70 % … 90 %</small>" in page and "<small>8.0 … 15</small>" in page
+
+
+def test_classes_of_several_causes_are_kept_apart(tmp_path: Path) -> None:
+    said = copy.deepcopy(gap_cases.diagnosis("ambiguous"))
+    other = said["causes"][1]
+    other |= {"effect": "payload", "joints": [], "indistinguishable_from": ["base_tilt"]}
+    verdict = verdict_of(page_of(tmp_path, said))
+    assert verdict.endswith(
+        "either Stribeck friction on joint_a3 or nonlinear viscous friction on joint_a3; either payload or base tilt."
+    )
+
+
+def test_stretches_of_one_run_have_bars_of_their_own(tmp_path: Path) -> None:
+    drawn = gap_cases.evidence("attributed")
+    drawn["runs"] = [line | {"run": "work_1"} for line in drawn["runs"]]
+    page_of(tmp_path, gap_cases.diagnosis("attributed"), drawn)
+    bars = figures_of(tmp_path / "p.html")["runs_torque"]["data"][0]["x"]
+    assert bars == ["work_1, part 1", "work_1, part 2", "work_1, part 3", "work_1, part 4"]
+
+
+def figures_of(page: Path) -> dict[str, Any]:
+    found = re.search(r'id="page-data">(.*?)</script>', page.read_text())
+    assert found
+    figures: dict[str, Any] = json.loads(found[1])["figures"]
+    return figures
+
+
+def page_of(folder: Path, said: dict[str, Any], drawn: dict[str, Any] | None = None) -> str:
+    with Workspace(folder / "w") as workspace:
+        six_axis(workspace)
+        record(workspace, rows.ROBOT, said, drawn or gap_cases.evidence("attributed"))
+        render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, folder / "p.html")
+    return (folder / "p.html").read_text()
 
 
 def test_a_robot_without_diagnosis_is_an_error(tmp_path: Path) -> None:

@@ -44,14 +44,15 @@ class Yardstick:
     def shares(self) -> dict[str, Any]:
         """Return which part of the gap above the floor could be closed, in all equations and in each.
 
-        `by_regression`: by a regression of what the plain twin leaves; `nameless`: by a regression of what the causes
-        leave, that is, without a name; `closeable`: by the better of the two. Fractions are of the mean square where no
-        floor is known, None where there is no gap.
+        `closed`: by the causes, refitted to all runs; `by_regression`: by a regression of what the plain twin leaves;
+        `nameless`: by a regression of what the causes leave, that is, without a name; `closeable`: by the better of the
+        two. Fractions are of the mean square where no floor is known, None where there is no gap.
         """
         floor = np.zeros_like(self.plain) if self.floor is None else self.floor**2
         level = self.plain if self.floor is None else floor
         gap = (self.plain - floor) / level
         left = {
+            "closed": self.plain - self.closed.clip(floor),
             "closeable": self.plain - np.minimum(self.plain_regressed, self.closed_regressed).clip(floor),
             "by_regression": self.plain - self.plain_regressed.clip(floor),
             "nameless": self.closed - self.closed_regressed.clip(floor),

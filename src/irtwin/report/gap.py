@@ -19,7 +19,7 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
-from irtwin.report import gap_figures, gap_verdict
+from irtwin.report import gap_document, gap_figures, gap_verdict
 from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_questions
 from irtwin.report.render import content_policy, embedded_json, environment
 from irtwin.signals.log import DataSet
@@ -29,13 +29,15 @@ from irtwin.storage.files import write
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 
 
+_ELSEWHERE = ("share of what is closed",)  # evidence that has its own place on the page
 _FEW = 3  # of many rivals the foremost are shown; the file of the diagnosis has them all
 
 
 def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path) -> None:
     """Write the gap report of a robot (its IRI) to `out`.
 
-    Numbers come from the questions in `reports/gap`, curves from the evidence file that the graph names.
+    Numbers come from the questions in `reports/gap`; shares, intervals and the experiment from the diagnosis' file and
+    curves from its evidence, both of which the graph names.
     Raises InputError where the graph has no diagnosis of the robot.
     """
     found = ask(graph, {"diagnosis": _questions()["diagnosis"]}, {"robot": robot})["diagnosis"].first
@@ -44,7 +46,8 @@ def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path)
     bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
     answers = ask(graph, _questions(), bindings)
     evidence = json.loads(read_document(found["evidence_file"], found["evidence_checksum"]))
-    write(out, _page(answers, bindings, evidence).encode())
+    document = json.loads(read_document(found["file"], found["checksum"]))
+    write(out, _page(gap_document.ranked(answers, document), bindings, evidence, document).encode())
 
 
 def render_alone(data_set: DataSet, diagnosis: Mapping[str, Any], evidence: Mapping[str, Any], out: Path) -> None:
@@ -65,24 +68,28 @@ def _questions() -> dict[str, Question]:
     return read_questions(resources.folder("reports") / "gap")
 
 
-def _page(answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, Any]) -> str:
+def _page(
+    answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, Any], document: Mapping[str, Any]
+) -> str:
     folder = resources.folder("reports")
-    drawn = gap_figures.figures(answers, evidence)
+    drawn = gap_figures.figures(answers, evidence, document)
+    parts = gap_document.shares(document)
     scripts = {
         "plotly": get_plotlyjs(),
         "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
     }
-    first = answers["next_experiment"].first
     return environment(folder).get_template("gap/page.html.jinja").render(
         answers=answers,
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
         verdict=gap_verdict.sentence(answers),
-        causes=[_cause(row, answers) for row in answers["causes"].rows],
+        causes=[_cause(row, answers) | {"share": parts.get(row["rank"])} for row in answers["causes"].rows],
+        places=gap_document.locations(answers["locations"].rows, document),
+        budgets=gap_document.budgets(document),
         foremost=gap_figures.foremost_joint(answers),
         follows=evidence.get("follows") or [],
         effect_names=gap_figures.effect_names(answers),
-        experiment=_pairs(first["description"]) if first else None,
+        experiment=gap_document.experiment(document, gap_figures.effect_names(answers)),
         drawn=drawn,
         data=embedded_json({"figures": drawn, "explorer": None}),
         style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
@@ -99,7 +106,7 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
         "joints": gap_verdict.joints_of(rank, answers),
         "rivals": gap_verdict.rivals_of(rank, answers),
         "parameters": [one for one in answers["cause_parameters"].rows if one["rank"] == rank],
-        "evidence": _pairs(row["evidence"]),
+        "evidence": [pair for pair in _pairs(row["evidence"]) if pair[0] not in _ELSEWHERE],
     }
 
 

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from irtwin.report import wording
+from irtwin.report import gap_document, wording
 from irtwin.report.figures import MEASURED, PALETTE, Figure, plain
 from irtwin.report.questions import Answers
 
 Evidence = Mapping[str, Any]
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
+_CAUSES = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#004C78", "#7FC8A9")
 _SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
 _BANDED = 0.25
+_TICKS = (0, 1, 3, 10, 30, 100, 300, 1000, 3000, 10_000, 100_000, 1_000_000)
+_LEAST_TOP = 3.0  # excess at which the scale ends where there is none larger: noise must not look like a gap
+_JOINTS_DRAWN = 7
 
 
-def figures(answers: Answers, evidence: Evidence) -> dict[str, Figure]:
-    """Return every figure that there is evidence for, by name."""
+def figures(answers: Answers, evidence: Evidence, document: Evidence) -> dict[str, Figure]:
+    """Return every figure that there is evidence for, by name; `document`: the diagnosis itself."""
     drawn = {"heat_map": heat_map(evidence.get("heat_map") or {})}
     for place, curve in enumerate(evidence.get("follows") or []):
         drawn[f"follows_{place}"] = follows(curve, effect_names(answers))
@@ -25,6 +31,8 @@ def figures(answers: Answers, evidence: Evidence) -> dict[str, Figure]:
         if name == "runs_power" or joint is not None:
             drawn[name] = runs(evidence.get("runs") or [], joint)
     drawn["by_cause"] = by_cause(answers)
+    drawn["budget"] = budget(answers, document)
+    drawn["experiment"] = experiment(evidence.get("experiment") or {})
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
@@ -43,20 +51,34 @@ def heat_map(given: Evidence) -> Figure | None:
     if not known:
         return None
     regimes = [plain(name.replace("_", " ")) for name in given["regimes"]]
+    top = math.log10(1 + max(_LEAST_TOP, *known))
+    ticks = [tick for tick in _TICKS if math.log10(1 + tick) <= top]
     cells = {
-        "type": "heatmap", "x": regimes, "y": [plain(name) for name in given["joints"]], "z": values, "zmin": 0,
-        "zmax": max(1.0, *known), "colorscale": _SHADES, "xgap": 2, "ygap": 2, "hoverongaps": False,
+        "type": "heatmap", "x": regimes, "y": [plain(name) for name in given["joints"]], "zmin": 0, "zmax": top,
+        "z": [[None if value is None else math.log10(1 + max(value, 0.0)) for value in row] for row in values],
+        "customdata": values, "colorscale": _SHADES, "xgap": 2, "ygap": 2, "hoverongaps": False,
         "text": [[_cell(value) for value in row] for row in values], "texttemplate": "%{text}",
-        "colorbar": {"title": {"text": "excess"}, "thickness": 12, "outlinewidth": 0},
-        "hovertemplate": "%{y}, %{x}<br>excess %{z:.3~g}<extra></extra>",
+        "colorbar": {
+            "title": {"text": "excess"}, "thickness": 10, "outlinewidth": 0, "tickmode": "array",
+            "tickvals": [math.log10(1 + tick) for tick in ticks], "ticktext": [f"{tick:,}" for tick in ticks],
+        },
+        "hovertemplate": "%{y}, %{x}<br>excess %{customdata:.3~g}<extra></extra>",
     }  # fmt: skip
-    axes = {"xaxis": {"type": "category", "side": "top"}, "yaxis": {"type": "category", "autorange": "reversed"}}
-    return {"data": [cells], "layout": {**axes, "hovermode": "closest", "margin": {"l": 80, "r": 12, "t": 40, "b": 12}}}
+    axes = {
+        "xaxis": {"type": "category", "side": "top", "tickangle": -55},
+        "yaxis": {"type": "category", "autorange": "reversed"},
+    }
+    return {"data": [cells], "layout": {**axes, "hovermode": "closest", "margin": {"l": 80, "r": 12, "t": 95, "b": 12}}}
 
 
 def effect_names(answers: Answers) -> dict[str, str]:
-    """Return what the ontology calls the effects that are causes, by their ids."""
-    return {wording.local_name(row["effect"]): row["label"] for row in answers["causes"].rows if row["label"]}
+    """Return what the ontology calls the effects that the diagnosis names, by their ids."""
+    named = [
+        (row[key], row["label"])
+        for question, key in (("causes", "effect"), ("rivals", "rival"), ("not_testable", "effect"))
+        for row in answers[question].rows
+    ]
+    return {wording.local_name(effect): label for effect, label in named if label}
 
 
 def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
@@ -109,12 +131,15 @@ def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
 
 
 def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
-    """Draw the RMSE of each held-out run before and after, with its noise floor; power where `joint` is None."""
+    """Draw the RMSE of each held-out run before and after, with its noise floor; power where `joint` is None.
+
+    None where nothing changed.
+    """
     rows = [row for row in given if row.get("joint") == joint]
-    if not rows:
+    if all(row.get("before") == row.get("after") for row in rows):
         return None
     unit = "W" if joint is None else "N m"
-    names = [plain(row["run"]) for row in rows]
+    names = _numbered([plain(row["run"]) for row in rows])
     data: list[dict[str, Any]] = [
         {
             "type": "bar", "name": name, "x": names, "y": [row.get(key) for row in rows], "marker": {"color": colour},
@@ -140,17 +165,22 @@ def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
 
 
 def by_cause(answers: Answers) -> Figure | None:
-    """Draw the RMSE that is left with each cause alone, and with all causes but it; the foremost channel's."""
+    """Draw the RMSE that is left with each cause alone, and with all causes but it; the foremost channel's.
+
+    None for a single cause, which the table says.
+    """
     of_any = answers["changes_by_cause"].rows
     rows = [row for row in of_any if row["measure"] == of_any[0]["measure"]]
-    if not rows:
+    if len({row["rank"] for row in rows}) < 2:
         return None
     unit = rows[0]["unit"]
+    place_of = {row["rank"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
+    rows = sorted(rows, key=lambda row: place_of[row["rank"]])
     data = []
     for name, part, colour in (("alone", "alone", AFTER), ("all causes but it", "without", PALETTE[4])):
         of_part = [row for row in rows if row["part"] == part]
         bars = {
-            "type": "bar", "name": name, "x": [plain(f"{row['rank']}. {row['label']}") for row in of_part],
+            "type": "bar", "name": name, "x": [plain(f"{place_of[row['rank']]}. {row['label']}") for row in of_part],
             "y": [row["after"] for row in of_part], "marker": {"color": colour},
             "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
         }  # fmt: skip
@@ -166,5 +196,78 @@ def by_cause(answers: Answers) -> Figure | None:
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
 
 
+def budget(answers: Answers, document: Evidence) -> Figure | None:
+    """Draw where each channel's gap goes: closed by each cause, closeable without a name, and what is left."""
+    given = gap_document.budgets(document)
+    if not given:
+        return None
+    names, parts = list(given), gap_document.shares(document)
+    data = []
+
+    def bar(name: str, of_channel: Mapping[str, float], colour: str) -> None:
+        data.append(
+            {
+                "type": "bar", "orientation": "h", "name": plain(name), "y": names, "marker": {"color": colour},
+                "x": [100 * of_channel.get(channel, 0.0) for channel in names],
+                "hovertemplate": f"{plain(name)} %{{x:.3~g}} %<extra></extra>",
+            }
+        )  # fmt: skip
+
+    channel_of = {
+        rank: (cause.get("evidence") or {}).get("channel", "torque")
+        for rank, cause in enumerate(document["causes"], start=1)
+    }
+    for place, row in enumerate(answers["causes"].rows):
+        channel, share = channel_of[row["rank"]], max(parts.get(row["rank"], 0.0), 0.0)
+        if channel in given and share:
+            whole = sum(max(parts.get(rank, 0.0), 0.0) for rank, of in channel_of.items() if of == channel)
+            name = str(row["label"] or wording.local_name(row["effect"]).replace("_", " "))
+            bar(
+                f"{place + 1}. {name}",
+                {channel: given[channel]["closed"] * share / whole},
+                _CAUSES[place % len(_CAUSES)],
+            )
+    bar("closeable, without a name", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
+    bar("neither", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
+    xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
+    layout = {"barmode": "stack", "xaxis": xaxis, "yaxis": {"type": "category", "autorange": "reversed"}}
+    legend = {
+        "orientation": "h", "x": 0, "y": 1, "yanchor": "bottom", "xanchor": "left", "traceorder": "normal",
+    }  # fmt: skip
+    return {"data": data, "layout": {**layout, "hovermode": "closest", "bargap": 0.35, "legend": legend}}
+
+
+def experiment(curve: Evidence) -> Figure | None:
+    """Draw the positions that the proposed experiment commands."""
+    if not curve.get("q"):
+        return None
+    lines = [
+        {
+            "type": "scatter", "mode": "lines", "name": plain(joint), "x": curve["time"], "y": q,
+            "line": {"width": 1.5, "color": PALETTE[place % len(PALETTE)]},
+            "hovertemplate": f"{plain(joint)} %{{y:.3~g}} rad<extra></extra>",
+        }
+        for place, (joint, q) in enumerate(zip(curve["joints"], curve["q"], strict=True))
+        if place < _JOINTS_DRAWN
+    ]  # fmt: skip
+    xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
+    return {"data": lines, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": "position, rad"}}}}
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Return names with a number where one stands more than once: the stretches of a run."""
+    total, count = Counter(names), Counter[str]()
+    found = []
+    for name in names:
+        count[name] += 1
+        found.append(f"{name}, part {count[name]}" if total[name] > 1 else name)
+    return found
+
+
 def _cell(value: float | None) -> str:
-    return "" if value is None else f"{value:.2f}"
+    """Write an excess short enough for a cell."""
+    if value is None:
+        return ""
+    if abs(value) < 10:
+        return f"{round(value, 1) + 0.0:.1f}".replace("-", "\N{MINUS SIGN}")  # no -0.0
+    return f"{value:.0f}" if value < 10_000 else f"{value / 1000:.0f}k"

@@ -17,19 +17,23 @@ def sentence(answers: Answers) -> str:
     if verdict == "unexplained":
         return f"There is a gap{_where(answers)}, and no effect of the catalogue closes it."
     if verdict == "ambiguous":
-        names = dict.fromkeys(name for row in answers["causes"].rows for name in _class_of(row, answers))
-        return (
-            f"There is a gap{_where(answers)}, and these data do not tell its causes apart: "
-            f"{_alternatives(list(names))} would explain it equally well."
-        )
+        return f"There is a gap{_where(answers)}, and these data do not tell its causes apart: {_classes(answers)}."
     causes = [_cause(row, answers) for row in answers["causes"].rows]
-    subject = "The simulator" if diagnosis["against_simulator"] else "The twin"
     lacking = [name for name, scope in causes if scope == "missing"]
     changed = [name for name, scope in causes if scope != "missing"]
-    said = [f"{subject} lacks {wording.listed(lacking)}"] if lacking else []
-    said += [f"{wording.listed(changed)} changed since the reference runs"] if changed else []
+    said = [f"the twin lacks {wording.listed(lacking)}"] if lacking else []
+    said += [_changed(wording.listed(changed), diagnosis)] if changed else []
     text = "; ".join(said)
     return f"{text[:1].upper()}{text[1:]}{_closes(answers)}."
+
+
+def _changed(named: str, diagnosis: Row) -> str:
+    """Say what tells the observed runs from the others: simulated ones never had it, reference ones had not yet."""
+    if not diagnosis["against_simulator"]:
+        return f"{named} changed since the reference runs"
+    if diagnosis["referenced"]:
+        return f"{named} changed since the reference runs, and the simulator lacks it"
+    return f"the simulator lacks {named}"
 
 
 def effect_name(row: Row) -> str:
@@ -61,6 +65,20 @@ def _class_of(row: Row, answers: Answers) -> list[str]:
     joints = joints_of(row["rank"], answers)
     place = f" on {wording.listed(joints)}" if joints else ""
     return [f"{name}{place}" for name in (effect_name(row), *rivals_of(row["rank"], answers))]
+
+
+def _classes(answers: Answers) -> str:
+    """Say which effects stand for one another, a class for each cause; and the causes that stand alone."""
+    classes: dict[frozenset[str], list[str]] = {}
+    for row in answers["causes"].rows:
+        names = _class_of(row, answers)
+        classes.setdefault(frozenset(names), names)
+    several = [_alternatives(names) for names in classes.values() if len(names) > 1]
+    alone = [names[0] for names in classes.values() if len(names) == 1]
+    if len(several) == 1 and not alone:
+        return f"{several[0]} would explain it equally well"
+    said = "; ".join(f"either {one}" for one in several)
+    return f"{said}; and besides {wording.listed(alone)}" if alone else said
 
 
 def _alternatives(names: Sequence[str]) -> str:

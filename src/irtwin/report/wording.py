@@ -106,7 +106,7 @@ def unit_symbol(unit: str | None) -> str:
     """Write a unit's symbol as it is printed: "kg m^2" -> "kg m²", "ohm" -> "Ω", "1" (no unit) -> ""."""
     if unit is None or unit == "1":
         return ""
-    return _POWER.sub(lambda power: _superscript(int(power[1])), unit).replace("ohm", "Ω")
+    return _POWER.sub(lambda power: _superscript(int(power[1])), unit).replace("ohm", "Ω").replace("degC", "°C")
 
 
 def moment(time: datetime | None, seconds: bool = False) -> str:
