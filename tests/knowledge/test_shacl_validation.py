@@ -40,7 +40,7 @@ def test_two_robots_keep_every_constraint(graph: KnowledgeGraph) -> None:
         (RUN, "Returned_Energy", Literal(-1.0), "a run's returned energy is one finite number, 0 J or more"),
         (RUN, "Measured_Energy", None, "a run with an energy error has a measured energy to err from"),
         (RUN, "Idle_Share", Literal(1.5), "a run's idle share is one number between 0 and 1 (irt:Idle_Share is 1.5)"),
-        (RUN, "Part_In_Twin", Literal("half"), 'a run\'s part in its twin is "fit", "held_out" or "both"'),
+        (RUN, "Part_In_Twin", Literal("half"), 'a run\'s part in its twin is "fit", "held_out", "both" or "apart"'),
         (RUN, "Payload", Literal("heavy"), "a run's payload is one number, 0 kg or more (irt:Payload is heavy)"),
         (JOINT, "Lower_Limit", Literal(4.0), "a joint's lower limit is one number below its upper limit"),
         (JOINT, "Joint_Name", None, "a joint has one name"),
