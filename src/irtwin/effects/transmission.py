@@ -98,6 +98,7 @@ class JointElasticity(Effect):
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
+    reach: ClassVar[int | None] = 64  # a quintic spline forgets all but 0.43 of what lies a sample farther off
 
     encoder: str = "link"
 

@@ -20,7 +20,7 @@ Parts = list[list[np.ndarray]]
 class Candidates:
     """M candidate columns in g equations, each column held only where it acts.
 
-    Effects with memory are computed over a whole run; one run is held at a time.
+    Effects with memory are computed over a whole run, if their memory has no end; one run is held at a time.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[Effect], pattern: np.ndarray, below: Below):
@@ -38,21 +38,29 @@ class Candidates:
         whole = motion.whole or motion
         if self._run is not whole:
             self._hold(whole)
-        cut = slice(motion.start, motion.start + len(motion.time))
-        predicted = self._predicted and self._predicted.part(cut.start, cut.stop)
         found: Parts = [[np.zeros((len(motion.time), 0))] for _ in range(self._equations)]
         for place in range(len(self._effects)):
-            held = self._held.get(place)
-            parts = self._columns(place, motion, predicted) if held is None else held
-            for equation, own in zip(found, parts, strict=True):
-                equation += own if held is None else [one[cut] for one in own]
+            for equation, own in zip(found, self._own(place, whole, motion), strict=True):
+                equation += own
         return [np.concatenate(equation, axis=1) for equation in found]
+
+    def _own(self, place: int, whole: Motion, motion: Motion) -> Parts:
+        """Return an effect's columns over a part of the run that is held."""
+        start, stop = motion.start, motion.start + len(motion.time)
+        if place in self._held:
+            return _cut(self._held[place], start, stop)
+        reach = self._effects[place].reach
+        if reach is None:
+            return self._columns(place, motion, self._predicted and self._predicted.part(start, stop))
+        first, last = max(0, start - reach), min(stop + reach, len(whole.time))
+        wider = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
+        return _cut(wider, start - first, stop - first)
 
     def _hold(self, whole: Motion) -> None:
         self._held = {}  # let go of the run before
         self._run, self._predicted = whole, self._below(whole)
         for place, effect in enumerate(self._effects):
-            if effect.memory:
+            if effect.memory and effect.reach is None:
                 self._held[place] = self._columns(place, whole, self._predicted)
 
     def _columns(self, place: int, motion: Motion, predicted: Predicted | None) -> Parts:
@@ -67,6 +75,10 @@ class Candidates:
         columns = free_columns(effect, robot, motion, predicted)
         by_equation = columns[:, None] if columns.ndim == 2 else columns
         return [[by_equation[:, equation, used]] for equation, used in enumerate(self._patterns[place])]
+
+
+def _cut(parts: Parts, start: int, stop: int) -> Parts:
+    return [[columns[start:stop] for columns in equation] for equation in parts]
 
 
 def free_columns(effect: Effect, robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
