@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -88,28 +88,27 @@ class Robot:
     shams: dict[str, list[list[str]]] = field(default_factory=dict)  # structure: effects named in each sham
 
 
-def examine(folder: Path, seeds: int, pool: Executor) -> Robot:
-    """Diagnose the data set with the whole twin, without each effect, and its shams."""
+def examine(folder: Path, pool: Executor) -> tuple[Robot, Twin]:
+    """Diagnose the data set with the whole twin and without each effect; return the twin with its causes too."""
     data_set = read_data_set(folder)
     pending = {effect: pool.submit(answer, data_set, (effect,)) for effect in WITHHELD[folder.name]}
     started = time.perf_counter()
     diagnosis = diagnose(data_set)
     plain = Answer(diagnosis.to_json(), time.perf_counter() - started)
     assert diagnosis.twin is not None
-    made = {
-        name: [sham(data_set, truth, diagnosis.twin, seed, centred=centred) for seed in range(seeds)]
-        for name, (truth, centred) in nulls(data_set, diagnosis.twin).items()
+    withheld = {effect: future.result() for effect, future in pending.items()}
+    matters = {effect: where_it_matters(data_set, effect) for effect in withheld}
+    return Robot(folder.name, data_set.robot.joint_names, plain, withheld, matters), diagnosis.twin
+
+
+def blame(folder: Path, full: Twin, seeds: int, pool: Executor) -> dict[str, list[list[str]]]:
+    """Return the effects named in each sham of the data set, by the twin that the shams obey."""
+    data_set = read_data_set(folder)
+    pending = {
+        name: [pool.submit(answer, sham(data_set, truth, full, seed, centred=centred), ()) for seed in range(seeds)]
+        for name, (truth, centred) in nulls(data_set, full).items()
     }
-    shams = {name: [pool.submit(answer, each, ()) for each in sets] for name, sets in made.items()}
-    joints = data_set.robot.joint_names
-    return Robot(
-        folder.name,
-        joints,
-        plain,
-        {effect: future.result() for effect, future in pending.items()},
-        {effect: where_it_matters(data_set, effect) for effect in pending},
-        {name: [future.result().named for future in futures] for name, futures in shams.items()},
-    )
+    return {name: [future.result().named for future in futures] for name, futures in pending.items()}
 
 
 def answer(data_set: DataSet, withhold: Sequence[str]) -> Answer:
@@ -182,7 +181,7 @@ def page(robots: Sequence[Robot], missing: Sequence[str], command: str) -> str:
         *(line for robot in robots for line in _beside(robot)),
         *(line for robot in robots if robot.name == COUPLED for line in _published(robot)),
         "",
-        *_shams(robots),
+        *(_shams(robots) if any(robot.shams for robot in robots) else ["No shams were run."]),
     ]
     if missing:
         lines += ["", f"Not in the data folder, or not run yet: {', '.join(missing)}."]
@@ -352,15 +351,24 @@ def main() -> None:
         parser.error(f"{arguments.data}: holds none of {', '.join(WITHHELD)}")
     missing = [name for name in WITHHELD if name not in there]
     command = f"python bench/withheld.py DATA_FOLDER --shams {arguments.shams}"
-    robots: list[Robot] = []
+    robots: dict[str, Robot] = {}
+    twins: dict[str, Twin] = {}
+
+    def tell(line: str) -> None:
+        text = page([*robots.values()], [*missing, *there[len(robots) :]], command)
+        if arguments.out:
+            arguments.out.write_text(text, encoding="utf-8")
+        print(line, flush=True)
+
     with ProcessPoolExecutor(arguments.workers) as pool:
         for name in there:
-            robots.append(examine(arguments.data / name, arguments.shams, pool))
-            text = page(robots, missing + there[len(robots) :], command)
-            if arguments.out:
-                arguments.out.write_text(text, encoding="utf-8")
-            print(f"{name} done", flush=True)
-    print(text)
+            robots[name], twins[name] = examine(arguments.data / name, pool)
+            tell(f"{name}: effects withheld")
+        for name in there if arguments.shams else ():
+            shams = blame(arguments.data / name, twins[name], arguments.shams, pool)
+            robots[name] = replace(robots[name], shams=shams)
+            tell(f"{name}: shams")
+    print(page([*robots.values()], missing, command))
 
 
 if __name__ == "__main__":
