@@ -1,0 +1,55 @@
+"""A diagnosis kept in a real PostgreSQL: the same individuals and answers as from SQLite."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import gap_cases
+import rows
+from irtwin.knowledge import shacl_rules
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.queries import ask
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.providers.gap import record
+from irtwin.resources import folder
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Joint
+
+pytestmark = pytest.mark.system
+QUESTIONS = ("why_more_energy", "where_is_the_gap", "what_to_do", "gap_shrinkage", "not_testable")
+MAPPINGS = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
+
+
+def answers(workspace: Workspace) -> dict[str, list[dict[str, object]]]:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    graph.replace(map_database(workspace.engine, MAPPINGS), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    shacl_rules.infer(graph)
+    return {name: [dict(row) for row in ask(graph, name)] for name in QUESTIONS}
+
+
+def fill(workspace: Workspace, verdict: str) -> None:
+    joints = [
+        Joint(robot_id=rows.ROBOT, name=name, position=k, kind="revolute") for k, name in enumerate(gap_cases.JOINTS, 1)
+    ]
+    runs = [rows.run(name) for name in gap_cases.RUNS]
+    workspace.ingest(rows.robot(), joints, runs, {run.run_id: rows.samples(1) for run in runs})
+    record(workspace, rows.ROBOT, gap_cases.diagnosis(verdict), gap_cases.evidence(verdict), "{}")
+
+
+def test_postgresql_answers_as_sqlite_does(tmp_path, new_postgresql_database):
+    with (
+        Workspace(tmp_path / "sqlite") as sqlite,
+        Workspace(tmp_path / "postgresql", new_postgresql_database()) as postgresql,
+    ):
+        for verdict in ("attributed", "ambiguous"):  # the second replaces the first
+            for workspace in (sqlite, postgresql):
+                fill(workspace, verdict)
+            said = answers(postgresql)
+            assert json.dumps(said, default=str) == json.dumps(answers(sqlite), default=str)
+            assert [row["effect"] for row in said["why_more_energy"]][:1] == ["Stribeck friction"]
+            assert said["what_to_do"]
