@@ -48,9 +48,9 @@ def labels(*kinds):
 
 
 def located(observed, others=()):
-    seen, known = joint_maps(observed, others, labels(observed, others))
-    follows = [followed(observed, joint)[0] for joint in range(3)]
-    return locate("torque", JOINTS, follows, seen, level_of(FLOOR, seen, known), known)
+    seen, known = joint_maps((observed, others), labels(observed, others))
+    follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
+    return locate("torque", JOINTS, follows, seen, level_of(FLOOR, seen, known), reference=known)
 
 
 def test_noise_has_no_place():
@@ -103,14 +103,14 @@ def test_one_run_is_cut_in_time():
 
 
 def test_places_without_a_known_floor_stand_out_of_their_joint():
-    seen, _ = joint_maps(traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1])), (), labels(traces()))
+    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()))
     places = locate("torque", JOINTS, ["acceleration"] * 3, seen, level_of(None, seen, None))
     assert places[0].joint == "joint_2"
     assert places[0].regime in ("accelerating", "braking", "loaded")
 
 
 def test_a_map_has_every_joint_and_regime():
-    seen, _ = joint_maps(traces(), (), labels(traces()))
+    (seen,) = joint_maps([traces()], labels(traces()))
     drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None))
     assert drawn["regimes"] == list(JOINT_REGIMES)
     assert np.array(drawn["excess"]).shape == (3, len(JOINT_REGIMES))
@@ -122,7 +122,7 @@ def test_power_that_is_given_back_is_located():
     for trace in traces():
         given = np.minimum((trace.torque * trace.motion.dq).sum(axis=1), 0.0)
         observed.append(replace(trace, residual=(trace.residual[:, 0] - given)[:, None]))
-    seen, _ = robot_maps(observed, (), labels(observed))
+    (seen,) = robot_maps([observed], labels(observed))
     first = locate("power", (None,), ("mechanical_power",), seen, level_of(np.array([0.5]), seen, None))[0]
     assert (first.joint, first.regime) == (None, "regenerating")
 
@@ -138,7 +138,7 @@ def test_power_that_is_given_back_is_located():
     ],
 )
 def test_a_residual_follows_its_variable(function, variable):
-    assert followed(traces(on(1, function)), 1)[0] == variable
+    assert followed(traces(on(1, function)), 1, "joint_2")[0] == variable
 
 
 def test_power_follows_the_torque_squared():
@@ -146,4 +146,4 @@ def test_power_follows_the_torque_squared():
         replace(trace, residual=trace.residual[:, :1] + 0.01 * (trace.torque**2).sum(axis=1)[:, None])
         for trace in traces()
     ]
-    assert followed(observed, None)[0] == "torque_squared"
+    assert followed(observed, 0, None)[0] == "torque_squared"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,14 @@ from irtwin.effects.effect import Effect, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.gap import document
 from irtwin.gap.attribute import Cause
+from irtwin.gap.balance import filtered, refuted
 from irtwin.gap.case import Case, case_of
 from irtwin.gap.channels import Torque, power_system, torque_system
 from irtwin.gap.closure import closed_twin
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
-from irtwin.gap.evidence import cause_curves, drawn
+from irtwin.gap.evidence import drawn
 from irtwin.gap.experiment import next_experiment
-from irtwin.gap.explained import ExplainedTorque, left_out_torque, twin_power
+from irtwin.gap.explained import Explained, ExplainedTorque, explained_power, left_out_torque, twin_power
 from irtwin.gap.finding import Finding, find
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
@@ -27,7 +28,8 @@ from irtwin.gap.through_power import ThroughPower
 from irtwin.gap.trial_ground import trial_grounds
 from irtwin.gap.verdict import NO_GAP, verdict_of
 from irtwin.gap.visibility import Untestable, can_show, untestable
-from irtwin.gap.where import Left, against_reference, left_of_power, left_of_torque, places
+from irtwin.gap.weighing import balances
+from irtwin.gap.where import left_over, places
 from irtwin.gap.yardstick import yardstick
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
@@ -95,29 +97,29 @@ def diagnose(
     case = case_of(data_set, withhold)
     floor = noise_floor(case.runs, case.motions)
     stack = Stack(case.robot, case.effects)
-    findings: list[Finding] = []
-    energies: EnergyErrors | None = None
     tell("Fitting the twin")
     power_stack, predicted = _torque_source(case, stack)
+    explained: list[Explained] = []
+    torque = predicted
     if case.shows("torque"):
         tell("Trying every effect on torque")
-        findings.append(_torque(case, stack, floor, predicted, seed))
-    torque = ExplainedTorque(stack, findings[0], predicted) if findings else predicted
+        torque = ExplainedTorque(stack, _torque(case, stack, floor, predicted, seed), predicted)
+        torque = _balanced(case, power_stack, torque, predicted, seed) if case.shows("power") else torque
+        explained.append(torque)
+    energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        findings.append(_power(case, power_stack, floor, torque, seed))
-        energies = energy_errors(findings[-1], case.with_power)
+        explained.append(_power(case, power_stack, floor, torque, seed))
+        energies = energy_errors(explained[-1].finding, case.with_power)
+    findings = [one.finding for one in explained]
     verdict = verdict_of(findings, floor)
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
     silent = [effect for effect in catalogue().values() if effect.id not in blamed]
     lacking = untestable(silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen)
-    left = _left(case, stack, power_stack, findings, predicted, torque)
-    ranked = sorted(((cause.gain, finding.name) for finding in findings for cause in finding.causes), reverse=True)
-    located = places(left, ranked[0][1] if ranked else None, seed)
-    curves = [line for f in findings if f.name == "torque" for line in cause_curves(stack, f, case.seen, predicted)]
-    evidence = drawn(findings, left, located, curves)
+    left = [left_over(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
+    located = places(left, seed)
     tell("Designing the next experiment")
     grounds = trial_grounds(case, (stack, power_stack), findings, (predicted, torque))
     measures = {ground.finding.name: yardstick(ground, case.seen, seed) for ground in grounds}
@@ -132,7 +134,7 @@ def diagnose(
         runs=tuple(sorted(case.observed)),
         seed=seed,
         experiment=None if proposal is None else proposal.to_json(),
-        evidence={**evidence, "experiment": None if proposal is None else proposal.curve},
+        evidence={**drawn(left, located), "experiment": None if proposal is None else proposal.curve},
         twin=closed_twin(case, causes),
         energies=energies,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
@@ -159,23 +161,24 @@ def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int
     return find("torque", case, system, floor.torque, seed)
 
 
-def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int) -> Finding:
+def _balanced(case: Case, stack: Stack, explained: ExplainedTorque, predicted: Torque, seed: int) -> ExplainedTorque:
+    """Let power speak: drop the rivals that it refutes, and try without causes that it does."""
+    known, finding = catalogue(), explained.finding
+    weighed = balances(case, stack, explained)
+    if wrong := refuted(finding.causes, weighed, known):
+        finding = find("torque", case, finding.system, finding.floor, seed, without=wrong)
+        weighed = balances(case, stack, ExplainedTorque(explained.stack, finding, predicted))
+    causes = tuple(filtered(one, said, known) for one, said in zip(finding.causes, weighed, strict=True))
+    finding = replace(finding, attribution=replace(finding.attribution, causes=causes), balances=weighed)
+    return ExplainedTorque(explained.stack, finding, predicted)
+
+
+def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int) -> Explained:
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of)
-    return find("power", case, system, None if floor.power is None else np.array([floor.power]), seed)
-
-
-def _left(
-    case: Case, stack: Stack, power_stack: Stack, findings: Sequence[Finding], predicted: Torque, torque: Torque
-) -> list[Left]:
-    """Return what the twin without causes leaves of each channel; power on the torque that the causes explain."""
-    return [
-        left_of_torque(case, stack, finding, predicted, reference=against_reference(finding))
-        if finding.name == "torque"
-        else left_of_power(case, power_stack, finding, torque, reference=against_reference(finding))
-        for finding in findings
-    ]
+    level = None if floor.power is None else np.array([floor.power])
+    return explained_power(stack, find("power", case, system, level, seed), torque, power_of)
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

@@ -54,7 +54,23 @@ def cause(robot: Robot, finding: Finding, one: Cause) -> Json:
             "t_between_groups": one.t,
             "p_adjusted_for_the_catalogue": one.p,
             "gain_of_rivals": one.rival_gains,
+            **_balance(finding, one),
         },
+    }
+
+
+def _balance(finding: Finding, one: Cause) -> Json:
+    """Return what torque and power together say of a cause."""
+    if finding.name == "power":
+        electrical = all(variant.effect.channel == "power" for variant in one.variants)
+        return {"power_on_explained_torque_says": "electrical" if electrical else "meter"}
+    said = finding.balance(one)
+    if said is None:
+        return {}
+    return {
+        "power_says": said.kind or "undecided",
+        "gain_in_power_if_mechanical": said.gain,
+        "t_in_power_between_groups": said.t,
     }
 
 
@@ -124,6 +140,7 @@ def _by_cause(finding: Finding, one: Cause) -> Json:
     without = held_out(system, noise, finding.attribution.noise, others)
     return {
         "effect": one.effect,
+        "joints": list(one.joints),
         "scope": one.scope,
         "channel": finding.name,
         "share": finding.share(one),

@@ -42,22 +42,22 @@ class Map:
             return np.asarray(self.squares.sum(axis=0) / self.counts.sum(axis=0))
 
 
-def joint_maps(seen: Sequence[Trace], others: Sequence[Trace], labels: Mapping[str, str]) -> tuple[Map, Map | None]:
-    """Sum the squares of torque residuals of the observed runs, and of others if any.
+def joint_maps(kinds: Sequence[Sequence[Trace]], labels: Mapping[str, str]) -> list[Map | None]:
+    """Sum the squares of torque residuals of several kinds of traces, None of a kind that has none.
 
-    labels: each run's programmed motion, whose runs make one unit.
+    labels: each run's programmed motion, whose runs make one unit. Regimes are told alike in all kinds.
     """
-    traces = [*seen, *others]
+    traces = [trace for kind in kinds for trace in kind]
     motions, torques = [trace.motion for trace in traces], [trace.torque for trace in traces]
     masks = [joint_regimes(motions, torques, joint) for joint in range(traces[0].residual.shape[1])]
-    return _both(seen, others, masks, Regimes(JOINT_REGIMES, JOINT_PARTS), labels)
+    return _maps(kinds, masks, Regimes(JOINT_REGIMES, JOINT_PARTS), labels)
 
 
-def robot_maps(seen: Sequence[Trace], others: Sequence[Trace], labels: Mapping[str, str]) -> tuple[Map, Map | None]:
+def robot_maps(kinds: Sequence[Sequence[Trace]], labels: Mapping[str, str]) -> list[Map | None]:
     """Sum the squares of power residuals, as `joint_maps` those of torque."""
-    traces = [*seen, *others]
+    traces = [trace for kind in kinds for trace in kind]
     masks = [robot_regimes([trace.motion for trace in traces], [trace.torque for trace in traces])]
-    return _both(seen, others, masks, Regimes(ROBOT_REGIMES, ROBOT_PARTS), labels)
+    return _maps(kinds, masks, Regimes(ROBOT_REGIMES, ROBOT_PARTS), labels)
 
 
 def level_of(floor: np.ndarray | None, seen: Map, reference: Map | None) -> np.ndarray:
@@ -85,15 +85,19 @@ def _least(seen: Map) -> np.ndarray:
     return np.asarray(np.min(np.where(enough, seen.means[:, parts], np.inf), axis=1))
 
 
-def _both(
-    seen: Sequence[Trace],
-    others: Sequence[Trace],
+def _maps(
+    kinds: Sequence[Sequence[Trace]],
     masks: Sequence[Sequence[np.ndarray]],
     regimes: Regimes,
     labels: Mapping[str, str],
-) -> tuple[Map, Map | None]:
-    first = _sums(seen, [mask[: len(seen)] for mask in masks], regimes, labels)
-    return first, _sums(others, [mask[len(seen) :] for mask in masks], regimes, labels) if others else None
+) -> list[Map | None]:
+    found: list[Map | None] = []
+    start = 0
+    for kind in kinds:
+        own = [mask[start : start + len(kind)] for mask in masks]
+        found.append(_sums(kind, own, regimes, labels) if kind else None)
+        start += len(kind)
+    return found
 
 
 def _sums(

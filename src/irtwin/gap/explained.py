@@ -53,42 +53,65 @@ def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torq
     return power_of
 
 
-class ExplainedTorque:
+class Explained:
+    """What the causes found in a channel add to its signal, and what the twin is beside them."""
+
+    def __init__(self, stack: Stack, finding: Finding, below: Callable[[Motion], Predicted]):
+        """Take what a channel showed, and what candidates were built on: what the twin predicts `below` them."""
+        self.stack, self.finding, self._below = stack, finding, below
+        self._places = {k: place for place, k in enumerate(finding.used)}
+
+    @property
+    def values(self) -> np.ndarray:
+        """(K,) the twin's coefficients."""
+        return self.finding.estimate.values[: self.finding.system.base]
+
+    def added(self, cause: Cause, whole: Motion, *, real: bool = False) -> np.ndarray:
+        """Return what a cause adds over a whole run, (N, n) N m or (N,) W; `real` torque and power alone, or all."""
+        robot, below = self.stack.robot, self._below(whole)
+        total = np.zeros(whole.dq.shape if self.finding.name == "torque" else len(whole.time))
+        for variant in cause.variants:
+            if real and variant.effect.channel == "measurement":
+                continue
+            columns = variant.effect.columns(robot, whole, below)
+            for k in variant.columns:
+                if k < self.finding.system.changed or whole.run in self.finding.observed:
+                    total += self._column(columns, k) * self.finding.estimate.values[self._places[k]]
+        return total
+
+    def _column(self, columns: np.ndarray, k: int) -> np.ndarray:
+        """Return the candidate column k of an effect's columns (..., m)."""
+        system = self.finding.system
+        own = system.columns[(k - len(system.columns) if k >= system.changed else k) - system.base]
+        if own.index is not None:
+            return np.asarray(columns[..., own.index])
+        return np.asarray(columns @ np.array([term.expected for term in own.effect.terms(self.stack.robot)]))
+
+
+class ExplainedTorque(Explained):
     """The joint torque of the twin refitted with the causes, and what each cause adds to the torque."""
 
     def __init__(self, stack: Stack, finding: Finding, predicted: Torque):
         """Take what torque showed, and the torque `predicted` that candidates were built on."""
-        self._stack, self._finding, self._predicted = stack, finding, predicted
-        self._places = {k: place for place, k in enumerate(finding.used)}
+        super().__init__(stack, finding, lambda whole: Predicted(predicted(whole)))
         self._held: tuple[str, np.ndarray] | None = None
 
     def __call__(self, motion: Motion) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of a run or a part of one."""
         whole = motion.whole or motion
         if self._held is None or self._held[0] != whole.run:
-            torque = self._stack.real_torque(whole, self.values)
-            for cause in self._finding.causes:
+            torque = self.stack.real_torque(whole, self.values)
+            for cause in self.finding.causes:
                 torque = torque + self.added(cause, whole, real=True)
             self._held = whole.run, torque
         return self._held[1][motion.start : motion.start + len(motion.time)]
 
-    @property
-    def values(self) -> np.ndarray:
-        """(K,) the twin's coefficients."""
-        return self._finding.estimate.values[: self._finding.system.base]
 
-    def added(self, cause: Cause, whole: Motion, *, real: bool = False) -> np.ndarray:
-        """Return what a cause adds to the torque over a whole run, (N, n) N m; `real` torque alone or all of it."""
-        system, robot = self._finding.system, self._stack.robot
-        below = Predicted(self._predicted(whole))
-        total = np.zeros(whole.dq.shape)
-        for variant in cause.variants:
-            if real and variant.effect.channel != "torque":
-                continue
-            columns = variant.effect.columns(robot, whole, below)
-            for k in variant.columns:
-                if k < system.changed or whole.run in self._finding.observed:
-                    source = k - len(system.columns) if k >= system.changed else k
-                    own = columns[:, :, system.columns[source - system.base].index or 0]
-                    total += own * self._finding.estimate.values[self._places[k]]
-        return total
+def explained_power(stack: Stack, finding: Finding, torque: Torque, power_of: PowerOf) -> Explained:
+    """Return what the causes found in power add to it, built on the joint torque and the power that it takes."""
+
+    def below(whole: Motion) -> Predicted:
+        taken = torque(whole)
+        return Predicted(taken, *power_of(whole, taken))
+
+    return Explained(stack, finding, below)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from irtwin.gap.attribute import Attribution, Cause, attribute
+from irtwin.gap.balance import Balance
 from irtwin.gap.case import Case
 from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.shares import shares
@@ -24,7 +25,7 @@ class Finding:
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
-    part of what they close together, none where they close nothing.
+    part of what they close together, none where they close nothing; `balances`: what power says of each.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Finding:
     floor: np.ndarray | None
     estimate: Estimate
     shares: tuple[float, ...] = ()
+    balances: tuple[Balance, ...] = ()
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -45,6 +47,10 @@ class Finding:
     def share(self, cause: Cause) -> float | None:
         """Return a cause's part of what all close together, None where they close nothing."""
         return self.shares[self.causes.index(cause)] if self.shares else None
+
+    def balance(self, cause: Cause) -> Balance | None:
+        """Return what power says of a cause, None where it was not asked."""
+        return self.balances[self.causes.index(cause)] if self.balances else None
 
     @property
     def chosen(self) -> list[int]:
@@ -76,13 +82,21 @@ class Finding:
         ]
 
 
-def find(name: str, case: Case, system: System, floor: np.ndarray | None, seed: int) -> Finding:
-    """Find the causes in the equations of a channel, "torque" or "power"; floor: (g,) RMS."""
+def find(
+    name: str,
+    case: Case,
+    system: System,
+    floor: np.ndarray | None,
+    seed: int,
+    without: Set[str] = frozenset(),
+) -> Finding:
+    """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
     power, inside = name == "power", case.effects
     places = (None,) if power else case.robot.joint_names
     candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
+    candidates = [one for one in candidates if one.effect not in without]
     found = attribute(system, candidates, seed)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)

@@ -22,22 +22,22 @@ _UNITS = {
 }
 
 
-def followed(traces: Sequence[Trace], joint: int | None) -> tuple[str, float] | None:
+def followed(traces: Sequence[Trace], place: int, joint: str | None) -> tuple[str, float] | None:
     """Return the variable that explains the most of a residual, with the share of its mean square.
 
-    joint: whose torque; None for power. Torque is binned apart for either direction of motion, as friction changes
-    its sign there.
+    place: of the residual, at a joint; None for the whole robot. A joint's is binned apart for either direction of
+    motion, as friction changes its sign there.
     """
-    residual = _joined([trace.residual[:, joint or 0] for trace in traces])
+    residual = _joined([trace.residual[:, place] for trace in traces])
     kept = np.isfinite(residual)
     if kept.sum() < 20 * _BINS:
         return None
     forward = np.zeros(len(residual), dtype=bool)
     if joint is not None:
-        forward = _joined([trace.motion.dq[:, joint] for trace in traces]) > 0
+        forward = _joined([trace.motion.dq[:, place] for trace in traces]) > 0
     shares = {
         name: _explained(values[kept], residual[kept], forward[kept])
-        for name, values in variables(traces, joint).items()
+        for name, values in variables(traces, None if joint is None else place).items()
     }
     best = max(shares, key=lambda name: shares[name])
     return best, shares[best]
@@ -64,18 +64,23 @@ def variables(traces: Sequence[Trace], joint: int | None) -> dict[str, np.ndarra
 
 
 def curve(
-    traces: Sequence[Trace], joint: int, name: str, effect: str | None = None, added: Sequence[np.ndarray] | None = None
+    traces: Sequence[Trace],
+    place: int,
+    joint: str | None,
+    name: str,
+    effect: str | None = None,
+    added: Sequence[np.ndarray] | None = None,
 ) -> dict[str, Any]:
-    """Return a joint's residual against a variable, in bins of equal numbers of samples; low and high are quartiles.
+    """Return a place's residual against a variable, in bins of equal numbers of samples; low and high are quartiles.
 
-    added: (N, n) of each trace, what an effect adds to the torque: the curve fitted to the residual.
+    added: (N, g) of each trace, what an effect adds: the curve fitted to the residual.
     """
-    values = variables(traces, joint)[name]
-    residual = _joined([trace.residual[:, joint] for trace in traces])
+    values = variables(traces, None if joint is None else place)[name]
+    residual = _joined([trace.residual[:, place] for trace in traces])
     kept = np.isfinite(residual)
-    place = _places(values[kept], 2 * _BINS)
-    bins = [inside for k in range(2 * _BINS) if (inside := place == k).any()]
-    fitted = None if added is None else _joined([part[:, joint] for part in added])[kept]
+    bin_of = _places(values[kept], 2 * _BINS)
+    bins = [inside for k in range(2 * _BINS) if (inside := bin_of == k).any()]
+    fitted = None if added is None else _joined([part[:, place] for part in added])[kept]
     return {
         "effect": effect,
         "variable": name,

@@ -44,7 +44,7 @@ class Location:
 
     `share` of the channel's whole excess; places that overlap (`loaded` with all others) share it. `q`: the rate of
     false discoveries at which the place is found. `concentration`: the place's share of its joint's excess over its
-    share of the samples. `rank` orders them.
+    share of the samples. `rank` orders those of one joint.
     """
 
     channel: str
@@ -83,15 +83,19 @@ def locate(
     follows: Sequence[str | None],
     seen: Map,
     level: np.ndarray,
+    *,
     reference: Map | None = None,
+    explained: Map | None = None,
+    acting: np.ndarray | None = None,
     seed: int = 0,
 ) -> list[Location]:
     """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first; `runs` are empty.
 
     joints, follows: of each of the g places its joint and the variable that its residual follows. The false discovery
     rate over places is held at 5 % (Benjamini and Hochberg); p-values are Student's over units, of the logarithm of
-    the mean square over the level, against that of the reference where there is one. A place ranks high where its
-    joint has much of the excess, its regime much of the joint's in few samples, and suits the variable.
+    the mean square over the level, against that of the `reference` where there is one; where causes are `acting` (g,),
+    also of that over what they leave, `explained`. Joints come in the order of their excess; a joint's regimes in
+    that of their share of it, its concentration there, and whether they suit the variable.
     """
     share, excess = _shares(seen, level, np.ones((1, len(seen.squares))))
     rng = np.random.default_rng(seed)
@@ -99,7 +103,7 @@ def locate(
     drawn_share, drawn_excess = _shares(seen, level, weights.astype(float))
     of_joint = share[0][:, : seen.regimes.parts].sum(axis=1)
     concentration = _concentration(seen, share[0], of_joint)
-    q = _false_discovery(_p_values(seen, level, reference))
+    q = _false_discovery(_p_values(seen, level, reference, explained, acting))
     found = [
         Location(
             channel,
@@ -113,7 +117,7 @@ def locate(
             excess_interval=_interval(drawn_excess[:, place, r]),
             concentration=float(concentration[place, r]),
             q=float(q[place, r]),
-            rank=float(of_joint[place] * share[0, place, r] * np.sqrt(concentration[place, r]))
+            rank=float(share[0, place, r] * np.sqrt(concentration[place, r]))
             * (1.0 if regime in _SUITS.get(follows[place] or "", seen.regimes.names) else _UNSUITED),
         )
         for place, joint in enumerate(joints)
@@ -122,7 +126,8 @@ def locate(
         and q[place, r] <= _DISCOVERIES
         and (regime != LOADED or follows[place] in _LOADS)
     ]
-    return sorted(found, key=lambda location: -location.rank)[:_PLACES]
+    order = {joint: -of_joint[place] for place, joint in enumerate(joints)}
+    return sorted(found, key=lambda location: (order[location.joint], -location.rank))[:_PLACES]
 
 
 def _concentration(seen: Map, share: np.ndarray, of_joint: np.ndarray) -> np.ndarray:
@@ -149,29 +154,44 @@ def _shares(seen: Map, level: np.ndarray, weights: np.ndarray) -> tuple[np.ndarr
     return share, np.divide(squares, counts, out=np.ones_like(total), where=counts > 0) - 1
 
 
-def _p_values(seen: Map, level: np.ndarray, reference: Map | None) -> np.ndarray:
+def _p_values(
+    seen: Map, level: np.ndarray, reference: Map | None, explained: Map | None, acting: np.ndarray | None
+) -> np.ndarray:
     """Return one-sided p-values of the excess, (g, R); NaN where too few units tell."""
-    mean, variance, freedom = _moments(seen, level)
+    mean, variance, freedom = _moments(_logarithms(seen, level))
     if reference is not None:
-        _, other, of_other = _moments(reference, level)
+        _, other, of_other = _moments(_logarithms(reference, level))
         parts = variance**2 / np.maximum(freedom, 1) + np.where(of_other > 0, other**2 / np.maximum(of_other, 1), 0.0)
         variance = variance + np.where(of_other > 0, other, 0.0)
         freedom = np.where(freedom > 0, variance**2 / np.maximum(parts, np.finfo(float).tiny), 0)
-    with np.errstate(invalid="ignore"):
-        p = t.sf(mean / np.sqrt(np.maximum(variance, np.finfo(float).tiny)), freedom)
+    beyond = _student(mean, variance, freedom)
+    if explained is None or acting is None:
+        return beyond
+    closed = _student(*_moments(_logarithms(seen, level) - _logarithms(explained, level)))
+    either = np.minimum(2 * np.fmin(beyond, closed), 1.0)  # Bonferroni
+    return np.asarray(np.where(acting[:, None], either, beyond))
+
+
+def _student(mean: np.ndarray, variance: np.ndarray, freedom: np.ndarray) -> np.ndarray:
+    p = t.sf(mean / np.sqrt(np.maximum(variance, np.finfo(float).tiny)), np.maximum(freedom, 1))
     return np.asarray(np.where(freedom > 0, p, np.nan))
 
 
-def _moments(one: Map, level: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the mean over units of the logarithm of mean square over level, its variance, and degrees of freedom."""
+def _logarithms(one: Map, level: np.ndarray) -> np.ndarray:
+    """Return the logarithm of mean square over level, (U, g, R); NaN of units with too few samples."""
     enough = one.counts >= FEWEST
     ratio = np.divide(one.squares, one.counts * level, out=np.ones_like(one.squares), where=enough)
-    values = np.log(np.maximum(ratio, np.finfo(float).tiny))
-    number = np.maximum(enough.sum(axis=0), 1)
-    mean = values.sum(axis=0) / number
-    spread = np.where(enough, (values - mean) ** 2, 0.0).sum(axis=0)
-    freedom = enough.sum(axis=0) - 1
-    return mean, spread / np.maximum(freedom, 1) / number, np.maximum(freedom, 0)
+    return np.where(enough, np.log(np.maximum(ratio, np.finfo(float).tiny)), np.nan)
+
+
+def _moments(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the mean over units (U, ...), its variance, and the degrees of freedom."""
+    known = np.isfinite(values)
+    number = np.maximum(known.sum(axis=0), 1)
+    mean = np.where(known, values, 0.0).sum(axis=0) / number
+    spread = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
+    freedom = np.maximum(known.sum(axis=0) - 1, 0)
+    return mean, spread / np.maximum(freedom, 1) / number, freedom
 
 
 def _false_discovery(p: np.ndarray) -> np.ndarray:

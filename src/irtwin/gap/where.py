@@ -4,52 +4,59 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from irtwin.effects.stack import Stack
 from irtwin.gap.case import Case
 from irtwin.gap.channels import Torque
 from irtwin.gap.excess_map import Map, joint_maps, level_of, robot_maps
+from irtwin.gap.explained import Explained
 from irtwin.gap.finding import Finding
-from irtwin.gap.follows import followed
+from irtwin.gap.follows import curve, followed
 from irtwin.gap.hypotheses import CHANGED
 from irtwin.gap.locate import Location, locate, standing_out
-from irtwin.gap.residuals import Trace, fitted_values, power_traces, torque_traces
+from irtwin.gap.residuals import Trace, Values, as_filtered, fitted_values, power_traces, torque_traces
 
 
 @dataclass(frozen=True)
 class Left:
-    """What the twin left of one channel: the observed runs' traces and map, and the level (g, R) of a gap.
+    """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
-    `joints`: the names of the g places, None for the whole robot; `reference`: the map of the other runs, where the
-    twin is the one that fits these.
+    `before`, `after`: traces and maps of them without and with the causes, `after` None where there is none; `added`:
+    what each cause adds to each trace, (N, g). `reference`: the map of the other runs, where the twin is the one that
+    fits these. `level` (g, R): the mean square beyond which a gap lies.
     """
 
-    channel: str
-    joints: tuple[str | None, ...]
-    traces: list[Trace]
+    finding: Finding
+    before: list[Trace]
+    after: list[Trace] | None
+    added: list[list[np.ndarray]]
     seen: Map
+    explained: Map | None
     reference: Map | None
     level: np.ndarray
 
 
-def left_of_torque(case: Case, stack: Stack, finding: Finding, predicted: Torque, *, reference: bool) -> Left:
-    """Return what the twin left of torque; `reference`: as it fits the runs beside the observed ones."""
-    values = fitted_values(finding, reference=reference)
-    traces = torque_traces(stack, case.seen, values, predicted)
-    others = torque_traces(stack, case.others, values, predicted) if reference else []
-    seen, known = joint_maps(traces, others, case.grouping.label)
-    return Left("torque", stack.robot.joint_names, traces, seen, known, level_of(finding.floor, seen, known))
+def left_over(case: Case, explained: Explained, torque: Torque) -> Left:
+    """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes)."""
+    finding = explained.finding
+    power = finding.name == "power"
+    reference = against_reference(finding)
 
+    def traces(runs: Sequence[Any], values: Values) -> list[Trace]:
+        return (power_traces if power else torque_traces)(explained.stack, runs, values, torque)
 
-def left_of_power(case: Case, stack: Stack, finding: Finding, torque: Torque, *, reference: bool) -> Left:
-    """Return what the twin left of power, given the joint torque."""
-    values = fitted_values(finding, reference=reference)
-    traces = power_traces(stack, case.seen, values, torque)
-    others = power_traces(stack, case.others, values, torque) if reference else []
-    seen, known = robot_maps(traces, others, case.grouping.label)
-    return Left("power", (None,), traces, seen, known, level_of(finding.floor, seen, known))
+    before = traces(case.seen, fitted_values(finding, reference=reference))
+    others = traces(case.others, fitted_values(finding, reference=True)) if reference else []
+    after, added = None, [_added(explained, k, before) for k in range(len(finding.causes))]
+    if added:
+        plain = traces(case.seen, lambda run: explained.values)
+        after = [replace(t, residual=t.residual - sum(parts)) for t, *parts in zip(plain, *added, strict=True)]
+    maps = (robot_maps if power else joint_maps)((before, after or [], others), case.grouping.label)
+    seen, closed, known = maps
+    assert seen is not None
+    return Left(finding, before, after, added, seen, closed, known, level_of(finding.floor, seen, known))
 
 
 def against_reference(finding: Finding) -> bool:
@@ -57,23 +64,80 @@ def against_reference(finding: Finding) -> bool:
     return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
 
 
-def places(left: Sequence[Left], first: str | None, seed: int) -> list[Location]:
-    """Return the ranked places of the gap: of the channel `first`, else of that with the largest excess, first."""
-    found = {one.channel: _places(one, seed) for one in left}
+def places(left: Sequence[Left], seed: int) -> list[Location]:
+    """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess."""
+    found = [(one, _places(one, seed)) for one in left]
 
-    def order(channel: str) -> tuple[bool, float]:
-        return channel != first, -max((place.excess for place in found[channel]), default=0.0)
+    def order(pair: tuple[Left, list[Location]]) -> tuple[float, float]:
+        gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
+        return -gain, -max((place.excess for place in pair[1]), default=0.0)
 
-    return [place for channel in sorted(found, key=order) for place in found[channel]]
+    return [place for _, own in sorted(found, key=order) for place in own]
+
+
+def cause_curves(left: Sequence[Left]) -> list[dict[str, Any]]:
+    """Return each cause's curve, on the residual that all the others leave."""
+    lines = []
+    for one in left:
+        for cause, added in zip(one.finding.causes, one.added, strict=True):
+            assert one.after is not None
+            alone = [replace(trace, residual=part) for trace, part in zip(one.after, added, strict=True)]
+            partial = [
+                replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
+            ]
+            for k, joint in enumerate(one.finding.places):
+                best = followed(alone, k, joint) if joint is None or not cause.joints or joint in cause.joints else None
+                if best:
+                    lines.append(_line(one, joint) | curve(partial, k, joint, best[0], cause.effect, added))
+    return lines
+
+
+def unnamed_curves(left: Sequence[Left], located: Sequence[Location], most: int) -> list[dict[str, Any]]:
+    """Return the residual against what it follows, at the foremost places on which no cause acts."""
+    lines: list[dict[str, Any]] = []
+    for one in left:
+        named = {joint for cause in one.finding.causes for joint in cause.joints or one.finding.places}
+        own = [place.joint for place in located if place.channel == one.finding.name and place.joint not in named]
+        for joint in list(dict.fromkeys(own))[:most]:
+            k = one.finding.places.index(joint)
+            if best := followed(one.before, k, joint):
+                lines.append(_line(one, joint) | curve(one.before, k, joint, best[0]))
+    return lines
+
+
+def _line(left: Left, joint: str | None) -> dict[str, Any]:
+    return {"channel": left.finding.name, "joint": joint}
+
+
+def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.ndarray]:
+    """Return what a cause adds to each trace, (N, g), as a measurement would show it."""
+    cause, found = explained.finding.causes[k], []
+    for trace in traces:
+        part = as_filtered(trace.motion, explained.added(cause, trace.motion))
+        found.append(part.reshape(trace.residual.shape))
+    return found
 
 
 def _places(left: Left, seed: int) -> list[Location]:
-    best = [followed(left.traces, None if joint is None else k) for k, joint in enumerate(left.joints)]
-    follows = [found[0] if found else None for found in best]
-    located = locate(left.channel, left.joints, follows, left.seen, left.level, left.reference, seed)
+    names = left.finding.places
+    best = [followed(left.before, k, joint) for k, joint in enumerate(names)]
+    acting = np.array(
+        [any(not cause.joints or name in (None, *cause.joints) for cause in left.finding.causes) for name in names]
+    )
+    located = locate(
+        left.finding.name,
+        names,
+        [found[0] if found else None for found in best],
+        left.seen,
+        left.level,
+        reference=left.reference,
+        explained=left.explained,
+        acting=acting,
+        seed=seed,
+    )
     return [replace(place, runs=_standing_out(left, place)) for place in located]
 
 
 def _standing_out(left: Left, place: Location) -> tuple[str, ...]:
-    k = left.joints.index(place.joint)
-    return standing_out(left.traces, k, float(left.level[k].min()))
+    k = left.finding.places.index(place.joint)
+    return standing_out(left.before, k, float(left.level[k].min()))
