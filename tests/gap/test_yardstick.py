@@ -100,3 +100,4 @@ def test_without_a_floor_shares_are_of_the_mean_square():
 def test_without_a_gap_there_are_no_shares():
     one = np.array([1.0])
     assert Yardstick(one, one, one, one, np.array([1.1])).shares()["closeable"] is None
+    assert Yardstick(one, one, one, one, np.array([0.98])).shares()["closeable_by_equation"] == [None]

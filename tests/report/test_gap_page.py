@@ -176,6 +176,14 @@ def test_stretches_of_one_run_have_bars_of_their_own(tmp_path: Path) -> None:
     assert bars == ["work_1, part 1", "work_1, part 2", "work_1, part 3", "work_1, part 4"]
 
 
+def test_of_many_joints_the_foremost_curves_are_shown(tmp_path: Path) -> None:
+    drawn = gap_cases.evidence("attributed")
+    drawn["follows"] = [drawn["follows"][0] | {"joint": joint} for joint in gap_cases.JOINTS]
+    page = page_of(tmp_path, gap_cases.diagnosis("attributed"), drawn)
+    assert re.findall(r"<h3>Torque of (\w+) against speed", page) == ["joint_a1", "joint_a2", "joint_a3"]
+    assert "3 more stand in" in page
+
+
 def figures_of(page: Path) -> dict[str, Any]:
     found = re.search(r'id="page-data">(.*?)</script>', page.read_text())
     assert found

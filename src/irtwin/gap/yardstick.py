@@ -23,6 +23,7 @@ _WAVES = 60  # random features
 _DIMENSIONS = 3  # at most, that one random feature depends on
 _SCALES = (0.25, 0.5, 1.0)  # waves over the range of a variable
 _RIDGES = (1e-3, 1e-2, 1e-1)  # of the mean square of a feature
+_LEAST_GAP = 0.1  # of the floor's mean square: less is no gap to part
 _STANDSTILL = 1e-3  # rad/s
 _MEMORY = (0.1, 0.5)  # s
 
@@ -59,9 +60,12 @@ class Yardstick:
         }
         parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
         total = float(np.maximum(gap, 0.0).sum())
+        total = total if total > _LEAST_GAP * len(gap) else 0.0
         shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
         for name, part in parts.items():
-            shares[f"{name}_by_equation"] = [_share(p, g) for p, g in zip(part, gap, strict=True)]
+            shares[f"{name}_by_equation"] = [
+                _share(float(p), float(g) if g > _LEAST_GAP else 0.0) for p, g in zip(part, gap, strict=True)
+            ]
         return shares | {
             "of": "the mean square, as no floor is known" if self.floor is None else "the gap above the floor"
         }

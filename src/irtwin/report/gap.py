@@ -19,7 +19,7 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
-from irtwin.report import gap_document, gap_figures, gap_verdict
+from irtwin.report import gap_document, gap_figures, gap_verdict, wording
 from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_questions
 from irtwin.report.render import content_policy, embedded_json, environment
 from irtwin.signals.log import DataSet
@@ -72,7 +72,8 @@ def _page(
     answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, Any], document: Mapping[str, Any]
 ) -> str:
     folder = resources.folder("reports")
-    drawn = gap_figures.figures(answers, evidence, document)
+    follows = gap_figures.foremost_curves(evidence.get("follows") or [], answers)
+    drawn = gap_figures.figures(answers, {**evidence, "follows": follows}, document)
     parts = gap_document.shares(document)
     scripts = {
         "plotly": get_plotlyjs(),
@@ -87,7 +88,8 @@ def _page(
         places=gap_document.locations(answers["locations"].rows, document),
         budgets=gap_document.budgets(document),
         foremost=gap_figures.foremost_joint(answers),
-        follows=evidence.get("follows") or [],
+        follows=follows,
+        hidden_curves=len(evidence.get("follows") or []) - len(follows),
         effect_names=gap_figures.effect_names(answers),
         experiment=gap_document.experiment(document, gap_figures.effect_names(answers)),
         drawn=drawn,
@@ -120,7 +122,7 @@ def _said(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+        return wording.number(value)
     if isinstance(value, list):
         return ", ".join(_said(one) for one in value)
     if isinstance(value, dict):

@@ -17,9 +17,12 @@ BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
 _CAUSES = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#004C78", "#7FC8A9")
 _SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
 _BANDED = 0.25
-_TICKS = (0, 1, 3, 10, 30, 100, 300, 1000, 3000, 10_000, 100_000, 1_000_000)
+_TICKS = (0, 1, 3, 10, 30, 100, 300)
+_DECADES = (0, 10, 100, 1000, 10_000, 100_000, 1_000_000)
+_WIDE = 2.6  # decades of excess
 _LEAST_TOP = 3.0  # excess at which the scale ends where there is none larger: noise must not look like a gap
 _JOINTS_DRAWN = 7
+_CURVES = 3  # of one effect
 
 
 def figures(answers: Answers, evidence: Evidence, document: Evidence) -> dict[str, Figure]:
@@ -52,7 +55,7 @@ def heat_map(given: Evidence) -> Figure | None:
         return None
     regimes = [plain(name.replace("_", " ")) for name in given["regimes"]]
     top = math.log10(1 + max(_LEAST_TOP, *known))
-    ticks = [tick for tick in _TICKS if math.log10(1 + tick) <= top]
+    ticks = [tick for tick in (_TICKS if top < _WIDE else _DECADES) if math.log10(1 + tick) <= top]
     cells = {
         "type": "heatmap", "x": regimes, "y": [plain(name) for name in given["joints"]], "zmin": 0, "zmax": top,
         "z": [[None if value is None else math.log10(1 + max(value, 0.0)) for value in row] for row in values],
@@ -69,6 +72,21 @@ def heat_map(given: Evidence) -> Figure | None:
         "yaxis": {"type": "category", "autorange": "reversed"},
     }
     return {"data": [cells], "layout": {**axes, "hovermode": "closest", "margin": {"l": 80, "r": 12, "t": 95, "b": 12}}}
+
+
+def foremost_curves(curves: Sequence[Evidence], answers: Answers) -> list[Evidence]:
+    """Return the curves of each effect at the joints where most of the gap lies; an arm has too many to show all."""
+    order = list(dict.fromkeys(row["joint"] for row in answers["locations"].rows))
+    ranks = {joint: place for place, joint in enumerate(order)}
+    of_effect: dict[str | None, list[int]] = {}
+    for place, curve in enumerate(curves):
+        of_effect.setdefault(curve.get("effect"), []).append(place)
+    kept = [
+        place
+        for places in of_effect.values()
+        for place in sorted(places, key=lambda k: ranks.get(curves[k].get("joint"), len(ranks)))[:_CURVES]
+    ]
+    return [curves[place] for place in sorted(kept)]
 
 
 def effect_names(answers: Answers) -> dict[str, str]:
