@@ -98,18 +98,18 @@ def diagnose(
     floor = noise_floor(case.runs, case.motions)
     stack = Stack(case.robot, case.effects)
     tell("Fitting the twin")
-    power_stack, predicted = _torque_source(case, stack)
+    power_stack, predicted = _torque_source(case, stack, tell)
     explained: list[Explained] = []
     torque = predicted
     if case.shows("torque"):
         tell("Trying every effect on torque")
-        torque = ExplainedTorque(stack, _torque(case, stack, floor, predicted, seed), predicted)
+        torque = ExplainedTorque(stack, _torque(case, stack, floor, predicted, seed, tell), predicted)
         torque = _balanced(case, power_stack, torque, predicted, seed) if case.shows("power") else torque
         explained.append(torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        explained.append(_power(case, power_stack, floor, torque, seed))
+        explained.append(_power(case, power_stack, floor, torque, seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
     verdict = verdict_of(findings, floor)
@@ -141,7 +141,7 @@ def diagnose(
     )
 
 
-def _torque_source(case: Case, stack: Stack) -> tuple[Stack, Torque]:
+def _torque_source(case: Case, stack: Stack, tell: Progress) -> tuple[Stack, Torque]:
     """Return the effects that explain power, and the joint torque that they are given.
 
     It is that of a fit to torque without the run's group; where no run shows torque, that of a fit to power.
@@ -149,15 +149,15 @@ def _torque_source(case: Case, stack: Stack) -> tuple[Stack, Torque]:
     if not case.with_torque:
         through_power = ThroughPower(stack, case.with_power)
         return through_power, through_power.torque
-    plain = torque_system(stack, case.with_torque, case.grouping, (), None)
+    plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell)
     if case.shows("torque"):
         check_same_robot(case.runs, stack, plain)
     return stack, left_out_torque(stack, plain)
 
 
-def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int) -> Finding:
+def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int, tell: Progress) -> Finding:
     tried = _variants(case, "torque")
-    system = torque_system(stack, case.with_torque, case.grouping, tried, predicted)
+    system = torque_system(stack, case.with_torque, case.grouping, tried, predicted, tell)
     return find("torque", case, system, floor.torque, seed)
 
 
@@ -173,10 +173,10 @@ def _balanced(case: Case, stack: Stack, explained: ExplainedTorque, predicted: T
     return ExplainedTorque(explained.stack, finding, predicted)
 
 
-def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int) -> Explained:
+def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int, tell: Progress) -> Explained:
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
-    system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of)
+    system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     level = None if floor.power is None else np.array([floor.power])
     return explained_power(stack, find("power", case, system, level, seed), torque, power_of)
 

@@ -28,8 +28,15 @@ def left_out_torque(stack: Stack, system: System) -> Torque:
         by_run[run] = twin_values(system, system.solution((), rest))
     whole = twin_values(system, system.solution((), total))
 
+    held: dict[str, tuple[Motion, np.ndarray]] = {}  # each of these runs': every pass over them asks for it
+
     def predicted(motion: Motion) -> np.ndarray:
-        return stack.real_torque(motion, by_run.get(motion.run, whole))
+        if motion.run not in by_run:
+            return stack.real_torque(motion, whole)
+        run = motion.whole or motion
+        if run.run not in held or held[run.run][0] is not run:
+            held[run.run] = run, stack.real_torque(run, by_run[run.run])
+        return held[run.run][1][motion.start : motion.start + len(motion.time)]
 
     return predicted
 
