@@ -132,6 +132,7 @@ def diagnose(
     Where the gap lies, which unmodelled effect causes it, and how far it shrinks once that effect is added.
     """
     from irtwin import workflow
+    from irtwin.report.gap_line import line
 
     found = workflow.diagnose(
         dataset,
@@ -145,9 +146,7 @@ def diagnose(
         twin_file=save_twin,
         announce=_say,
     )
-    document = found.to_json()
-    causes = [f"{cause['effect']} at {', '.join(cause['joints']) or 'the robot'}" for cause in document["causes"]]
-    click.echo(f"{document['verdict']}: {'; '.join(causes) or 'no cause named'}")
+    click.echo(line(found.to_json(), found.against))
 
 
 @cli.command()

@@ -141,7 +141,8 @@ def _round(
         return []
     block_scores, products = scores(system, moments, noise, chosen)
     p = p_values(block_scores, products, left, seed)
-    plausible = plausible[p[plausible] <= _ALPHA]
+    bodies = np.array([left[k].effect == "rigid_body" for k in plausible])  # too many for a score by column
+    plausible = plausible[(p[plausible] <= _ALPHA) | bodies]
     if not len(plausible):
         return []
     best = _leader(plausible, gain, _per_row(system, trial), left, found)
@@ -196,6 +197,8 @@ def _leader(
         return nearest
     equal = [int(k) for k in plausible if _equals(per_group[best] - per_group[k], gain[best])]
     equal = [k for k in equal if left[k].scope == left[best].scope and _overlap(left[k], left[best])]
+    if left[best].effect == "rigid_body":  # a load imitates bodies that are off, but not all of it
+        equal = [k for k in equal if gain[k] >= (1 - _SAME) * gain[best]]
     return min(equal, key=lambda k: (left[k].flexibility, -gain[k]), default=best)
 
 

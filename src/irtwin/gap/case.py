@@ -52,6 +52,12 @@ class Case:
         return [motion for run, motion in self.motions.items() if run not in self.observed]
 
     @property
+    def against(self) -> str | None:
+        """The role of the runs that the observed ones are held against: "reference", "simulated" or none."""
+        roles = {run.role for run in self.runs}
+        return next((role for role in ("reference", "simulated") if role in roles), None)
+
+    @property
     def with_torque(self) -> list[Motion]:
         """The motions whose torque is known."""
         return [motion for motion in self.motions.values() if motion.torque is not None]

@@ -54,6 +54,7 @@ class Diagnosis:
     evidence: dict[str, Any] = field(default_factory=dict)
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
+    against: str | None = None  # the role of the runs that the observed ones are held against
     yardstick: dict[str, Any] = field(default_factory=dict)  # each channel's, what could be closed at all
 
     @property
@@ -137,6 +138,7 @@ def diagnose(
         evidence={**drawn(left, located), "experiment": None if proposal is None else proposal.curve},
         twin=closed_twin(case, causes),
         energies=energies,
+        against=case.against,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
     )
 
@@ -182,10 +184,14 @@ def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int, te
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:
-    """Return every effect that shows in a signal, in every shape that is to be tried."""
+    """Return every effect that shows in a signal, in every shape that is to be tried.
+
+    A robot keeps its bodies; those of a simulator are as drawn, and may be off.
+    """
+    bodies = any(run.role == "simulated" for run in case.runs)
     return [
         shape
         for effect in catalogue().values()
-        if effect.signal == signal and effect.id != "rigid_body" and can_show(effect, case.seen)
+        if effect.signal == signal and (effect.id != "rigid_body" or bodies) and can_show(effect, case.seen)
         for shape in effect.candidates(case.robot)
     ]

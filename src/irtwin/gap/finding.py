@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.effects.effect import catalogue
 from irtwin.gap.attribute import Attribution, Cause, attribute
 from irtwin.gap.balance import Balance
 from irtwin.gap.case import Case
@@ -14,6 +15,7 @@ from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.shares import shares
 from irtwin.gap.shrink import HeldOut, held_out
 from irtwin.gap.system import System
+from irtwin.gap.visibility import can_show
 from irtwin.identification.estimators import Estimate, estimate
 
 _NO_NOISE = 1e-9
@@ -93,6 +95,8 @@ def find(
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
     power, inside = name == "power", case.effects
     places = (None,) if power else case.robot.joint_names
+    if system.both:  # zero in the other runs where these did not measure it: there, missing is changed
+        inside = (*inside, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
     candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)

@@ -34,10 +34,12 @@ class Floor:
 def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion]) -> Floor:
     """Return the floor: from repeats of one motion where there are any, else from above the band.
 
+    A simulator's runs say nothing of it: they have no noise, and repeat themselves.
     `motions`: each run's, by name, filtered alike. Repeats: RMS of the aligned difference / sqrt(2), pooled.
     Above the band: what the filter took away, taken as white, scaled to the band. This misses noise that is
     coloured, so it is the smaller of the two.
     """
+    runs = [run for run in runs if run.role != "simulated"]
     pairs = [(motions[run.repeat_of], motions[run.name]) for run in runs if run.repeat_of and _has_repeat(run, runs)]
     torque = _pooled([_difference(a, b, "torque") for a, b in pairs])
     power = _pooled([_difference(a, b, "power") for a, b in pairs])

@@ -1,0 +1,44 @@
+"""What the terminal says of a diagnosis."""
+
+from __future__ import annotations
+
+import pytest
+
+import gap_cases
+from irtwin.report.gap_line import line
+
+
+@pytest.mark.parametrize(
+    ("verdict", "against", "said"),
+    [
+        ("no_gap", None, "no_gap: no cause named"),
+        ("unexplained", "reference", "unexplained: no cause named"),
+        (
+            "attributed",
+            "reference",
+            "attributed: stribeck friction on joint_a3 and viscous friction on joint_a3 changed since the reference "
+            "runs",
+        ),
+        (
+            "attributed",
+            "simulated",
+            "attributed: the simulator lacks stribeck friction on joint_a3 and viscous friction on joint_a3",
+        ),
+        (
+            "ambiguous",
+            None,
+            "ambiguous: the twin lacks stribeck friction or nonlinear viscous friction on joint_a3 and "
+            "nonlinear viscous friction or stribeck friction on joint_a3",
+        ),
+    ],
+)
+def test_one_line_names_what_lacks_what(verdict, against, said):
+    assert line(gap_cases.diagnosis(verdict), against) == said
+
+
+def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
+    diagnosis = gap_cases.diagnosis("attributed")
+    diagnosis["causes"][1] |= {"scope": "missing", "joints": [], "effect": "base_tilt"}
+    assert line(diagnosis, "simulated") == (
+        "attributed: the twin lacks base tilt; the simulator lacks stribeck friction on joint_a3"
+    )
