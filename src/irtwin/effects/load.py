@@ -183,6 +183,11 @@ class ExternalContact(Effect):
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
     ) -> tuple[Quantity, ...]:
-        """Return the force, and its three parts."""
+        """Return the force, its three parts, and start and stop where it has them."""
         length, deviation = size(values, covariance)
-        return (quantity("f", None, length, "N", deviation), *super().parameters(robot, values, covariance, known))
+        ends = (quantity(name, None, end, "s") for name, end in (("start", self.start), ("stop", self.stop)))
+        return (
+            quantity("f", None, length, "N", deviation),
+            *super().parameters(robot, values, covariance, known),
+            *(end for end in ends if np.isfinite(end.value)),
+        )

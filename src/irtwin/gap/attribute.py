@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from irtwin.effects.effect import BASELINE
+from irtwin.gap.episodes import brief, in_scope
 from irtwin.gap.hypotheses import MISSING, Hypothesis, Variant
 from irtwin.gap.significance import p_values
 from irtwin.gap.system import System, Trial, attempt, scores
@@ -72,8 +73,10 @@ class _Found:
 def attribute(system: System, candidates: Sequence[Hypothesis], seed: int) -> Attribution:
     """Find the effects that the data show beyond the twin's.
 
-    Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out.
+    Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out; an
+    episode by what its joints say of each other.
     """
+    candidates = in_scope(candidates, both=system.both)
     noise = np.maximum(system.residual_rms((), np.ones(len(system.pattern))), 1e-9)
     noise = np.maximum(system.residual_rms((), noise), 1e-9)
     moments = system.moments(noise)
@@ -136,11 +139,14 @@ def _round(
         return []
     trial = attempt(system, moments, chosen, [h.variants for h in left])
     gain, t = _gains(system, trial, left)
+    episodes = [k for k, one in enumerate(left) if system.episode and any(brief(v.effect) for v in one.variants)]
+    t[episodes] = system.episode.t if system.episode else 0.0
     plausible = np.flatnonzero((gain >= _MATTERS) & (t >= _LEAST_T))
     if not len(plausible):
         return []
     block_scores, products = scores(system, moments, noise, chosen)
     p = p_values(block_scores, products, left, seed)
+    p[episodes] = system.episode.p if system.episode else 1.0
     bodies = np.array([left[k].effect == "rigid_body" for k in plausible])  # too many for a score by column
     plausible = plausible[(p[plausible] <= _ALPHA) | bodies]
     if not len(plausible):
@@ -298,11 +304,16 @@ def _with_rivals(
         joints=joints,
         variants=tuple(one.variant for one in members),
         gain=float(gain[0]),
-        t=max(_t(per_group[0]), _t(per_group[0] * rows[own] / np.maximum(trial.start[own], 1e-12))),
+        t=_own_t(members) or max(_t(per_group[0]), _t(per_group[0] * rows[own] / np.maximum(trial.start[own], 1e-12))),
         p=max(one.p for one in members),
         rivals=tuple(dict.fromkeys(sorted(equal, key=lambda name: -known[name]))),
         rival_gains=known,
     )
+
+
+def _own_t(members: Sequence[_Found]) -> float | None:
+    """Return an episode's t, which is between joints."""
+    return members[0].t if brief(members[0].variant.effect) else None
 
 
 def _joined(parts: Sequence[Variant]) -> Variant:

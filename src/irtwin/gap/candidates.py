@@ -65,6 +65,8 @@ class Candidates:
 
     def _columns(self, place: int, motion: Motion, predicted: Predicted | None) -> Parts:
         effect, robot = self._effects[place], self._robot
+        if not effect.acts_in(motion):
+            return [[np.zeros((len(motion.time), int(used.sum())))] for used in self._patterns[place]]
         if isinstance(effect, JointEffect) and effect.signal == "torque":  # dense, it would be zeros for the most part
             samples = effect.samples(robot, motion, predicted)
             acting = {joint.name for joint in effect.acting(robot)}

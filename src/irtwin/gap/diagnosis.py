@@ -23,6 +23,7 @@ from irtwin.gap.explained import Explained, ExplainedTorque, explained_power, le
 from irtwin.gap.finding import Finding, find
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
+from irtwin.gap.occasional import occasional
 from irtwin.gap.same_robot import check_same_robot
 from irtwin.gap.through_power import ThroughPower
 from irtwin.gap.trial_ground import trial_grounds
@@ -158,8 +159,10 @@ def _torque_source(case: Case, stack: Stack, tell: Progress) -> tuple[Stack, Tor
 
 
 def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int, tell: Progress) -> Finding:
-    tried = _variants(case, "torque")
+    found = occasional(case, stack, torque_system(stack, case.with_torque, case.grouping, (), None), seed)
+    tried = found.shapes(_variants(case, "torque"))
     system = torque_system(stack, case.with_torque, case.grouping, tried, predicted, tell)
+    system = replace(system, episode=found.contact)
     return find("torque", case, system, floor.torque, seed)
 
 

@@ -13,6 +13,7 @@ from irtwin.gap.confidence import confidence
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.finding import Finding, noise_before
 from irtwin.gap.floor import Floor
+from irtwin.gap.occasional import acting
 from irtwin.gap.shrink import closed_fraction, held_out, pooled_interval
 from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
@@ -55,6 +56,7 @@ def cause(robot: Robot, finding: Finding, one: Cause) -> Json:
             "p_adjusted_for_the_catalogue": one.p,
             "gain_of_rivals": one.rival_gains,
             **_balance(finding, one),
+            **acting(one.variants),
         },
     }
 

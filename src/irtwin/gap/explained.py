@@ -78,7 +78,7 @@ class Explained:
         robot, below = self.stack.robot, self._below(whole)
         total = np.zeros(whole.dq.shape if self.finding.name == "torque" else len(whole.time))
         for variant in cause.variants:
-            if real and variant.effect.channel == "measurement":
+            if (real and variant.effect.channel == "measurement") or not variant.effect.acts_in(whole):
                 continue
             columns = variant.effect.columns(robot, whole, below)
             for k in variant.columns:

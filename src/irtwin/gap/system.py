@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from irtwin.effects.effect import Effect, Term
+from irtwin.gap.episodes import Episode, brief
 from irtwin.gap.hypotheses import Column, Variant, bounds
 from irtwin.identification.accumulate import Block
 
@@ -24,7 +25,7 @@ class System:
 
     `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
     whether the block belongs to an observed run. With any that does not, each candidate column stands there twice: as
-    it is, and (from index K + M) zero in all but observed runs.
+    it is, and (from index K + M) zero in all but observed runs. `episode`: what joints say of a brief candidate.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -33,6 +34,7 @@ class System:
     blocks: tuple[Block, ...]
     group: np.ndarray
     observed: np.ndarray
+    episode: Episode | None = None
 
     @property
     def base(self) -> int:
@@ -174,28 +176,32 @@ def attempt(
 ) -> Trial:
     """Try hypotheses, each a list of variants, beside the twin's terms and the `chosen` columns.
 
-    Everything is refitted without each group in turn; the shape (variant) is chosen inside the training groups.
+    Everything is refitted without each group in turn; the shape (variant) is chosen inside the training groups. What is
+    brief has its coefficients from all groups: other runs cannot tell them, and joints have told that they agree.
     """
     variants = [variant for group in candidates for variant in group]
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
     batches = _batches(system, variants)
     total = np.sum(moments, axis=0)
+    whole, _ = _project(total, total, system.base, chosen)
+    objective, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss = np.empty((len(candidates), len(moments)))
     for group, part in enumerate(moments):
         train, test = _project(total - part, part, system.base, chosen)
         start[group] = test[-1, -1]
-        objective, left_out, _ = _fit(train, test, batches, len(variants))
-        best = _best(objective, owner, len(candidates))
+        inner, left_out, _ = _fit(train, test, batches, len(variants))
+        for place, variant in enumerate(variants):
+            if brief(variant.effect):
+                left_out[place] = _left(test, variant.columns, values[place])
+        best = _best(inner, owner, len(candidates))
         loss[:, group] = left_out[best]
-    train, _ = _project(total, total, system.base, chosen)
-    objective, _, values = _fit(train, train, batches, len(variants))
     best = _best(objective, owner, len(candidates))
-    diagonal = np.diag(train)
+    diagonal = np.diag(whole)
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
     visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
-    whole = np.diag(total)
-    share = np.array([_ratio(diagonal[list(variants[k].columns)], whole[list(variants[k].columns)]) for k in best])
+    before = np.diag(total)
+    share = np.array([_ratio(diagonal[list(variants[k].columns)], before[list(variants[k].columns)]) for k in best])
     return Trial(start, loss, best, tuple(values[k] for k in best), visible, share)
 
 
@@ -226,6 +232,13 @@ def _change(term: Term) -> Term:
 
 def _ratio(part: np.ndarray, whole: np.ndarray) -> float:
     return float(part.sum() / whole.sum()) if whole.sum() > 0 else 0.0
+
+
+def _left(test: np.ndarray, columns: Sequence[int], values: np.ndarray) -> float:
+    """Return the squares left on test by known coefficients of some columns."""
+    inside = [*columns, -1]
+    vector = np.append(-values, 1.0)
+    return float(vector @ test[np.ix_(inside, inside)] @ vector)
 
 
 def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:

@@ -1,0 +1,58 @@
+"""Payloads in some of the runs, which are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from irtwin.effects.effect import BASELINE
+from irtwin.effects.load import Payload
+from irtwin.effects.stack import Stack
+from irtwin.gap.channels import Grouping, torque_system
+from irtwin.gap.finding import noise_before
+from irtwin.gap.payloads import carried
+from synthetic import arm, measure, swing
+
+ROBOT = arm(4)
+LOAD = np.array([0.6, 0.0, 0.02, 0.05, 0, 0, 0, 0, 0, 0])
+
+
+def search(loaded, observed=range(8), added=None):
+    motions = []
+    for seed in range(8):
+        motion = replace(swing(ROBOT, seed, seconds=6.0, rate=50.0), run=f"run_{seed}")
+        shown = measure(ROBOT, motion, noise=0.5, seed=seed)
+        extra = Payload().contribution(ROBOT, motion, LOAD) if seed in loaded else 0.0
+        extra = extra + (added(seed, motion) if added else 0.0)
+        motions.append(replace(shown, torque=shown.torque + extra))
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed))
+    system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
+    return carried(ROBOT, system, noise_before(system), seed=0)
+
+
+def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():
+    found = search((1, 4, 5))
+    assert found.effect.runs == ("run_1", "run_4", "run_5")
+    assert found.gain > 0.03
+    assert found.p <= 0.01
+
+
+def test_the_heavier_part_is_the_one_that_carries():
+    assert search((0, 2, 3, 4, 6, 7)).effect.runs == tuple(f"run_{seed}" for seed in (0, 2, 3, 4, 6, 7))
+
+
+def test_no_payload_is_found_where_none_or_all_carry_it():
+    assert search(()) is None
+    assert search(range(8)) is None
+
+
+def test_friction_that_differs_from_run_to_run_is_no_payload():
+    def jitter(seed, motion):
+        return np.random.default_rng(seed).normal(0, 0.6, 4) * np.sign(motion.dq)
+
+    assert search((), added=jitter) is None
+
+
+def test_too_few_runs_tell_nothing():
+    assert search((1,), observed=range(3)) is None
