@@ -102,7 +102,7 @@ class Case:
         self.plan, self.rng = plan, np.random.default_rng(plan.seed)
         drawings = read_drawings(plan.robot)
         soft = bool(TRANSMISSION & set(plan.effects))
-        drawings = replace(drawings, step=0.001 if soft else 0.002)
+        drawings = replace(drawings, step=0.0005 if soft else 0.002)
         self.machine: Machine = build(drawings, plan.seed)
         self.step, self.interval = drawings.step, drawings.log_interval
         self.stride = round(self.interval / self.step)

@@ -116,7 +116,7 @@ def draw(name: str, machine: Machine, runs: np.ndarray, everywhere: bool, rng: n
     elif name == "backlash":
         guess, most = 2e-3, 0.03
     elif name == "joint_elasticity":
-        guess, most = 10.0, 60.0
+        guess, most = 40.0, 225.0
     elif name == "torque_ripple":
         shape, guess = {"order": int(rng.integers(3, 25)), "phase": rng.uniform(0, 6.28)}, 0.3 * fc[j]
     elif name == "position_dependent_friction":

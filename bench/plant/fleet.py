@@ -199,7 +199,7 @@ class Fleet:
     def _transmission(self, by_id: dict[str, Effect], elastic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (N m/rad) and half of the dead band (rad), (R, n)."""
         n = elastic.shape[1]
-        usual = 400.0 * self.machine.drive.maximum_torque
+        usual = 1500.0 * self.machine.drive.maximum_torque
         stiffness, gap = np.tile(usual, (len(elastic), 1)), np.zeros(elastic.shape)
         if "joint_elasticity" in by_id:
             mask = by_id["joint_elasticity"].mask(n)  # compliance, relative to the usual
