@@ -14,7 +14,7 @@ from irtwin.gap.significance import p_values
 from irtwin.gap.system import System, Trial, attempt, scores
 
 _ROUNDS = 12
-_MATTERS = 0.03  # of the mean square of one equation's residual: less than this a cause has to explain
+_MATTERS = 0.08  # of the mean square of one equation's residual: less than this a cause has to explain
 _LEAST_SHARE = 0.01  # of what the largest cause explains
 _ALPHA = 0.01  # of the whole catalogue
 _LEAST_T = 2.5  # mean gain over its standard error between groups

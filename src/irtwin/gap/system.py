@@ -18,6 +18,8 @@ from irtwin.gap.episodes import Episode, brief
 from irtwin.gap.hypotheses import Column, Variant, bounds
 from irtwin.identification.accumulate import Block
 
+_QUIET = 0.3  # of the noise: what is left of a block is never taken for less
+
 
 @dataclass(frozen=True)
 class System:
@@ -208,7 +210,10 @@ def attempt(
 def scores(
     system: System, moments: Sequence[np.ndarray], noise: np.ndarray, chosen: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return each block's score of each column (B, D), and the products of projected columns (D + 1, D + 1)."""
+    """Return each block's score of each column (B, D), and the products of projected columns (D + 1, D + 1).
+
+    A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
+    """
     total = np.sum(moments, axis=0)
     inside, weights = _weights(total, system.base, chosen)
     rest = np.zeros(len(total))
@@ -220,7 +225,9 @@ def scores(
         for equation, level in enumerate(noise):
             factor, used = system.factor(block, equation)
             places = np.append(used, len(total) - 1)
-            vector[places] += factor.T @ (factor @ rest[places]) / level**2
+            left = factor @ rest[places]
+            loud = np.sqrt(left @ left / max(system.blocks[block].rows[equation], 1)) / level
+            vector[places] += factor.T @ left / level**2 / max(float(loud), _QUIET)
         found[block] = (vector - weights.T @ vector[inside])[:-1]
     train, _ = _project(total, total, system.base, chosen)
     return found, train
