@@ -16,14 +16,14 @@ from irtwin.gap.system import System, Trial, attempt, scores
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: less than this a cause has to explain
 _LEAST_SHARE = 0.01  # of what the largest cause explains
-_ALPHA = 0.01  # of the whole catalogue
-_LEAST_T = 2.5  # mean gain over its standard error between groups
+_ALPHA = 0.05  # of the whole catalogue
+_LEAST_T = 2.3  # mean gain over its standard error between groups
 _NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
 _RIVAL = 0.8  # of the cause's gain a rival explains
 _APART = 2.0  # standard errors between groups that tell rivals apart
 _PLAIN = 0.5  # of the best gain: a form of the default twin that is missing goes before what refines it
 _SAME = 0.01  # of the gain: a smaller difference is none
-_AT_MOST = 0.1  # of the gain: a larger difference is one, whatever its error
+_AT_MOST = 0.05  # of the gain: a larger difference is one, whatever its error
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ def _leader(
 def _equals(behind: np.ndarray, gain: float) -> bool:
     """Return whether a hypothesis is behind the best (whose gain is given) by no more than chance, over groups."""
     error = float(behind.std(ddof=1)) / np.sqrt(len(behind)) if len(behind) > 1 else 0.0
-    return float(behind.mean()) <= max(_SAME * gain, min(error, _AT_MOST * gain))
+    return float(behind.mean()) <= max(_SAME * gain, min(_APART * error, _AT_MOST * gain))
 
 
 def _overlap(one: Hypothesis, other: Hypothesis) -> bool:

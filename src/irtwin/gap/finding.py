@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -74,6 +75,22 @@ class Finding:
         """(g,) mean square over the floor's, less one."""
         return None if self.floor is None else np.asarray(self.rmse**2 / self.floor**2 - 1)
 
+    @cached_property
+    def fitted(self) -> tuple[np.ndarray, np.ndarray]:
+        """(g,) RMS left in observed runs by fits to all runs: of the twin as it is, and with the causes."""
+        return (
+            observed_rms(self.system, (), noise_before(self.system)),
+            observed_rms(self.system, self.chosen, self.attribution.noise),
+        )
+
+    def closed(self, cause: Cause) -> float:
+        """Return the part of the mean square above the floor, where a cause acts, that all causes together close."""
+        mine = [place in cause.joints or not cause.joints for place in self.places]
+        before, after = (level[mine] ** 2 for level in self.fitted)
+        floor = self.fitted[1][mine] ** 2 * _NO_NOISE if self.floor is None else self.floor[mine] ** 2
+        above = float(np.sum(before / floor - 1))
+        return float(np.clip(np.sum((before - after) / floor) / above, 0.0, 1.0)) if above > 0 else 0.0
+
     @property
     def groups(self) -> list[tuple[str, ...]]:
         """The runs of each observed group."""
@@ -111,6 +128,17 @@ def find(
 def noise_before(system: System) -> np.ndarray:
     """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
     return np.asarray(np.maximum(system.residual_rms((), np.ones(len(system.pattern))), _NO_NOISE))
+
+
+def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
+    """Return the RMS (g,) that a fit to all runs leaves in observed ones; equations weighted by `noise` (g,)."""
+    return system.rms(chosen, noise, range(system.groups), np.flatnonzero(system.group_observed))
+
+
+def reference_rms(system: System, noise: np.ndarray) -> np.ndarray:
+    """Return the RMS (g,) that the twin, fitted to the runs that are not observed, leaves in these."""
+    groups = np.flatnonzero(~system.group_observed)
+    return system.rms((), noise, groups, groups)
 
 
 def twin_values(system: System, vector: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -107,27 +107,46 @@ class System:
             used = np.append(used, used[later] + len(self.columns))
         return np.column_stack([columns * self.scale[used], target]), used
 
+    @cached_property
+    def _products(self) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+        """Per group and equation: the indices of its columns, the measurement's (D) last, and their products."""
+        found = []
+        for group in range(self.groups):
+            blocks = np.flatnonzero(self.group == group)
+            own = []
+            for equation in range(len(self.pattern)):
+                factors = [self.factor(int(block), equation) for block in blocks]
+                stacked = np.concatenate([factor for factor, _ in factors])
+                own.append((np.append(factors[0][1], self._size), stacked.T @ stacked))
+            found.append(own)
+        return found
+
     def moments(self, noise: np.ndarray) -> list[np.ndarray]:
         """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,)."""
-        found = [np.zeros((self._size + 1, self._size + 1)) for _ in range(self.groups)]
-        for group, total in enumerate(found):
-            for equation, level in enumerate(noise):
-                factors: dict[int, list[np.ndarray]] = {}
-                places: dict[int, np.ndarray] = {}
-                for block in np.flatnonzero(self.group == group):
-                    factor, used = self.factor(int(block), equation)
-                    factors.setdefault(len(used), []).append(factor)
-                    places[len(used)] = np.append(used, self._size)
-                for size, parts in factors.items():
-                    stacked = np.concatenate(parts) / level
-                    total[np.ix_(places[size], places[size])] += stacked.T @ stacked
-        return found
+        return [self._weighted([group], noise) for group in range(self.groups)]
+
+    def _weighted(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> np.ndarray:
+        total = np.zeros((self._size + 1, self._size + 1))
+        for group in groups:
+            for (places, products), level in zip(self._products[group], noise, strict=True):
+                total[np.ix_(places, places)] += products / level**2
+        return total
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
         """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns."""
-        vector = self.solution(chosen, np.sum(self.moments(noise), axis=0))
-        squares = sum(self.squares(vector, group) for group in range(self.groups))
-        return np.asarray(np.sqrt(squares / np.maximum(self.rows.sum(axis=0), 1)))
+        return self.rms(chosen, noise, range(self.groups), range(self.groups))
+
+    def rms(
+        self,
+        chosen: Sequence[int],
+        noise: np.ndarray,
+        fitted: Sequence[int] | np.ndarray,
+        of: Sequence[int] | np.ndarray,
+    ) -> np.ndarray:
+        """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
+        vector = self.solution(chosen, self._weighted(fitted, noise))
+        squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
+        return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
     def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
@@ -139,12 +158,9 @@ class System:
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
         """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
-        found = np.zeros(len(self.pattern))
-        for block in np.flatnonzero(self.group == group):
-            for equation in range(len(self.pattern)):
-                factor, used = self.factor(int(block), equation)
-                found[equation] += float(np.sum((factor @ np.append(-vector[used], 1.0)) ** 2))
-        return found
+        weights = np.append(-vector, 1.0)
+        left = [float(weights[places] @ products @ weights[places]) for places, products in self._products[group]]
+        return np.maximum(left, 0.0)
 
 
 @dataclass(frozen=True)
@@ -184,14 +200,14 @@ def attempt(
     variants = [variant for group in candidates for variant in group]
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
     batches = _batches(system, variants)
-    total = np.sum(moments, axis=0)
+    total = reduce(np.add, moments)
     whole, _ = _project(total, total, system.base, chosen)
     objective, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss = np.empty((len(candidates), len(moments)))
     for group, part in enumerate(moments):
         train, test = _project(total - part, part, system.base, chosen)
-        start[group] = test[-1, -1]
+        start[group] = test.squares
         inner, left_out, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
             if brief(variant.effect):
@@ -199,7 +215,7 @@ def attempt(
         best = _best(inner, owner, len(candidates))
         loss[:, group] = left_out[best]
     best = _best(objective, owner, len(candidates))
-    diagonal = np.diag(whole)
+    diagonal = whole.diagonal
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
     visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
     before = np.diag(total)
@@ -214,7 +230,7 @@ def scores(
 
     A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
     """
-    total = np.sum(moments, axis=0)
+    total = reduce(np.add, moments)
     inside, weights = _weights(total, system.base, chosen)
     rest = np.zeros(len(total))
     rest[-1] = 1.0
@@ -229,8 +245,7 @@ def scores(
             loud = np.sqrt(left @ left / max(system.blocks[block].rows[equation], 1)) / level
             vector[places] += factor.T @ left / level**2 / max(float(loud), _QUIET)
         found[block] = (vector - weights.T @ vector[inside])[:-1]
-    train, _ = _project(total, total, system.base, chosen)
-    return found, train
+    return found, total - total[inside].T @ weights
 
 
 def _change(term: Term) -> Term:
@@ -241,11 +256,10 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> float:
     return float(part.sum() / whole.sum()) if whole.sum() > 0 else 0.0
 
 
-def _left(test: np.ndarray, columns: Sequence[int], values: np.ndarray) -> float:
+def _left(test: _Products, columns: Sequence[int], values: np.ndarray) -> float:
     """Return the squares left on test by known coefficients of some columns."""
-    inside = [*columns, -1]
-    vector = np.append(-values, 1.0)
-    return float(vector @ test[np.ix_(inside, inside)] @ vector)
+    both = np.array([[*columns, len(test.whole) - 1]])
+    return float(_squares(test.of(both), values[None])[0])
 
 
 def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:
@@ -268,26 +282,60 @@ def _weights(total: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[np.nd
     return inside, cho_solve(cho_factor(normal), total[inside])
 
 
-def _project(train: np.ndarray, test: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class _Products:
+    """Products of what a fit leaves of each column, worked out for the columns that are asked for.
+
+    `whole` (D + 1, D + 1): products of the columns as they are; of each pair (D + 1, K) the product is taken off.
+    """
+
+    whole: np.ndarray
+    pairs: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def of(self, columns: np.ndarray) -> np.ndarray:
+        """Return the products among each row of columns: (V, k) -> (V, k, k)."""
+        found: np.ndarray = self.whole[columns[:, :, None], columns[:, None, :]]
+        for left, right in self.pairs:
+            found = found - left[columns] @ right[columns].swapaxes(1, 2)
+        return found
+
+    @property
+    def squares(self) -> float:
+        """Those of the measurement."""
+        return float(self.of(np.array([[len(self.whole) - 1]]))[0, 0, 0])
+
+    @property
+    def diagonal(self) -> np.ndarray:
+        """(D,) those of each column."""
+        return self.of(np.arange(len(self.whole) - 1)[:, None])[:, 0, 0]
+
+
+def _project(train: np.ndarray, test: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[_Products, _Products]:
     """Return the products of what a fit on `train` leaves of each column: on train, and on test."""
     inside, weights = _weights(train, base, chosen)
-    cross = weights.T @ test[inside]
-    squares = weights.T @ test[np.ix_(inside, inside)] @ weights
-    return train - train[inside].T @ weights, test - cross - cross.T + squares
+    own = np.ascontiguousarray(weights.T)
+    seen = np.ascontiguousarray(test[inside].T)
+    fitted = seen - own @ test[np.ix_(inside, inside)]
+    return (
+        _Products(train, ((np.ascontiguousarray(train[inside].T), own),)),
+        _Products(test, ((own, fitted), (seen, own))),
+    )
 
 
 def _fit(
-    train: np.ndarray, test: np.ndarray, batches: Sequence[_Batch], count: int
+    train: _Products, test: _Products, batches: Sequence[_Batch], count: int
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Fit each variant on train; return the objective there, the squares on test, and the coefficients."""
     objective, left_out = np.empty(count), np.empty(count)
     values: list[np.ndarray] = [np.zeros(0)] * count
     for batch in batches:
-        rows, columns = batch.columns[:, :, None], batch.columns[:, None, :]
-        normal, right = train[rows, columns], train[batch.columns, -1]
+        target = np.full((len(batch.columns), 1), len(train.whole) - 1)
+        both = np.concatenate([batch.columns, target], axis=1)
+        on_train, on_test = train.of(both), test.of(both)
+        normal, right = on_train[:, :-1, :-1], on_train[:, :-1, -1]
         solved = _bounded(normal + np.eye(normal.shape[1]), right, batch.lowest)
-        objective[batch.place] = _squares(train[-1, -1], right, normal, solved) + (solved**2).sum(axis=1)
-        left_out[batch.place] = _squares(test[-1, -1], test[batch.columns, -1], test[rows, columns], solved)
+        objective[batch.place] = _squares(on_train, solved) + (solved**2).sum(axis=1)
+        left_out[batch.place] = _squares(on_test, solved)
         for place, value in zip(batch.place, solved, strict=True):
             values[place] = value
     return objective, left_out, values
@@ -312,8 +360,10 @@ def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.nd
     return solved
 
 
-def _squares(start: float, right: np.ndarray, normal: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.asarray(start - 2 * (values * right).sum(axis=1) + np.einsum("vi,vij,vj->v", values, normal, values))
+def _squares(products: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return what V fits leave of the measurement: products (V, k + 1, k + 1), it last; values (V, k)."""
+    weights = np.concatenate([-values, np.ones((len(values), 1))], axis=1)
+    return np.asarray(np.einsum("vi,vij,vj->v", weights, products, weights))
 
 
 def _best(objective: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
