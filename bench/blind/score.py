@@ -48,11 +48,12 @@ def judge(diagnosis: dict[str, Any], label: dict[str, Any]) -> dict[str, float]:
     """Return what one case adds to each score it takes part in, 0 or 1 (a class' size: a count)."""
     kind, causes = label["kind"], ranked(diagnosis)
     if kind in {"clean_null", "dirty_null"}:
-        wrong = bool(causes) or "error" in diagnosis
+        wrong = diagnosis.get("verdict") != "no_gap"
         return {f"false alarms, {kind.split('_')[0]} nulls": float(wrong)}
     if kind == "unknown":
         return {
-            "unknown effects abstained from": float(not causes and diagnosis.get("verdict") in ABSTAIN),
+            "unknown effects abstained from": float(diagnosis.get("verdict") in ABSTAIN),
+            "unknown effects, nothing named above 0.5": float(all(cause["confidence"] <= 0.5 for cause in causes)),
             "unknown effects located": float(_located(diagnosis, label["effects"][0])),
         }
     if kind == "pair":

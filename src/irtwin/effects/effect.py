@@ -166,6 +166,10 @@ class Effect(ABC):
         """Return the joints that the effect acts on, in the robot's order."""
         return tuple(joint for joint in robot.joints if self.joints is None or joint.name in self.joints)
 
+    def touched(self, robot: Robot, joint: str) -> tuple[str, ...]:
+        """Return the joints on which a coefficient acts that is named by a joint."""
+        return (joint,)
+
     def variants(self, **shapes: tuple[Any, ...]) -> tuple[Effect, ...]:
         """Return the effect with each value of one field."""
         return tuple(replace(self, **{name: value}) for name, values in shapes.items() for value in values)

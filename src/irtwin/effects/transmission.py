@@ -202,6 +202,10 @@ class JointCoupling(Effect):
         acting = self.acting(robot)
         return acting[-2:] if len(acting) > 1 else ()
 
+    def touched(self, robot: Robot, joint: str) -> tuple[str, ...]:
+        """Return both joints of the pair."""
+        return tuple(one.name for one in self.pair(robot))
+
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return Ia, Fv and Fc of the pair, named by its second joint."""
         return tuple(

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 
-# Set by judgement, not yet calibrated on the benchmark's development seeds: logit of the chance that a cause is right
-_CONSTANT = -0.5
-_PER_GAIN = 1.0  # natural logarithm of the gain over what matters
-_PER_T = 0.25
-_MOST_T = 8.0
-_HIGHEST = 0.98
+# Logistic regression on the causes named in 240 development cases of bench/blind: 154 causes, 69 % of them right
+_CONSTANT = -0.199
+_PER_T = 0.15
+_MOST_T = 10.0
+_PER_CLOSED = 1.169
+_PER_SHARE = 1.383  # natural logarithm of the gain over the largest cause's
 
 
-def confidence(gain: float, least: float, t: float, rivals: int) -> float:
-    """Return the chance that a cause is right: rises with its gain (over the `least` that matters) and its t.
+def confidence(t: float, closed: float, share: float) -> float:
+    """Return the chance that a cause is right.
 
-    Rivals that explain it as well share the chance.
+    t: of its gain, between groups of runs; closed: the part of the gap that all causes close where it acts, 0 to 1;
+    share: its gain over that of the largest cause, above 0 to 1.
     """
-    logit = _CONSTANT + _PER_GAIN * math.log(max(gain / least, 1.0)) + _PER_T * min(max(t, 0.0), _MOST_T)
-    return min(_HIGHEST, 1 / (1 + math.exp(-logit))) / (1 + rivals)
+    logit = _CONSTANT + _PER_T * min(max(t, 0.0), _MOST_T) + _PER_CLOSED * closed + _PER_SHARE * math.log(share)
+    return 1 / (1 + math.exp(-logit))

@@ -20,8 +20,6 @@ from irtwin.robot.description import Robot
 
 Json = dict[str, Any]
 
-_LEAST = 0.03  # gain that matters
-
 
 def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> Json:
     """Return the gap before anything is added."""
@@ -39,18 +37,20 @@ def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErro
     return document
 
 
-def cause(robot: Robot, finding: Finding, one: Cause) -> Json:
-    """Return a cause with its parameters and evidence."""
+def cause(robot: Robot, finding: Finding, one: Cause, largest: float) -> Json:
+    """Return a cause with its parameters and evidence; `largest` is the gain of the largest one."""
+    closed = finding.closed(one)
     return {
         "effect": one.effect,
-        "joints": list(one.joints),
+        "joints": acted_on(robot, one),
         "scope": one.scope,
-        "confidence": confidence(one.gain, _LEAST, one.t, len(one.rivals)),
+        "confidence": confidence(one.t, closed, min(one.gain / largest, 1.0)),
         "parameters": parameters(robot, finding, one),
         "indistinguishable_from": list(one.rivals),
         "evidence": {
             "channel": finding.name,
             "share_of_what_is_closed": finding.share(one),
+            "closed_where_it_acts": closed,
             "gain_on_groups_left_out": one.gain,
             "t_between_groups": one.t,
             "p_adjusted_for_the_catalogue": one.p,
@@ -74,6 +74,12 @@ def _balance(finding: Finding, one: Cause) -> Json:
         "gain_in_power_if_mechanical": said.gain,
         "t_in_power_between_groups": said.t,
     }
+
+
+def acted_on(robot: Robot, one: Cause) -> list[str]:
+    """Return the joints that a cause acts on; none for an effect of the whole robot."""
+    touched = [one.variants[0].effect.touched(robot, joint) for joint in one.joints]
+    return list(dict.fromkeys(joint for joints in touched for joint in joints))
 
 
 def parameters(robot: Robot, finding: Finding, one: Cause) -> list[Json]:
