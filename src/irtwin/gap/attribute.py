@@ -16,7 +16,7 @@ from irtwin.gap.system import System, Trial, attempt, scores
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: less than this a cause has to explain
 _LEAST_SHARE = 0.01  # of what the largest cause explains
-_ALPHA = 0.05  # of the whole catalogue
+_ALPHA = 0.02  # of the whole catalogue
 _LEAST_T = 2.3  # mean gain over its standard error between groups
 _NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
 _RIVAL = 0.8  # of the cause's gain a rival explains

@@ -78,7 +78,8 @@ def _balance(finding: Finding, one: Cause) -> Json:
 
 def acted_on(robot: Robot, one: Cause) -> list[str]:
     """Return the joints that a cause acts on; none for an effect of the whole robot."""
-    touched = [one.variants[0].effect.touched(robot, joint) for joint in one.joints]
+    named = [(variant.effect, term.joint) for variant in one.variants for term in variant.terms if term.link is None]
+    touched = [effect.touched(robot, joint) for effect, joint in named if joint is not None]
     return list(dict.fromkeys(joint for joints in touched for joint in joints))
 
 
