@@ -129,7 +129,7 @@ class Proposal:
             return None
         time, q, start = [], [], 0.0
         for motion in self.programme.motions:
-            every = max(1, len(motion.time) * len(self.programme.motions) // _DRAWN)
+            every = -(-len(motion.time) * len(self.programme.motions) // _DRAWN)
             time.append(motion.time[::every] + start)
             q.append(motion.q[::every])
             start = float(time[-1][-1]) + every / motion.rate
