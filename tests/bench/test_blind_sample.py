@@ -43,3 +43,8 @@ def test_a_missing_effect_is_named_first(scored, effect):
 def test_a_changed_effect_is_named_with_its_joints_and_scope(scored):
     scores = scored("changed", "single", ("asymmetric_friction",), 3.0, "changed")
     assert scores["right effect first"] == scores["joint right"] == scores["scope right"] == 1
+
+
+def test_joints_that_never_move_are_no_obstacle(scored):
+    scores = scored("poor", "poor", ("payload",), 3.0)
+    assert set(scores) == {"right effect first, gap 3, poor"}

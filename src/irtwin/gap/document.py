@@ -25,11 +25,12 @@ def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErro
     """Return the gap before anything is added."""
     document: Json = {"energy_error_percent": energies.mean[0] if energies else None}
     for finding in findings:
+        judged = finding.held_out.rows.sum(axis=0)
         numbers = [
             {
                 "rmse": float(rmse),
                 "noise_floor": None if finding.floor is None else float(finding.floor[k]),
-                "excess": None if finding.excess is None else float(finding.excess[k]),
+                "excess": None if finding.excess is None or not judged[k] else float(finding.excess[k]),
             }
             for k, rmse in enumerate(finding.rmse)
         ]

@@ -18,6 +18,7 @@ from irtwin.gap.episodes import Episode, brief
 from irtwin.gap.hypotheses import Column, Variant, bounds
 from irtwin.identification.accumulate import Block
 
+_NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
 
 
@@ -129,12 +130,16 @@ class System:
         total = np.zeros((self._size + 1, self._size + 1))
         for group in groups:
             for (places, products), level in zip(self._products[group], noise, strict=True):
-                total[np.ix_(places, places)] += products / level**2
+                total[np.ix_(places, places)] += products / max(float(level), _NO_NOISE) ** 2
         return total
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
-        """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns."""
-        return self.rms(chosen, noise, range(self.groups), range(self.groups))
+        """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.
+
+        Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
+        """
+        found = self.rms(chosen, noise, range(self.groups), range(self.groups))
+        return np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
 
     def rms(
         self,
