@@ -81,7 +81,10 @@ def cause_curves(left: Sequence[Left]) -> list[dict[str, Any]]:
     for one in left:
         for cause, added in zip(one.finding.causes, one.added, strict=True):
             assert one.after is not None
-            alone = [replace(trace, residual=part) for trace, part in zip(one.after, added, strict=True)]
+            alone = [
+                replace(trace, residual=np.where(np.isfinite(trace.residual), part, np.nan))
+                for trace, part in zip(one.after, added, strict=True)
+            ]
             partial = [
                 replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
             ]
