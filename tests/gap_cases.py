@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any
 
@@ -17,8 +18,10 @@ _UNTESTABLE = [
 
 
 def diagnosis(verdict: str) -> dict[str, Any]:
-    """A diagnosis as the contract's schema wants it."""
-    return {"verdict": verdict, "robot": "KR6", "gap": _gap(verdict), "shrink": {}} | _NOTHING | _CASES[verdict]
+    """A diagnosis as the contract's schema wants it, to be changed at will."""
+    return copy.deepcopy(
+        {"verdict": verdict, "robot": "KR6", "gap": _gap(verdict), "shrink": {}} | _NOTHING | _CASES[verdict]
+    )
 
 
 def evidence(verdict: str) -> dict[str, Any]:

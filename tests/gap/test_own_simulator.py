@@ -67,7 +67,6 @@ def test_the_friction_that_the_simulator_lacks_is_named_on_its_joint(tmp_path):
     assert "stribeck friction" in said
 
 
-@pytest.mark.xfail(reason="viscous friction is named on two of four joints only", strict=True)
 def test_a_simulator_without_friction_lacks_all_of_it(tmp_path):
     _, causes = diagnosed(tmp_path, lambda motion: 0.0, friction=0.0)
     everywhere = set(DRAWN.joint_names)

@@ -19,6 +19,7 @@ from irtwin.gap.hypotheses import MISSING, Hypothesis
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+_FEWEST_JOINTS = 3
 _LENGTHS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)  # s
 _STRIDE = 0.125  # s, between windows, or a quarter of their length
 _MOST = 0.7  # of a run: what lasts longer is no episode
@@ -67,8 +68,10 @@ class Episode:
 def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> Episode | None:
     """Return the clearest contact, in all observed runs that show its force at its clock; None where none stands out.
 
-    noise: (n,) RMS of each joint's residual, N m.
+    noise: (n,) RMS of each joint's residual, N m. Of an arm of one or two joints nothing is said: hardly any agree.
     """
+    if len(robot.joints) < _FEWEST_JOINTS:
+        return None
     return _contact([_Run(one, ExternalContact().columns(robot, one.motion), noise) for one in left])
 
 
