@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import catalogue
+from irtwin.effects.effect import BASELINE, catalogue
 from irtwin.gap.attribute import Cause
 from irtwin.gap.balance import Balance, filtered, kind_of, refuted
 from irtwin.gap.diagnosis import diagnose
@@ -17,16 +17,7 @@ from synthetic import arm, as_run, measure, swing, truth
 
 ROBOT = arm(2)
 KNOWN = catalogue()
-WITH_LOSS = (
-    "rigid_body",
-    "rotor_inertia",
-    "coulomb_friction",
-    "viscous_friction",
-    "torque_offset",
-    "mechanical_power",
-    "standby_power",
-    "copper_loss",
-)
+WITH_LOSS = (*BASELINE, "copper_loss")
 MECHANICAL, SENSOR, UNDECIDED = Balance(0.5, 8.0), Balance(-0.5, -8.0), Balance(0.5, 1.0)
 
 

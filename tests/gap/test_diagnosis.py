@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from irtwin.effects.effect import BASELINE
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
@@ -58,16 +59,7 @@ def valid(diagnosis):
     return document
 
 
-WITH_LOSS = (
-    "rigid_body",
-    "rotor_inertia",
-    "coulomb_friction",
-    "viscous_friction",
-    "torque_offset",
-    "mechanical_power",
-    "standby_power",
-    "copper_loss",
-)
+WITH_LOSS = (*BASELINE, "copper_loss")
 
 
 @pytest.mark.parametrize("seed", range(3))

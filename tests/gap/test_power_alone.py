@@ -14,16 +14,7 @@ from irtwin.signals.log import DataSet
 from synthetic import arm, as_run, measure, swing, truth
 
 ROBOT = arm(3)
-WITH_LOSS = (
-    "rigid_body",
-    "rotor_inertia",
-    "coulomb_friction",
-    "viscous_friction",
-    "torque_offset",
-    "mechanical_power",
-    "standby_power",
-    "copper_loss",
-)
+WITH_LOSS = (*BASELINE, "copper_loss")
 
 
 def data_set(runs, effects=WITH_LOSS):

@@ -171,7 +171,7 @@ def _round(
 
 
 def _per_row(system: System, trial: Trial) -> np.ndarray:
-    """Return each hypothesis' gain per row in each group, (H, G); groups that are not observed are NaN for a change."""
+    """Return each hypothesis' gain per row in each group, (H, G)."""
     return np.asarray((trial.start - trial.loss) / np.maximum(system.rows.max(axis=1), 1.0))
 
 

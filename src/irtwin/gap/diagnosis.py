@@ -25,6 +25,7 @@ from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
 from irtwin.gap.occasional import occasional
 from irtwin.gap.same_robot import check_same_robot
+from irtwin.gap.system import System
 from irtwin.gap.through_power import ThroughPower
 from irtwin.gap.trial_ground import trial_grounds
 from irtwin.gap.verdict import NO_GAP, verdict_of
@@ -100,12 +101,13 @@ def diagnose(
     floor = noise_floor(case.runs, case.motions)
     stack = Stack(case.robot, case.effects)
     tell("Fitting the twin")
-    power_stack, predicted = _torque_source(case, stack, tell)
+    plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
+    power_stack, predicted = _torque_source(case, stack, plain)
     explained: list[Explained] = []
     torque = predicted
-    if case.shows("torque"):
+    if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        torque = ExplainedTorque(stack, _torque(case, stack, floor, predicted, seed, tell), predicted)
+        torque = ExplainedTorque(stack, _torque(case, stack, plain, floor, predicted, seed, tell), predicted)
         torque = _balanced(case, power_stack, torque, predicted, seed) if case.shows("power") else torque
         explained.append(torque)
     energies: EnergyErrors | None = None
@@ -144,22 +146,24 @@ def diagnose(
     )
 
 
-def _torque_source(case: Case, stack: Stack, tell: Progress) -> tuple[Stack, Torque]:
+def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stack, Torque]:
     """Return the effects that explain power, and the joint torque that they are given.
 
-    It is that of a fit to torque without the run's group; where no run shows torque, that of a fit to power.
+    It is that of a fit to torque (`plain`: the twin's equations) without the run's group; where no run shows torque,
+    that of a fit to power.
     """
-    if not case.with_torque:
+    if plain is None:
         through_power = ThroughPower(stack, case.with_power)
         return through_power, through_power.torque
-    plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell)
     if case.shows("torque"):
         check_same_robot(case.runs, stack, plain)
     return stack, left_out_torque(stack, plain)
 
 
-def _torque(case: Case, stack: Stack, floor: Floor, predicted: Torque, seed: int, tell: Progress) -> Finding:
-    found = occasional(case, stack, torque_system(stack, case.with_torque, case.grouping, (), None), seed)
+def _torque(
+    case: Case, stack: Stack, plain: System, floor: Floor, predicted: Torque, seed: int, tell: Progress
+) -> Finding:
+    found = occasional(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
     system = torque_system(stack, case.with_torque, case.grouping, tried, predicted, tell)
     system = replace(system, episode=found.contact)
