@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from pyoxigraph import DefaultGraph, NamedNode
+from pyoxigraph import DefaultGraph, NamedNode, Quad
 from sqlalchemy import Connection
 
 from irtwin.knowledge.mapping.document import (
@@ -40,13 +40,41 @@ class Property:
 
 @dataclass(frozen=True)
 class Statement:
-    """A query, and the makers of the terms that each of its rows becomes."""
+    """A query, and the makers of the terms that each of its rows becomes.
+
+    table: the name of the one table that it reads, empty for a query of the document's or a join;
+    columns: what its rows hold of that table, in order.
+    """
 
     where: str
     sql: str
+    table: tuple[Identifier, ...]
+    columns: tuple[str, ...]
     subject: TermMaker
     graphs: GraphMaker
     properties: tuple[Property, ...]
+
+    def quads(self, row: Row) -> list[Quad]:
+        """Return what a row becomes (W3C R2RML, section 11.1). Raises InputError where it does not fit."""
+        subject = self.subject(row)
+        if subject is None:
+            return []
+        own = self.graphs(row)
+        found = []
+        for item in self.properties:
+            graphs = own if item.graphs is None else item.graphs(row)
+            predicates = [make(row) for make in item.predicates]
+            objects = [make(row) for make in item.objects]
+            # Document checks leave only an IRI or blank node as subject, and an IRI as predicate.
+            found += [
+                Quad(subject, predicate, value, graph)  # type: ignore[arg-type]
+                for predicate in predicates
+                if predicate is not None
+                for value in objects
+                if value is not None
+                for graph in graphs
+            ]
+        return found
 
 
 def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[Statement]:
@@ -78,7 +106,7 @@ class _Select:
         self.sources = sources
         self.base_iri = base_iri
         self.quote = connection.dialect.identifier_preparer.quote_identifier
-        self.chosen: dict[str, int] = {}
+        self.chosen: dict[tuple[str, str], int] = {}  # side and column
         self.conditions: list[str] = []
 
     def maker(self, term_map: TermMap, side: str = "child") -> TermMaker:
@@ -107,20 +135,24 @@ class _Select:
     def column(self, identifier: Identifier, where: str, side: str) -> Column:
         source = self.sources[side]
         name = source.column(identifier, where)
-        index = self.chosen.setdefault(f"{side}.{self.quote(name)}", len(self.chosen))
+        index = self.chosen.setdefault((side, name), len(self.chosen))
         return Column(index, source.columns[name])
 
     def join(self, join: Join) -> None:
         for child, parent in join.conditions:
             sides = (("child", child), ("parent", parent))
-            names = [f"{side}.{self.quote(self.sources[side].column(item, join.where))}" for side, item in sides]
+            names = [self.qualified(side, self.sources[side].column(item, join.where)) for side, item in sides]
             self.conditions.append(" = ".join(names))
+
+    def qualified(self, side: str, name: str) -> str:
+        return f"{side}.{self.quote(name)}"
 
     @property
     def sql(self) -> str:
         tables = ", ".join(f"{source.sql} {side}" for side, source in self.sources.items())
         condition = f" WHERE {' AND '.join(self.conditions)}" if self.conditions else ""
-        return f"SELECT {', '.join(self.chosen) or '1'} FROM {tables}{condition}"
+        columns = ", ".join(self.qualified(*column) for column in self.chosen)
+        return f"SELECT {columns or '1'} FROM {tables}{condition}"
 
 
 def _plain(select: _Select, triples_map: TriplesMap, document: Document) -> Statement:
@@ -156,7 +188,15 @@ def _property(
 
 def _statement(select: _Select, triples_map: TriplesMap, properties: Sequence[Property]) -> Statement:
     subject, graphs = select.maker(triples_map.subject), select.graphs(triples_map.graphs)
-    return Statement(triples_map.where, select.sql, subject, graphs, tuple(properties))
+    return Statement(
+        where=triples_map.where,
+        sql=select.sql,
+        table=triples_map.table.table if len(select.sources) == 1 else (),
+        columns=tuple(name for _, name in select.chosen),
+        subject=subject,
+        graphs=graphs,
+        properties=tuple(properties),
+    )
 
 
 def _constant(name: NamedNode) -> TermMap:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from pyoxigraph import Quad, RdfFormat, serialize
@@ -25,17 +26,29 @@ def map_database(engine: Engine, documents: Sequence[Path], base_iri: str | None
     The same quad may come more than once. Memory stays flat: rows are read in chunks.
     Raises InputError for a fault in a document, before the first quad, and for a row that does not fit it.
     """
+    with planned(engine, documents, base_iri) as (connection, statements):
+        for statement in statements:
+            for row in read(connection, statement.sql, statement.where):
+                yield from statement.quads(row)
+
+
+@contextmanager
+def planned(
+    engine: Engine, documents: Sequence[Path], base_iri: str | None = None
+) -> Iterator[tuple[Connection, list[Statement]]]:
+    """Give a read-only snapshot of a database, and the statements that documents make of it."""
     checked = [read_document(path) for path in documents]
     with engine.connect() as connection:
         connection.execution_options(**snapshot_options(engine))
         with connection.begin():
-            statements = [
-                statement
-                for document in checked
-                for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
-            ]
-            for statement in statements:
-                yield from _quads(connection, statement)
+            yield (
+                connection,
+                [
+                    statement
+                    for document in checked
+                    for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
+                ],
+            )
 
 
 def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | None = None) -> None:
@@ -49,24 +62,3 @@ def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | Non
             files.put_in_place(temporary, out)
     finally:
         engine.dispose()
-
-
-def _quads(connection: Connection, statement: Statement) -> Iterator[Quad]:
-    for row in read(connection, statement.sql, statement.where):
-        subject = statement.subject(row)
-        if subject is None:
-            continue
-        own = statement.graphs(row)
-        for item in statement.properties:
-            graphs = own if item.graphs is None else item.graphs(row)
-            for make_predicate in item.predicates:
-                predicate = make_predicate(row)
-                if predicate is None:
-                    continue
-                for make_object in item.objects:
-                    value = make_object(row)
-                    if value is None:
-                        continue
-                    for graph in graphs:
-                        # Document checks leave only an IRI or blank node here, and an IRI as predicate.
-                        yield Quad(subject, predicate, value, graph)  # type: ignore[arg-type]
