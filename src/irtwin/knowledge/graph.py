@@ -17,6 +17,7 @@ from pyoxigraph import (
     Quad,
     QueryBoolean,
     QuerySolutions,
+    QueryTriples,
     RdfFormat,
     Store,
     Triple,
@@ -78,6 +79,16 @@ class KnowledgeGraph:
         except OSError as error:
             raise InputError(f"{path}: the graph cannot be opened: {error}") from error
 
+    @classmethod
+    def as_it_stands(cls, path: Path) -> Self:
+        """Open what is on disk now, to read; takes no lock, so that another process may write meanwhile.
+
+        Raises OSError or RuntimeError where that process changed the files just now: see `snapshot`.
+        """
+        graph = cls.__new__(cls)
+        graph._store = Store.read_only(str(path))
+        return graph
+
     def __enter__(self) -> Self:
         """Return the graph; leaving the block closes it."""
         return self
@@ -127,7 +138,7 @@ class KnowledgeGraph:
         `bindings` gives variables the IRI that they stand for. The usual prefixes need no PREFIX.
         InputError where the text is no such query, asks another server, or has too many answers.
         """
-        answer = self._ask(text, bindings or {})
+        answer = self.answer(_bound(text, bindings or {}))
         if isinstance(answer, QueryBoolean):
             return Table(("answer",), ({"answer": bool(answer)},))
         if isinstance(answer, QuerySolutions):
@@ -142,13 +153,27 @@ class KnowledgeGraph:
 
     def construct(self, text: str) -> set[Triple]:
         """Return the triples that a CONSTRUCT makes of the union of all named graphs."""
-        return set(self._ask(text, {}))
+        triples = self.answer(text)
+        assert isinstance(triples, QueryTriples)
+        return set(triples)
 
-    def _ask(self, text: str, bindings: Mapping[str, str]) -> Any:
+    def answer(
+        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = ()
+    ) -> QuerySolutions | QueryBoolean | QueryTriples:
+        """Answer a query row by row as they are found; InputError where it is none or asks another server.
+
+        Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
+        """
         if "service" in _HARMLESS.sub(" ", text).lower():
             raise InputError("SERVICE asks another server, which is not allowed here: ask this graph alone")
+        whole = not (default_graphs or named_graphs)
         try:
-            return self._store.query(_bound(text, bindings), prefixes=PREFIXES)
+            return self._store.query(
+                text,
+                prefixes=PREFIXES,
+                default_graph=None if whole else [_graph_name(iri) for iri in default_graphs],
+                named_graphs=None if whole else [_graph_name(iri) for iri in named_graphs],
+            )
         except SyntaxError as error:
             raise InputError(f"not a SPARQL query: {error}") from error
 
@@ -223,6 +248,13 @@ def _bound(text: str, bindings: Mapping[str, str]) -> str:
         return text
     values = " ".join(f"VALUES ?{name} {{ {NamedNode(iri)} }}" for name, iri in bindings.items())
     return f"{text[: group.end()]} {values} {text[group.end() :]}"
+
+
+def _graph_name(iri: str) -> NamedNode:
+    try:
+        return NamedNode(iri)
+    except ValueError as error:
+        raise InputError(f"{iri!r} names no graph: {error}") from error
 
 
 def _counted(answers: Iterable[Any]) -> Iterator[Any]:
