@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any, Self, overload
+from typing import TYPE_CHECKING, Any, Self, overload
 
 from pyoxigraph import (
     BlankNode,
+    CanonicalizationAlgorithm,
+    Dataset,
     DefaultGraph,
     Literal,
     NamedNode,
@@ -25,23 +26,19 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+from irtwin.knowledge.server import SparqlServer, is_url
+from irtwin.knowledge.sparql_text import asks_another_server, bound
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES, XSD
 from irtwin.resources import folder
+
+if TYPE_CHECKING:
+    import rdflib  # half a second to import, for those who ask for it
 
 Row = dict[str, Any]  # a variable's Python value, None where it is unbound
 MOST_ROWS = 1_000_000
 
 _INTEGERS = {XSD + name for name in ("integer", "int", "long", "short", "byte", "nonNegativeInteger", "unsignedInt")}
 _FLOATS = {XSD + name for name in ("double", "float", "decimal")}
-
-# What SPARQL reads as comment, IRI, string, variable or local name, where the word SERVICE means nothing.
-_HARMLESS = re.compile(
-    r"""<[^<>"{}|^`\\\s]*>|\"\"\".*?\"\"\"|'''.*?'''|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*'|\#[^\n]*|[?$]\w+|:[\w.%-]*""",
-    re.DOTALL,
-)
-
-
-_OUTERMOST_GROUP = re.compile(r"\b(?:SELECT|ASK)\b[^{]*\{|\bWHERE\s*\{", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -67,17 +64,21 @@ class Table(Sequence[Row]):
 
 
 class KnowledgeGraph:
-    """Ontology, individuals and inferences in named graphs, on disk at `path` or in memory.
+    """Ontology, individuals and inferences in named graphs: in a folder, on a SPARQL server by its URL, or in memory.
 
     The store's default graph holds the union of the named graphs, each triple once: Oxigraph's own union
     repeats a triple that several graphs hold, and a sum would count it twice.
     """
 
-    def __init__(self, path: Path | None = None):
+    def __init__(self, place: Path | str | None = None):
+        self._store: Store | SparqlServer
         try:
-            self._store = Store() if path is None else Store(str(path))
+            if place is None:
+                self._store = Store()
+            else:
+                self._store = SparqlServer(str(place)) if is_url(place) else Store(str(place))
         except OSError as error:
-            raise InputError(f"{path}: the graph cannot be opened: {error}") from error
+            raise InputError(f"{place}: the graph cannot be opened: {error}") from error
 
     @classmethod
     def as_it_stands(cls, path: Path) -> Self:
@@ -116,11 +117,36 @@ class KnowledgeGraph:
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(_belonging(quads, below))
         names = {*_names(new), *self.graphs(*below)}
-        changed = sorted(name for name in names if _read(new, name) != _read(self._store, name))
+        changed = sorted(name for name in names if not _same(_read(new, name), _read(self._store, name)))
         if changed:
             self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
+
+    def change(self, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
+        """Take quads out of their named graphs and put others in, in one transaction; the rest stays untouched.
+
+        ValueError for blank nodes: they have no name to find them by.
+        """
+        taken, given = set(removed), set(added)
+        taken -= given
+        if any(isinstance(term, BlankNode) for quad in taken | given for term in (quad.subject, quad.object)):
+            raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
+        triples = {quad.triple for quad in taken}
+        remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
+        lost = triples - remaining - {quad.triple for quad in given}
+        if taken or given:
+            self._store.update(
+                f"DELETE DATA {{ {_data(in_graph(lost))} {_data(taken)} }} ;\n"
+                f"INSERT DATA {{ {_data(in_graph(quad.triple for quad in given))} {_data(given)} }}"
+            )
+
+    def _holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
+        """Yield the quads of named graphs that say one of the triples."""
+        if isinstance(self._store, SparqlServer):
+            return self._store.holding(triples)
+        found = (self._store.quads_for_pattern(it.subject, it.predicate, it.object, None) for it in triples)
+        return (quad for quads in found for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
 
     def graphs(self, *below: str) -> list[str]:
         """Return the IRIs of the named graphs, of all or of those that start with one of `below`."""
@@ -138,7 +164,7 @@ class KnowledgeGraph:
         `bindings` gives variables the IRI that they stand for. The usual prefixes need no PREFIX.
         InputError where the text is no such query, asks another server, or has too many answers.
         """
-        answer = self.answer(_bound(text, bindings or {}))
+        answer = self.answer(bound(text, bindings or {}))
         if isinstance(answer, QueryBoolean):
             return Table(("answer",), ({"answer": bool(answer)},))
         if isinstance(answer, QuerySolutions):
@@ -154,7 +180,7 @@ class KnowledgeGraph:
     def construct(self, text: str) -> set[Triple]:
         """Return the triples that a CONSTRUCT makes of the union of all named graphs."""
         triples = self.answer(text)
-        assert isinstance(triples, QueryTriples)
+        assert not isinstance(triples, QuerySolutions | QueryBoolean)
         return set(triples)
 
     def answer(
@@ -164,7 +190,7 @@ class KnowledgeGraph:
 
         Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
         """
-        if "service" in _HARMLESS.sub(" ", text).lower():
+        if asks_another_server(text):
             raise InputError("SERVICE asks another server, which is not allowed here: ask this graph alone")
         whole = not (default_graphs or named_graphs)
         try:
@@ -176,6 +202,22 @@ class KnowledgeGraph:
             )
         except SyntaxError as error:
             raise InputError(f"not a SPARQL query: {error}") from error
+        except RuntimeError as error:
+            if "function" in str(error):
+                raise InputError(f"{error}: see the functions of ontology/series.ttl and of SPARQL 1.1") from None
+            raise
+
+    def as_rdflib(self) -> rdflib.Graph:
+        """Return the union of all named graphs as rdflib sees it, to read."""
+        import rdflib
+        from oxrdflib import OxigraphStore
+        from rdflib.plugins.stores.sparqlstore import SPARQLStore
+
+        if isinstance(self._store, SparqlServer):
+            return rdflib.Graph(
+                SPARQLStore(self._store.query_url, context_aware=False, method="POST", headers=self._store.headers)
+            )
+        return rdflib.Graph(OxigraphStore(store=self._store), identifier=rdflib.graph.DATASET_DEFAULT_GRAPH_ID)
 
 
 def read_turtle(file: Path) -> Iterator[Triple]:
@@ -221,12 +263,34 @@ def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
         yield quad
 
 
-def _names(store: Store) -> list[str]:
+def _names(store: Store | SparqlServer) -> list[str]:
     return [graph.value for graph in store.named_graphs() if isinstance(graph, NamedNode)]
 
 
-def _read(store: Store, name: str) -> set[Triple]:
+def _read(store: Store | SparqlServer, name: str) -> set[Triple]:
     return {quad.triple for quad in store.quads_for_pattern(None, None, None, NamedNode(name))}
+
+
+def _same(some: set[Triple], others: set[Triple]) -> bool:
+    """Whether two graphs say the same, whatever their blank nodes are called."""
+    if some == others or len(some) != len(others):
+        return some == others
+    (named, blank), (other_named, other_blank) = _parted(some), _parted(others)
+    return named == other_named and _canonical(blank) == _canonical(other_blank)
+
+
+def _parted(triples: set[Triple]) -> tuple[set[Triple], set[Triple]]:
+    """Part the triples without blank nodes from those with."""
+    blank = {
+        triple for triple in triples if isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode)
+    }
+    return triples - blank, blank
+
+
+def _canonical(triples: Iterable[Triple]) -> Dataset:
+    found = Dataset(in_graph(triples))
+    found.canonicalize(CanonicalizationAlgorithm.RDFC_1_0)
+    return found
 
 
 def _replacement(name: str, triples: set[Triple]) -> str:
@@ -241,13 +305,14 @@ def _replacement(name: str, triples: set[Triple]) -> str:
     INSERT DATA {{ {text} GRAPH <{name}> {{ {text} }} }}"""
 
 
-def _bound(text: str, bindings: Mapping[str, str]) -> str:
-    """Let the variables of a query's outermost group have the given IRIs as their only values."""
-    group = _OUTERMOST_GROUP.search(_HARMLESS.sub(lambda match: " " * len(match[0]), text))
-    if not bindings or group is None:
-        return text
-    values = " ".join(f"VALUES ?{name} {{ {NamedNode(iri)} }}" for name, iri in bindings.items())
-    return f"{text[: group.end()]} {values} {text[group.end() :]}"
+def _data(quads: Iterable[Quad]) -> str:
+    """Write quads as SPARQL's QuadData."""
+    return "\n".join(
+        f"{quad.triple} ."
+        if isinstance(quad.graph_name, DefaultGraph)
+        else f"GRAPH {quad.graph_name} {{ {quad.triple} }}"
+        for quad in quads
+    )
 
 
 def _graph_name(iri: str) -> NamedNode:

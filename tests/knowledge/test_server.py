@@ -1,0 +1,178 @@
+"""The graph on a SPARQL server: the `oxigraph` of PyPI answers as the embedded store does."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from urllib.error import URLError
+from urllib.request import urlopen
+
+import pytest
+import rdflib
+from pyoxigraph import Literal, NamedNode, Quad
+
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.queries import ask, named_questions
+from irtwin.knowledge.server import TOKEN, SparqlServer
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, term
+
+A, B = "https://example.org/g/a", "https://example.org/g/b"
+
+
+@pytest.fixture(scope="module")
+def server_url() -> Iterator[str]:
+    program = shutil.which("oxigraph", path=str(Path(sys.executable).parent)) or shutil.which("oxigraph")
+    if program is None:
+        pytest.skip("no oxigraph server on this machine: pip install oxigraph")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    process = subprocess.Popen(
+        [program, "serve", "--bind", address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        for _ in range(100):
+            try:
+                urlopen(f"http://{address}/").close()
+                break
+            except URLError:
+                time.sleep(0.05)
+        yield f"http://{address}/query"
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def served(server_url: str, two_robots: list[Quad]) -> KnowledgeGraph:
+    graph = KnowledgeGraph(server_url)
+    graph._store.update("DROP ALL")
+    graph.load_ontology()
+    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    return graph
+
+
+def quad(subject: str, value: float, graph: str) -> Quad:
+    return Quad(
+        NamedNode(f"https://example.org/{subject}"), NamedNode(term("Energy")), Literal(value), NamedNode(graph)
+    )
+
+
+def total(graph: KnowledgeGraph) -> float:
+    return graph.query("SELECT (SUM(?energy) AS ?total) { ?s irt:Energy ?energy }")[0]["total"]
+
+
+def test_every_question_has_the_answer_of_the_embedded_store(served: KnowledgeGraph, graph: KnowledgeGraph) -> None:
+    assert served.graphs() == graph.graphs()
+    for name in named_questions():
+        assert ask(served, name) == ask(graph, name), name
+
+
+def test_what_is_there_already_is_left_alone(served: KnowledgeGraph, two_robots: list[Quad]) -> None:
+    """The server calls blank nodes as it likes: the ontology is the same all the same."""
+    served._store.update(f"INSERT DATA {{ GRAPH <{A}> {{ <https://example.org/x> a <https://example.org/X> }} }}")
+    assert served.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY) == []
+    ontology = served.triples(GRAPH_ONTOLOGY)
+    served.load_ontology()
+    assert served.triples(GRAPH_ONTOLOGY) == ontology
+
+
+def test_union_is_kept(served: KnowledgeGraph) -> None:
+    served.replace([], GRAPH_SOURCE, GRAPH_ACTIVITY)
+    served.replace([quad("x", 2.0, A), quad("x", 2.0, B), quad("y", 3.0, B)], A, B)
+    assert total(served) == 5.0
+    served.change([quad("x", 2.0, B), quad("y", 3.0, B)], [quad("y", 4.0, B)])
+    assert total(served) == 6.0
+    served.replace([], A, B)
+    assert total(served) == 0
+
+
+def test_construct_ask_bindings_and_faults(served: KnowledgeGraph) -> None:
+    assert len(served.construct("CONSTRUCT { ?s irt:Run_Name ?n } WHERE { ?s irt:Run_Name ?n }")) == 5
+    assert served.query("ASK { ?s a irt:Industrial_Robot }").rows == ({"answer": True},)
+    robot = "https://w3id.org/irtwin/id/robot/Arm_A"
+    assert len(served.query("SELECT ?run { ?robot irt:has_RunProcess ?run }", {"robot": robot})) == 3
+    with pytest.raises(InputError, match="not a SPARQL query"):
+        served.query("SELECT * { ?s ?p }")
+    with pytest.raises(InputError, match="not allowed"):
+        served.query("SELECT * { SERVICE <http://example.org/> { ?s ?p ?o } }")
+
+
+def test_rdflib_sees_the_same(served: KnowledgeGraph, graph: KnowledgeGraph) -> None:
+    text = "SELECT ?name { ?run <https://w3id.org/irtwin#Run_Name> ?name }"
+    names = sorted(str(row[0]) for row in graph.as_rdflib().query(text))
+    assert len(names) == 5
+    assert sorted(str(row[0]) for row in served.as_rdflib().query(text)) == names
+    name = rdflib.URIRef(term("Run_Name"))
+    assert len(list(served.as_rdflib().subjects(name))) == len(list(graph.as_rdflib().subjects(name))) == 5
+
+
+@pytest.mark.parametrize(
+    ("query", "update"),
+    [
+        ("http://h:7878/query", "http://h:7878/update"),
+        ("http://h:3030/ds/query", "http://h:3030/ds/update"),
+        ("http://h:7200/repositories/r", "http://h:7200/repositories/r/statements"),
+        ("http://h:8000/sparql", "http://h:8000/sparql"),
+    ],
+)
+def test_address_of_updates(query: str, update: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SparqlServer, "query", lambda *_: None)
+    assert SparqlServer(query).update_url == update
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("ftp://example.org/", "begins with http"),
+        ("file:///etc/passwd", "begins with http"),
+        ("http://", "names a host"),
+        ("http://h:port/", "cannot be read"),
+        ("http://user:secret@127.0.0.1:1/query", r"http://127\.0\.0\.1:1/query: no SPARQL server answers"),
+    ],
+)
+def test_what_is_no_server(url: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        KnowledgeGraph(url)
+    assert "secret" not in str(caught.value)
+
+
+@pytest.fixture
+def refusing() -> Iterator[tuple[str, list[str]]]:
+    """A server that wants to know who asks; yields its URL and what it was told."""
+    told: list[str] = []
+
+    class Refusing(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            told.append(self.headers.get("Authorization", ""))
+            self.send_error(401)
+
+        def log_message(self, *arguments: object) -> None:
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Refusing)
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    yield f"127.0.0.1:{server.server_port}/sparql", told
+    server.shutdown()
+
+
+def test_credentials(refusing: tuple[str, list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    address, told = refusing
+    with pytest.raises(InputError, match="refuses the query: 401"):
+        KnowledgeGraph(f"http://{address}")
+    monkeypatch.setenv(TOKEN, "abc")
+    with pytest.raises(InputError) as caught:
+        KnowledgeGraph(f"http://{address}")
+    assert "abc" not in str(caught.value)
+    with pytest.raises(InputError):
+        KnowledgeGraph(f"http://me:s%40crt@{address}")
+    assert told == ["", "Bearer abc", f"Basic {base64.b64encode(b'me:s@crt').decode()}"]
