@@ -19,12 +19,12 @@ from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.knowledge import graph as knowledge
 from irtwin.knowledge import queries
 from irtwin.knowledge.export import export_owl
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.table import Table
 from irtwin.knowledge.validation import validate
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import adopt as adopt_twin
@@ -166,16 +166,16 @@ def adopt(robot: str, workspace: Path | str = WORKSPACE, *, database: str | None
         return _report(place, graph, robot_id)
 
 
-def ask(question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> knowledge.Table:
+def ask(question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> Table:
     """Answer a named question, or one in SPARQL, from a workspace's graph."""
     with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
         return queries.ask(graph, question)
 
 
-def questions() -> knowledge.Table:
+def questions() -> Table:
     """Return the questions that have a name."""
     known = queries.named_questions().values()
-    return knowledge.Table(("name", "question"), tuple({"name": q.name, "question": q.question} for q in known))
+    return Table(("name", "question"), tuple({"name": q.name, "question": q.question} for q in known))
 
 
 def export(owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> None:

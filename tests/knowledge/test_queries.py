@@ -7,8 +7,9 @@ import pytest
 
 from irtwin.errors import InputError
 from irtwin.knowledge import shacl_rules
-from irtwin.knowledge.graph import KnowledgeGraph, Table
+from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.queries import ask, named_questions, to_csv, to_json
+from irtwin.knowledge.table import Table
 
 TWIN_A = "https://w3id.org/irtwin/id/twin/Arm_A.t1"
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import TYPE_CHECKING, Any, Self
 
 from pyoxigraph import (
     BlankNode,
     CanonicalizationAlgorithm,
     Dataset,
     DefaultGraph,
-    Literal,
     NamedNode,
     Quad,
     QueryBoolean,
@@ -28,39 +25,14 @@ from pyoxigraph import (
 from irtwin.errors import InputError
 from irtwin.knowledge.server import SparqlServer, is_url
 from irtwin.knowledge.sparql_text import asks_another_server, bound
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES, XSD
+from irtwin.knowledge.table import Table, to_python
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES
 from irtwin.resources import folder
 
 if TYPE_CHECKING:
     import rdflib  # half a second to import, for those who ask for it
 
-Row = dict[str, Any]  # a variable's Python value, None where it is unbound
 MOST_ROWS = 1_000_000
-
-_INTEGERS = {XSD + name for name in ("integer", "int", "long", "short", "byte", "nonNegativeInteger", "unsignedInt")}
-_FLOATS = {XSD + name for name in ("double", "float", "decimal")}
-
-
-@dataclass(frozen=True)
-class Table(Sequence[Row]):
-    """The rows that answer a query, with its variables in the order of the query."""
-
-    columns: tuple[str, ...]
-    rows: tuple[Row, ...]
-
-    @overload
-    def __getitem__(self, index: int) -> Row: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Row, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> Row | tuple[Row, ...]:
-        """Return a row, or some."""
-        return self.rows[index]
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(self.rows)
 
 
 class KnowledgeGraph:
@@ -233,27 +205,6 @@ def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Qua
     """Say of each triple that it belongs into the named graph, or into the default graph."""
     graph = DefaultGraph() if name is None else NamedNode(name)
     return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
-
-
-def to_python(term: NamedNode | BlankNode | Literal | Triple | None) -> Any:
-    """Turn an RDF term into a Python value: an IRI into its text, a literal into number, time, truth or text."""
-    if not isinstance(term, Literal):
-        return None if term is None else term.value if isinstance(term, NamedNode) else str(term)
-    kind = term.datatype.value
-    try:
-        if kind in _FLOATS:
-            return float(term.value)
-        if kind in _INTEGERS:
-            return int(term.value)
-        if kind == XSD + "boolean":
-            return term.value in ("true", "1")
-        if kind == XSD + "dateTime":
-            return datetime.fromisoformat(term.value)
-        if kind == XSD + "date":
-            return date.fromisoformat(term.value)
-    except ValueError:  # an ill-typed literal is shown as it is written
-        return term.value
-    return term.value
 
 
 def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph, Table
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.table import Table
 
 _FOLDER = Path(__file__).parent / "questions"
 _HEADER = re.compile(r"^# (title|question): (.+)$", re.MULTILINE)

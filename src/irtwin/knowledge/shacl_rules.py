@@ -14,7 +14,8 @@ from typing import cast
 from pyoxigraph import QuerySolutions, Store, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph, read_turtle, to_python
+from irtwin.knowledge.graph import KnowledgeGraph, in_graph, read_turtle
+from irtwin.knowledge.table import to_python
 from irtwin.knowledge.vocabulary import GRAPH_SHACL, PREFIXES, SH
 from irtwin.resources import folder
 

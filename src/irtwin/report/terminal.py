@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from irtwin.knowledge import graph
+from irtwin.knowledge import table as answers
 
 
-def show(answer: graph.Table) -> None:
+def show(answer: answers.Table) -> None:
     """Print an answer as a table, numbers to the right."""
     table = Table(header_style="bold")
     for column in answer.columns:
