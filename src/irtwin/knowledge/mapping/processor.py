@@ -28,8 +28,9 @@ def map_database(engine: Engine, documents: Sequence[Path], base_iri: str | None
     """
     with planned(engine, documents, base_iri) as (connection, statements):
         for statement in statements:
-            for row in read(connection, statement.sql, statement.where):
-                yield from statement.quads(row)
+            for rows in read(connection, statement.sql, statement.where):
+                for row in rows:
+                    yield from statement.quads(row)
 
 
 @contextmanager
@@ -41,14 +42,12 @@ def planned(
     with engine.connect() as connection:
         connection.execution_options(**snapshot_options(engine))
         with connection.begin():
-            yield (
-                connection,
-                [
-                    statement
-                    for document in checked
-                    for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
-                ],
-            )
+            statements = [
+                statement
+                for document in checked
+                for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
+            ]
+            yield connection, statements
 
 
 def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | None = None) -> None:

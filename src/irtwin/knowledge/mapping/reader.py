@@ -61,8 +61,8 @@ class _Graph:
                 values.append(value)
 
     def objects(self, node: Node, name: str) -> list[Node]:
-        """Return the values of a node's property rr:NAME, in a fixed order."""
-        return sorted(self.properties.get(node, {}).get(RR + name, []), key=str)
+        """Return the values of a node's property rr:NAME, as they come in the document."""
+        return self.properties.get(node, {}).get(RR + name, [])
 
     def names(self, node: Node) -> list[str]:
         """Return the IRIs of a node's properties."""
@@ -77,15 +77,15 @@ class _Reader:
         self.graph = graph
 
     def triples_maps(self) -> dict[Node, TriplesMap]:
-        nodes: set[Node] = set()
+        nodes: dict[Node, None] = {}  # in the document's order, so that each reading gives the same statements
         for node, properties in self.graph.properties.items():
             typed = NamedNode(f"{RR}TriplesMap") in properties.get(_RDF_TYPE, [])
             if typed or any(RR + name in properties for name in ("logicalTable", "subjectMap", "subject")):
-                nodes.add(node)
-            nodes.update(self.graph.objects(node, "parentTriplesMap"))
+                nodes[node] = None
+            nodes |= dict.fromkeys(self.graph.objects(node, "parentTriplesMap"))
         if not nodes:
             raise InputError(f"{self.path}: no rr:TriplesMap in it")
-        return {node: self.triples_map(node) for node in sorted(nodes, key=str)}
+        return {node: self.triples_map(node) for node in nodes}
 
     def triples_map(self, node: Node) -> TriplesMap:
         where = f"{self.path}: {_label(node)}"

@@ -50,6 +50,13 @@ def snapshot_options(engine: Engine) -> dict[str, Any]:
     return {}  # in SQLite a transaction is a snapshot, and what stands in FROM (...) cannot write
 
 
+def schema_version(connection: Connection) -> str:
+    """Return what changes whenever a column's declared type does, where that decides on literals: in SQLite."""
+    if connection.dialect.name != "sqlite":
+        return ""
+    return str(connection.exec_driver_sql("PRAGMA main.schema_version").scalar())
+
+
 def describe(connection: Connection, table: LogicalTable) -> Source:
     """Find a logical table's columns. Raises InputError where it is not there or the query is not valid."""
     sql = _from_item(connection, table)
@@ -65,12 +72,11 @@ def describe(connection: Connection, table: LogicalTable) -> Source:
     return Source(table.where, sql, columns, folded=table.query is None)
 
 
-def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Any]]:
-    """Yield a query's rows, a chunk of them in memory at a time."""
+def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Sequence[Any]]]:
+    """Yield a query's rows in chunks, one of them in memory at a time."""
     result = run(connection, sql, where)
     try:
-        for rows in result.partitions(_CHUNK):
-            yield from rows
+        yield from result.partitions(_CHUNK)
     except DBAPIError as error:
         raise _refused(where, error) from None
     finally:

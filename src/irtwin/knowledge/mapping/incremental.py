@@ -1,0 +1,146 @@
+"""Mapping anew only what changed: rows that are new or gone since the last run, on any database.
+
+Each statement's rows are read and told from the remembered ones by a hash. A quad of a row that is gone goes too,
+unless another row makes it: rows of the same subject are looked up among the remembered ones.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import marshal
+import uuid
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from pyoxigraph import BlankNode, Literal, NamedNode, Quad
+from sqlalchemy import Connection, Engine
+
+from irtwin import __version__
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping.plan import Statement
+from irtwin.knowledge.mapping.processor import planned
+from irtwin.knowledge.mapping.remembered import ENTRY, Entries, RememberedRows
+from irtwin.knowledge.mapping.source import read, schema_version
+from irtwin.knowledge.mapping.terms import Row
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, OWL
+
+_VERSION_GRAPH = f"{GRAPH_SOURCE}version"
+_ASK_VERSION = f"SELECT ?version {{ GRAPH <{_VERSION_GRAPH}> {{ ?graphs owl:versionInfo ?version }} }}"
+
+
+def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path) -> None:
+    """Bring the graphs of sources and activities up to date with a database.
+
+    file: where the rows are remembered. The graph names the state that they are of, so that a graph or a file that
+    was put back, or a crash between the two, leads to a full run, as another document, table or software does.
+    Raises InputError as `map_database`; graph and file then stay as they were.
+    """
+    with planned(engine, documents) as (connection, statements), RememberedRows(file) as remembered:
+        run = _Run(connection, statements, remembered)
+        made_by = _digest(
+            __version__,
+            schema_version(connection),
+            *(path.read_text() for path in documents),
+            *(statement.sql for statement in statements),
+        )
+        current = next((row["version"] for row in graph.query(_ASK_VERSION)), "")
+        version = f"{made_by}.{uuid.uuid4().hex}"
+        if current == remembered.version and current.startswith(made_by):
+            removed, added = run.changes()
+            if not (added or removed):
+                return
+            if not _blank(added | removed):
+                graph.change({*removed, _version(current)}, {*added, _version(version)})
+                remembered.version = version
+                return
+        remembered.forget()
+        graph.replace(chain(run.added(), [_version(version)]), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        remembered.version = version
+
+
+class _Run:
+    """One look at all rows, beside those that are remembered."""
+
+    def __init__(self, connection: Connection, statements: Sequence[Statement], remembered: RememberedRows) -> None:
+        self.connection = connection
+        self.statements = statements
+        self.remembered = remembered
+        self.gone: dict[int, Entries] = {}  # by the statement's number
+
+    def added(self) -> Iterator[Quad]:
+        """Yield the quads of rows that are not remembered, and remember those."""
+        for number, statement in enumerate(self.statements):
+            entries = self.remembered.entries(number)
+            seen = np.zeros(len(entries), dtype=bool)
+            new: list[Entries] = []
+            for rows in read(self.connection, statement.sql, statement.where):
+                unknown = _unknown(rows, entries, seen)
+                made = [statement.quads(row) for row in unknown.values()]
+                if made:
+                    subjects = [quads[0].subject if quads else None for quads in made]
+                    ids = self.remembered.keep(list(unknown.values()))
+                    new.append(np.array(list(zip(unknown, _hashes(map(str, subjects)), ids, strict=True)), ENTRY))
+                    yield from chain.from_iterable(made)
+            self.gone[number] = entries[~seen]
+            if new or not seen.all():
+                self.remembered.set_entries(number, np.concatenate([entries[seen], *new]))
+
+    def changes(self) -> tuple[set[Quad], set[Quad]]:
+        """Return the quads that no row makes any more, and those that new rows make; forget the rows that are gone."""
+        added = set(self.added())
+        gone = {
+            quad
+            for number, entries in self.gone.items()
+            for row in self.remembered.rows(entries)
+            for quad in self.statements[number].quads(row)
+        }
+        return self._no_longer_made(gone - added), added - gone
+
+    def _no_longer_made(self, candidates: set[Quad]) -> set[Quad]:
+        subjects = _hashes({str(quad.subject) for quad in candidates})
+        for number, statement in enumerate(self.statements):
+            self.remembered.drop(self.gone[number])
+            entries = self.remembered.entries(number)
+            for row in self.remembered.rows(entries[np.isin(entries["subject"], subjects)]):
+                candidates.difference_update(statement.quads(row))
+        return candidates
+
+
+def _unknown(rows: Sequence[Row], entries: Entries, seen: npt.NDArray[np.bool_]) -> dict[int, Row]:
+    """Return the rows that have no entry, by hash; mark in `seen`, (N,), the entries of the others."""
+    hashes = np.frombuffer(b"".join(map(_row_hash, rows)), np.uint64)
+    known = entries["row"]
+    at = np.searchsorted(known, hashes)
+    within = at < len(known)
+    found = np.zeros(len(rows), dtype=bool)
+    found[within] = known[at[within]] == hashes[within]
+    seen[at[found]] = True
+    return {int(hashes[index]): rows[index] for index in np.flatnonzero(~found).tolist()}
+
+
+def _row_hash(row: Row) -> bytes:
+    try:
+        content = marshal.dumps(tuple(row), 2)  # without references, so that the value alone decides
+    except ValueError:
+        content = repr(tuple(row)).encode()
+    return hashlib.blake2b(content, digest_size=8).digest()
+
+
+def _hashes(texts: Iterable[str]) -> npt.NDArray[np.uint64]:
+    digests = (hashlib.blake2b(text.encode(), digest_size=8).digest() for text in texts)
+    return np.frombuffer(b"".join(digests), np.uint64)
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _version(name: str) -> Quad:
+    return Quad(NamedNode(GRAPH_SOURCE), NamedNode(f"{OWL}versionInfo"), Literal(name), NamedNode(_VERSION_GRAPH))
+
+
+def _blank(quads: Iterable[Quad]) -> bool:
+    return any(isinstance(term, BlankNode) for quad in quads for term in (quad.subject, quad.object))

@@ -1,0 +1,133 @@
+"""The rows of a database as they were when they were last mapped, in an SQLite file of their own."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator, Sequence
+from datetime import date, datetime, time
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.natural import by_value
+from irtwin.knowledge.mapping.terms import Row
+
+# One for each row of a statement, in the order of the hashes: 64 bits tell rows apart, and find those of a subject.
+ENTRY = np.dtype([("row", np.uint64), ("subject", np.uint64), ("id", np.int64)])
+Entries = npt.NDArray[np.void]
+
+_TABLES = """
+CREATE TABLE IF NOT EXISTS version (name TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS statement (number INTEGER PRIMARY KEY, entries BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS kept (id INTEGER PRIMARY KEY, content TEXT NOT NULL);
+"""
+_PLAIN = (type(None), bool, int, float, str)
+_RESTORED: dict[str, Callable[[str], Any]] = {
+    "bytes": bytes.fromhex,
+    "Decimal": Decimal,
+    "date": date.fromisoformat,
+    "time": time.fromisoformat,
+    "datetime": datetime.fromisoformat,
+}
+
+
+class RememberedRows:
+    """One transaction on the file: what is done in the block is kept if it ends well, and is undone if not."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+
+    def __enter__(self) -> Self:
+        self._connection = _opened(self._file)
+        self._next = self._connection.execute("SELECT coalesce(max(id), 0) + 1 FROM kept").fetchone()[0]
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._connection.execute("COMMIT" if kind is None else "ROLLBACK")
+        self._connection.close()
+
+    @property
+    def version(self) -> str | None:
+        """The name of the state that the rows are of, None where there is none."""
+        found = self._connection.execute("SELECT name FROM version").fetchone()
+        return None if found is None else str(found[0])
+
+    @version.setter
+    def version(self, name: str) -> None:
+        self._connection.execute("DELETE FROM version")
+        self._connection.execute("INSERT INTO version VALUES (?)", (name,))
+
+    def forget(self) -> None:
+        """Start anew, with no rows."""
+        for table in ("version", "statement", "kept"):
+            self._connection.execute(f"DELETE FROM {table}")
+        self._next = 1
+
+    def entries(self, statement: int) -> Entries:
+        """Return the entries of a statement's rows, (N,) of ENTRY, by rising hash."""
+        found = self._connection.execute("SELECT entries FROM statement WHERE number = ?", (statement,)).fetchone()
+        return np.frombuffer(b"" if found is None else found[0], ENTRY)
+
+    def set_entries(self, statement: int, entries: Entries) -> None:
+        """Keep a statement's entries in place of those it had, each row once."""
+        _, first = np.unique(entries["row"], return_index=True)
+        self.drop(np.delete(entries, first))
+        self._connection.execute(
+            "INSERT OR REPLACE INTO statement VALUES (?, ?)", (statement, entries[first].tobytes())
+        )
+
+    def keep(self, rows: Sequence[Row]) -> range:
+        """Keep rows; return their numbers."""
+        ids = range(self._next, self._next + len(rows))
+        self._next += len(rows)
+        self._connection.executemany("INSERT INTO kept VALUES (?, ?)", zip(ids, map(_written, rows), strict=True))
+        return ids
+
+    def rows(self, entries: Entries) -> Iterator[list[Any]]:
+        """Yield the kept rows of these entries."""
+        for number in entries["id"].tolist():
+            found = self._connection.execute("SELECT content FROM kept WHERE id = ?", (number,)).fetchone()
+            yield [_restored(value) if isinstance(value, dict) else value for value in json.loads(found[0])]
+
+    def drop(self, entries: Entries) -> None:
+        """Drop the kept rows of these entries."""
+        self._connection.executemany("DELETE FROM kept WHERE id = ?", ((number,) for number in entries["id"].tolist()))
+
+
+def _opened(file: Path) -> sqlite3.Connection:
+    """Open the file, in place of a broken one: what it holds can be had from the database again."""
+    try:
+        connection = sqlite3.connect(file, isolation_level=None)
+        connection.executescript(_TABLES)
+        connection.execute("BEGIN IMMEDIATE")
+        return connection
+    except sqlite3.OperationalError as error:
+        raise InputError(f"{file}: cannot be written: {error}") from None
+    except sqlite3.DatabaseError:
+        file.unlink()
+        return _opened(file)
+
+
+def _written(row: Row) -> str:
+    return json.dumps([value if type(value) in _PLAIN else _tagged(value) for value in row])
+
+
+def _tagged(value: Any) -> Any:
+    """What JSON has no notation for, so that its natural literal stays the same."""
+    if isinstance(value, (bytes, memoryview)):
+        return {"bytes": bytes(value).hex()}
+    if isinstance(value, Decimal):
+        return {"Decimal": str(value)}
+    if isinstance(value, (date, time)):
+        return {type(value).__name__: value.isoformat()}
+    return by_value(value)[0]  # its natural literal is a string
+
+
+def _restored(tagged: dict[str, str]) -> Any:
+    ((kind, text),) = tagged.items()
+    return _RESTORED[kind](text)

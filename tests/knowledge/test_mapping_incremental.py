@@ -1,0 +1,255 @@
+"""Mapping only what changed leaves the graph that a full run makes."""
+
+from __future__ import annotations
+
+import sqlite3
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyoxigraph import NamedNode, Quad, Triple
+from sqlalchemy import Engine
+from test_mapping import PREFIXES
+
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database, refresh
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.storage.engine import open_engine
+
+TABLES = """
+CREATE TABLE city (id INTEGER PRIMARY KEY, name VARCHAR, area NUMERIC(8, 2));
+CREATE TABLE person (id INTEGER PRIMARY KEY, name VARCHAR, city INTEGER, since DATE, part VARCHAR);
+"""
+# Names are shared by several rows and two triples maps; graphs and joins come and go with a column.
+MAPPING = (
+    PREFIXES
+    + """
+@prefix g: <https://w3id.org/irtwin/graph/source/> .
+<#City> rr:logicalTable [ rr:tableName "city" ] ;
+    rr:subjectMap [ rr:template "http://example.com/city/{id}" ; rr:class ex:City ; rr:graph g:city ] ;
+    rr:predicateObjectMap [ rr:predicate ex:name ; rr:objectMap [ rr:column "name" ] ] ;
+    rr:predicateObjectMap [ rr:predicate ex:area ; rr:objectMap [ rr:column "area" ] ] .
+<#Person> rr:logicalTable [ rr:tableName "person" ] ;
+    rr:subjectMap [ rr:template "http://example.com/person/{id}" ; rr:class ex:Person ;
+        rr:graphMap [ rr:template "https://w3id.org/irtwin/graph/activity/{part}" ] ] ;
+    rr:predicateObjectMap [ rr:predicate ex:name ; rr:objectMap [ rr:column "name" ] ; rr:graph g:person ] ;
+    rr:predicateObjectMap [ rr:predicate ex:since ; rr:objectMap [ rr:column "since" ] ] ;
+    rr:predicateObjectMap [ rr:predicate ex:city ; rr:objectMap [ rr:parentTriplesMap <#City> ;
+        rr:joinCondition [ rr:child "city" ; rr:parent "id" ] ] ] .
+<#Name> rr:logicalTable [ rr:sqlQuery "SELECT name FROM person UNION ALL SELECT name FROM city" ] ;
+    rr:subjectMap [ rr:template "http://example.com/name/{name}" ; rr:class ex:Name ; rr:graph g:city ] .
+<#Inhabited> rr:logicalTable [ rr:tableName "person" ] ;
+    rr:subjectMap [ rr:template "http://example.com/city/{city}" ; rr:class ex:City ; rr:graph g:city ] ;
+    rr:predicateObjectMap [ rr:predicate ex:inhabitant ; rr:objectMap [ rr:column "name" ] ] .
+"""
+)
+
+names = st.sampled_from(["Ada", "Bo & Co", "é", None])
+persons = st.tuples(
+    st.integers(0, 4),
+    names,
+    st.none() | st.integers(0, 3),
+    st.sampled_from([None, "2026-01-02", "2025-12-31"]),
+    st.sampled_from([None, "a", "b"]),
+)
+cities = st.tuples(st.integers(0, 3), names, st.none() | st.sampled_from([1, 2.5, 0.1]))
+statements = st.one_of(
+    st.tuples(st.just("INSERT OR REPLACE INTO person VALUES (?, ?, ?, ?, ?)"), persons),
+    st.tuples(st.just("INSERT OR REPLACE INTO city VALUES (?, ?, ?)"), cities),
+    st.tuples(st.just("DELETE FROM person WHERE id = ?"), st.tuples(st.integers(0, 4))),
+    st.tuples(st.just("DELETE FROM city WHERE id = ?"), st.tuples(st.integers(0, 3))),
+    st.tuples(st.just("UPDATE person SET city = ?"), st.tuples(st.integers(0, 3))),
+)
+SQL = tuple[str, Sequence[object]]
+
+
+class Place:
+    """A database, its mapping, a graph and the file of remembered rows."""
+
+    def __init__(self, folder: Path) -> None:
+        self.database, self.document, self.file = folder / "a.db", folder / "a.r2rml.ttl", folder / "rows.db"
+        self.graph = KnowledgeGraph()
+        self.document.write_text(MAPPING)
+        self.run(*((line, ()) for line in TABLES.strip().split("\n")))
+        self.engine: Engine = open_engine(f"sqlite:///{self.database}")
+
+    def run(self, *statements: SQL) -> None:
+        with sqlite3.connect(self.database) as connection:
+            for sql, values in statements:
+                connection.execute(sql, values)
+
+    def refresh(self) -> None:
+        refresh(self.graph, self.engine, [self.document], self.file)
+
+    def check(self) -> None:
+        """The graph is what a full run makes, named graphs and their union, but for the version's mark."""
+        made = set(map_database(self.engine, [self.document]))
+        names = {quad.graph_name.value for quad in made if isinstance(quad.graph_name, NamedNode)}
+        mark = f"{GRAPH_SOURCE}version"
+        assert set(self.graph.graphs(GRAPH_SOURCE, GRAPH_ACTIVITY)) - {mark} >= names
+        for name in self.graph.graphs():
+            if name != mark:
+                assert self.graph.triples(name) == {q.triple for q in made if q.graph_name == NamedNode(name)}
+        assert self.graph.triples() - self.graph.triples(mark) == {quad.triple for quad in made}
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    place = Place(tmp_path)
+    place.run(
+        ("INSERT INTO city VALUES (1, 'Ada', 2.5), (2, 'Rom', NULL)", ()),
+        ("INSERT INTO person VALUES (1, 'Ada', 1, '2026-01-02', 'a'), (2, 'Ada', 2, NULL, 'b')", ()),
+    )
+    place.refresh()
+    return place
+
+
+@pytest.fixture
+def full_runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A list that grows by each full run."""
+    counted: list[int] = []
+    replace = KnowledgeGraph.replace
+
+    def counting(graph: KnowledgeGraph, quads: Iterable[Quad], *below: str) -> list[str]:
+        counted.append(1)
+        return replace(graph, quads, *below)
+
+    monkeypatch.setattr(KnowledgeGraph, "replace", counting)
+    return counted
+
+
+@given(runs=st.lists(st.lists(statements, max_size=8), max_size=6))
+@settings(max_examples=60, deadline=None)
+def test_the_graph_is_a_full_runs(runs: list[list[SQL]]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        place = Place(Path(folder))
+        for run in runs:
+            place.run(*run)
+            place.refresh()
+            place.check()
+        place.engine.dispose()
+
+
+def test_only_what_changed_is_touched(place: Place, full_runs: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    changed: list[set[str]] = []
+    change = KnowledgeGraph.change
+
+    def watching(graph: KnowledgeGraph, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
+        changed.extend(
+            {str(quad.triple) for quad in quads if "versionInfo" not in str(quad)} for quads in (removed, added)
+        )
+        change(graph, removed, added)
+
+    monkeypatch.setattr(KnowledgeGraph, "change", watching)
+    place.refresh()
+    assert changed == []
+    place.run(("UPDATE city SET name = 'Roma' WHERE id = 2", ()))
+    place.refresh()
+    name, kind = (
+        "<http://example.com/name>",
+        "<http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <http://example.com/Name>",
+    )
+    assert changed == [
+        {f'<http://example.com/city/2> {name} "Rom"', f"<http://example.com/name/Rom> {kind}"},
+        {f'<http://example.com/city/2> {name} "Roma"', f"<http://example.com/name/Roma> {kind}"},
+    ]
+    place.check()
+    assert full_runs == []
+
+
+def test_a_row_that_others_stand_in_for_takes_nothing_with_it(place: Place) -> None:
+    place.run(("DELETE FROM person WHERE id = 1", ()))  # Ada is still the name of a city and of another person
+    place.refresh()
+    place.check()
+    assert (
+        Triple(
+            NamedNode("http://example.com/name/Ada"),
+            NamedNode("http://www.w3.org/1999/02/22-rdf-syntax-ns#type"),
+            NamedNode("http://example.com/Name"),
+        )
+        in place.graph.triples()
+    )
+
+
+@pytest.mark.parametrize(
+    "happens",
+    [
+        lambda place: place.document.write_text(MAPPING.replace("ex:since", "ex:from")),
+        lambda place: place.run(("ALTER TABLE person ADD COLUMN more INTEGER", ())),
+        lambda place: place.file.unlink(),
+        lambda place: place.file.write_bytes(b"no database at all" * 100),
+        lambda place: setattr(place, "graph", KnowledgeGraph()),
+        lambda place: place.graph.replace([], f"{GRAPH_SOURCE}version"),
+    ],
+    ids=["another document", "another table", "no file", "a broken file", "another graph", "a graph of another time"],
+)
+def test_all_is_mapped_where_the_rows_are_not_the_graphs(
+    place: Place, happens: Callable[[Place], object], full_runs: list[int]
+) -> None:
+    happens(place)
+    full_runs.clear()
+    place.run(("UPDATE person SET city = 2, name = 'é'", ()))
+    place.refresh()
+    place.check()
+    assert full_runs == [1]
+    place.run(("DELETE FROM person WHERE id = 2", ()))
+    place.refresh()
+    place.check()
+    assert full_runs == [1]
+
+
+def test_a_crash_between_graph_and_file(place: Place, full_runs: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    change = KnowledgeGraph.change
+
+    def crashing(graph: KnowledgeGraph, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
+        change(graph, removed, added)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(KnowledgeGraph, "change", crashing)
+    place.run(("UPDATE person SET name = 'é' WHERE id = 1", ()))
+    with pytest.raises(KeyboardInterrupt):
+        place.refresh()
+    monkeypatch.undo()
+    place.run(("UPDATE person SET name = 'Bo & Co' WHERE id = 1", ()))
+    place.refresh()
+    place.check()
+
+
+def test_a_row_that_does_not_fit_leaves_all_as_it_was(place: Place) -> None:
+    place.document.write_text(
+        MAPPING.replace('rr:column "name" ] ; rr:graph', 'rr:column "name" ; rr:datatype xsd:date ] ; rr:graph')
+    )
+    place.run(("UPDATE person SET name = NULL", ()))
+    place.refresh()
+    before = place.graph.triples(), place.file.read_bytes()
+    place.run(("UPDATE person SET name = 'today'", ()))
+    with pytest.raises(InputError, match="the value 'today' is no"):
+        place.refresh()
+    assert (place.graph.triples(), place.file.read_bytes()) == before
+    place.run(("UPDATE person SET name = '2026-01-02'", ()))
+    place.refresh()
+    place.check()
+
+
+def test_blank_nodes_are_made_anew(place: Place, full_runs: list[int]) -> None:
+    place.document.write_text(
+        MAPPING.replace('"http://example.com/name/{name}"', '"{name}" ; rr:termType rr:BlankNode')
+    )
+    for name in ("é", "Ada", "Bo & Co"):
+        place.run(("UPDATE person SET name = ? WHERE id = 1", (name,)))
+        place.refresh()
+        made = set(map_database(place.engine, [place.document]))
+        assert len(place.graph.triples(f"{GRAPH_SOURCE}city")) == len(
+            {quad.triple for quad in made if quad.graph_name == NamedNode(f"{GRAPH_SOURCE}city")}
+        )
+    assert len(full_runs) == 3
+
+
+def test_where_rows_cannot_be_remembered(place: Place, tmp_path: Path) -> None:
+    place.file = tmp_path / "none" / "rows.db"
+    with pytest.raises(InputError, match=r"rows\.db: cannot be written: unable to open"):
+        place.refresh()
