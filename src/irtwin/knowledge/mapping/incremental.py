@@ -10,6 +10,7 @@ import hashlib
 import marshal
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
+from importlib import metadata
 from itertools import chain
 from pathlib import Path
 
@@ -18,7 +19,6 @@ import numpy.typing as npt
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad
 from sqlalchemy import Connection, Engine
 
-from irtwin import __version__
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
@@ -41,7 +41,7 @@ def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], fi
     with planned(engine, documents) as (connection, statements), RememberedRows(file) as remembered:
         run = _Run(connection, statements, remembered)
         made_by = _digest(
-            __version__,
+            metadata.version("irtwin"),
             schema_version(connection),
             *(path.read_text() for path in documents),
             *(statement.sql for statement in statements),
