@@ -26,6 +26,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.server import SparqlServer, is_url
 from irtwin.knowledge.sparql_text import asks_another_server, bound
 from irtwin.knowledge.table import Table, to_python
+from irtwin.knowledge.updates import keeping_union
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES
 from irtwin.resources import folder
 
@@ -178,6 +179,17 @@ class KnowledgeGraph:
             if "function" in str(error):
                 raise InputError(f"{error}: see the functions of ontology/series.ttl and of SPARQL 1.1") from None
             raise
+
+    def update(self, text: str) -> None:
+        """Do a SPARQL update in one transaction that keeps the default graph the union: see `updates`.
+
+        InputError where the text is no update, reads from elsewhere, or fails.
+        """
+        try:
+            self._store.update(keeping_union(text), prefixes=PREFIXES)
+            self._store.flush()
+        except (SyntaxError, RuntimeError) as error:
+            raise InputError(f"the update failed, nothing changed: {error}") from error
 
     def as_rdflib(self) -> rdflib.Graph:
         """Return the union of all named graphs as rdflib sees it, to read."""

@@ -42,6 +42,7 @@ GRAPH = f"{ONTOLOGY}/graph/"
 GRAPH_ONTOLOGY = f"{GRAPH}ontology"
 GRAPH_SOURCE = f"{GRAPH}source/"  # one for each mapping file
 GRAPH_ACTIVITY = f"{GRAPH}activity/"  # one for each execution of a provider
+GRAPH_UPDATE = f"{GRAPH}update"  # what SPARQL updates put into no graph
 GRAPH_INFERRED = f"{GRAPH}inferred/"
 GRAPH_OWL_RL = f"{GRAPH_INFERRED}owl_rl"
 GRAPH_SWRL = f"{GRAPH_INFERRED}swrl"

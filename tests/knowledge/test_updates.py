@@ -1,0 +1,80 @@
+"""SPARQL updates: what they do, that the default graph stays the union, and what is refused."""
+
+import pytest
+from pyoxigraph import DefaultGraph, Literal, NamedNode, Quad, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_UPDATE
+
+A, B = "http://e/a", "http://e/b"
+
+
+@pytest.fixture
+def graph() -> KnowledgeGraph:
+    """Two graphs that both hold (x, p, 1), and one of which holds (x, p, 2)."""
+    graph = KnowledgeGraph()
+    both, alone = (Triple(NamedNode("http://e/x"), NamedNode("http://e/p"), Literal(n)) for n in (1, 2))
+    graph.replace(
+        [Quad(*both, NamedNode(A)), Quad(*both, NamedNode(B)), Quad(*alone, NamedNode(B))],  # type: ignore[misc]
+        "http://e/",
+    )
+    return graph
+
+
+def values(graph: KnowledgeGraph) -> dict[str, list[int]]:
+    """Return the numbers in each graph, the union under an empty name, after a check that it is one."""
+    quads = list(graph._store.quads_for_pattern(None, None, None, None))
+    named = [quad for quad in quads if not isinstance(quad.graph_name, DefaultGraph)]
+    assert {quad.triple for quad in named} == graph.triples()
+    found: dict[str, list[int]] = {"": sorted(int(triple.object.value) for triple in graph.triples())}
+    for quad in named:
+        found.setdefault(quad.graph_name.value, []).append(int(quad.object.value))
+    return {name: sorted(numbers) for name, numbers in found.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("INSERT DATA { <x> <p> 3 }", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]}),
+        ("INSERT DATA { <x> <p> 2 }", {"": [1, 2], A: [1], B: [1, 2]}),
+        ("INSERT DATA { GRAPH <a> { <x> <p> 3 } }", {"": [1, 2, 3], A: [1, 3], B: [1, 2]}),
+        ("DELETE DATA { GRAPH <a> { <x> <p> 1 } }", {"": [1, 2], B: [1, 2]}),
+        ("DELETE DATA { GRAPH <b> { <x> <p> 2 } }", {"": [1], A: [1], B: [1]}),
+        ("DELETE DATA { <x> <p> 1 }", {"": [2], B: [2]}),
+        ("DELETE WHERE { ?s <p> ?o }", {"": []}),
+        ("DELETE { ?s <p> 2 } INSERT { ?s <p> 4 } WHERE { ?s <p> 2 }", {"": [1, 4], A: [1], B: [1], GRAPH_UPDATE: [4]}),
+        ("DROP GRAPH <b>", {"": [1], A: [1]}),
+        ("DROP ALL", {"": []}),
+        ("INSERT DATA { <x> <p> 3 } ; DELETE DATA { <x> <p> 3 } ; # and back\n", {"": [1, 2], A: [1], B: [1, 2]}),
+        ("# nothing", {"": [1, 2], A: [1], B: [1, 2]}),
+    ],
+)
+def test_the_default_graph_stays_the_union(graph: KnowledgeGraph, text: str, expected: dict[str, list[int]]) -> None:
+    graph.update(f"# PREFIX in a comment\nBASE <http://e/>\nPREFIX : <http://e/> {text}")
+    assert values(graph) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("INSERT DATA {\n <a b c> }", "not a SPARQL update: error at 2:"),
+        ("SELECT * { ?s ?p ?o }", "not a SPARQL update: error at 1:"),
+        ("INSERT DATA { } } ; DROP ALL ; INSERT { ", "not a SPARQL update"),
+        ("LOAD <http://127.0.0.1:1/x>", "LOAD and SERVICE read from elsewhere"),
+        ("load silent <file:///etc/passwd>", "LOAD and SERVICE read from elsewhere"),
+        ("INSERT { ?s ?p ?o } WHERE { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "LOAD and SERVICE read"),
+        ("DROP GRAPH <http://e/nowhere>", "nothing changed: The graph <http://e/nowhere> does not exist"),
+        ("INSERT DATA { <http://e/x> <http://e/p> 9 } ; DROP GRAPH <http://e/nowhere>", "nothing changed"),
+    ],
+)
+def test_a_refused_update_changes_nothing(graph: KnowledgeGraph, text: str, message: str) -> None:
+    before = values(graph)
+    with pytest.raises(InputError, match=message):
+        graph.update(text)
+    assert values(graph) == before
+
+
+def test_payload_is_a_word_like_any_other(graph: KnowledgeGraph) -> None:
+    graph.update("INSERT DATA { <http://e/x> irt:Payload 5 ; <http://e/load> 6 } # load")
+    assert values(graph)[GRAPH_UPDATE] == [5, 6]
