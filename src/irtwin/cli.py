@@ -251,6 +251,31 @@ def map_database(mapping: Path, database: str, out: Path) -> None:
     map_to_file(mapping, database, out)
 
 
+@cli.command()
+@_workspace
+@click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 takes a free one.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; others may ask it.")
+@click.option("--timeout", type=click.FloatRange(min=0.1), default=30.0, show_default=True, help="Seconds per query.")
+@click.option("--memory", type=click.IntRange(min=128), default=1024, show_default=True, help="MB per query.")
+@click.option("--token-file", type=click.Path(path_type=Path), help="Allows updates by who sends the token in it.")
+def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
+    """Answer SPARQL over HTTP, at /sparql.
+
+    With a query page at /, and the ontology at its IRIs' paths. Read-only, unless the token for updates is given: in
+    a file, or in the environment as IRTWIN_TOKEN.
+    """
+    from irtwin.serve.pool import Limits
+    from irtwin.serve.server import read_token
+    from irtwin.serve.server import serve as serve_graph
+
+    limits = Limits(seconds=timeout, memory=memory << 20)
+    serve_graph(workspace / "graph", host, port, token=read_token(token_file), limits=limits, announce=_announce)
+
+
+def _announce(address: str) -> None:
+    click.echo(f"Serving {address}; Ctrl-C stops.")
+
+
 def _say(line: str) -> None:
     click.echo(line, err=True)
 

@@ -1,0 +1,1 @@
+"""The SPARQL endpoint: protocol, workers, query page, the ontology by its IRIs."""

@@ -1,0 +1,150 @@
+"""`/sparql`: a request in, the worker's answer streamed out, or one line that says why not."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from irtwin.serve import description, page
+from irtwin.serve.pool import Limits, Pool, Worker
+from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
+from irtwin.serve.updates import Updates
+
+_METHODS = "GET, HEAD, POST, OPTIONS"
+_log = logging.getLogger(__name__)
+
+
+class Endpoint:
+    """An ASGI application that speaks the SPARQL 1.1 Protocol."""
+
+    def __init__(self, pool: Pool, updates: Updates, limits: Limits):
+        self._pool = pool
+        self._updates = updates
+        self._limits = limits
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request. A client that leaves ends its query."""
+        request = Request(scope, receive)
+        try:
+            operation = await self._read(request)
+        except Refusal as refusal:
+            return await refused(refusal)(scope, receive, send)
+        except ClientDisconnect:
+            return
+        answering = asyncio.create_task(self._respond(operation, request, send))
+        leaving = asyncio.create_task(_left(receive))
+        leaving.add_done_callback(lambda _: answering.cancel())
+        try:
+            await answering
+        except asyncio.CancelledError:
+            if not leaving.done():
+                raise
+        finally:
+            leaving.cancel()
+
+    async def _read(self, request: Request) -> Operation | None:
+        """Read what is asked; None for the service itself."""
+        query_string = request.scope["query_string"].decode("ascii", errors="replace")
+        if request.method in ("GET", "HEAD"):
+            return read_get(query_string)
+        if request.method == "POST":
+            return read_post(request.headers.get("content-type", ""), query_string, await self._body(request))
+        if request.method == "OPTIONS":
+            raise Refusal(204, "", {"Allow": _METHODS})
+        raise Refusal(405, f"{request.method} is not for this address", {"Allow": _METHODS})
+
+    async def _body(self, request: Request) -> bytes:
+        body = bytearray()
+        try:
+            async with asyncio.timeout(self._limits.seconds):
+                async for piece in request.stream():
+                    body += piece
+                    if len(body) > self._limits.request:
+                        raise Refusal(413, f"a request has at most {self._limits.request:,} bytes")
+        except TimeoutError:
+            raise Refusal(408, "the request did not come in time") from None
+        return bytes(body)
+
+    async def _respond(self, operation: Operation | None, request: Request, send: Send) -> None:
+        deadline = time.monotonic() + self._limits.seconds
+        try:
+            if operation is not None and operation.kind == "query":
+                return await self._query(operation, request, send, deadline)
+            response = await self._describe(request) if operation is None else await self._update(operation, request)
+        except Refusal as refusal:
+            response = refused(refusal)
+        await response(request.scope, request.receive, send)
+
+    async def _describe(self, request: Request) -> Response:
+        accept = request.headers.get("accept", "")
+        if description.wants_page(accept):
+            return page.response()
+        graphs = await self._named_graphs()
+        return description.response(accept, str(request.url.replace(query="")), graphs, self._updates.allowed)
+
+    async def _update(self, operation: Operation, request: Request) -> Response:
+        await self._updates.do(operation, request.headers.get("authorization", ""))
+        return Response(status_code=204)
+
+    async def _query(self, operation: Operation, request: Request, send: Send, deadline: float) -> None:
+        async with self._pool.worker() as worker:
+            media_type = await self._ask(worker, operation, request.headers.get("accept", ""), deadline)
+            headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
+            await send(
+                {
+                    "type": "http.response.start",
+                    "status": 200,
+                    "headers": [(name.lower().encode(), value.encode()) for name, value in headers.items()],
+                }
+            )
+            try:
+                async with asyncio.timeout_at(deadline):
+                    async for piece in worker.pieces():
+                        await send({"type": "http.response.body", "body": piece, "more_body": True})
+            except (TimeoutError, Refusal) as error:
+                # The status is sent: all that can be done is not to end the body as if it were whole.
+                _log.warning("an answer was broken off: %s", error or f"after {self._limits.seconds:g} s")
+                return
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    async def _ask(self, worker: Worker, operation: Operation, accept: str, deadline: float) -> str:
+        request = {
+            "text": operation.text,
+            "default_graphs": operation.default_graphs,
+            "named_graphs": operation.named_graphs,
+            "accept": accept,
+            "at_once": self._updates.just_now,
+        }
+        try:
+            async with asyncio.timeout_at(deadline):
+                return await worker.ask(request)
+        except TimeoutError:
+            seconds = self._limits.seconds
+            raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
+
+    async def _named_graphs(self) -> list[str]:
+        deadline = time.monotonic() + self._limits.seconds
+        async with self._pool.worker() as worker:
+            await self._ask(worker, Operation("query", description.NAMED_GRAPHS), "text/csv", deadline)
+            body = b"".join([piece async for piece in worker.pieces()])
+        return body.decode().splitlines()[1:]
+
+
+def refused(refusal: Refusal) -> Response:
+    """Turn a refusal into a response of one line."""
+    text = f"{refusal.message}\n" if refusal.message else None
+    return PlainTextResponse(text, status_code=refusal.status, headers=refusal.headers)
+
+
+async def _left(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def _with_charset(media_type: str) -> str:
+    return f"{media_type}; charset=utf-8" if media_type.startswith("text/") else media_type

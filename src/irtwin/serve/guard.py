@@ -1,0 +1,52 @@
+"""What every response says to browsers, and which names the server answers to."""
+
+from __future__ import annotations
+
+from starlette.datastructures import MutableHeaders
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+_LOCAL = {"localhost", "127.0.0.1", "[::1]"}
+_HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
+}
+
+
+class Guard:
+    """Adds security headers; with `local`, answers only to this machine's own names.
+
+    A page from elsewhere can have its own name resolve to 127.0.0.1 and then read what is served there as if it were
+    its own (DNS rebinding): such a request carries that name in Host.
+    """
+
+    def __init__(self, app: ASGIApp, local: bool):
+        self._app = app
+        self._local = local
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, unless it is for another host."""
+        if scope["type"] != "http":
+            return await self._app(scope, receive, send)
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in _HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        if self._local and _host(Request(scope).headers.get("host", "")) not in _LOCAL:
+            refusal = PlainTextResponse("this server answers to localhost only\n", status_code=421)
+            return await refusal(scope, receive, send_guarded)
+        await self._app(scope, receive, send_guarded)
+
+
+def _host(header: str) -> str:
+    """Return the name in a Host header, without the port."""
+    name, colon, port = header.rpartition(":")
+    return (name if colon and port.isdecimal() else header).lower()

@@ -1,0 +1,60 @@
+"""The ontology by its IRIs' paths: https://w3id.org/irtwin/robot is /irtwin/robot here."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
+from starlette.requests import Request
+from starlette.responses import Response
+
+from irtwin.knowledge.graph import read_turtle
+from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF
+from irtwin.resources import folder
+from irtwin.serve import negotiation
+from irtwin.serve.protocol import Refusal
+
+_FORMATS = {form.name: form for form in (RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
+
+
+def module(request: Request) -> Response:
+    """Return the module whose IRI or version IRI has the request's path."""
+    file = _modules().get(request.url.path)
+    if file is None:
+        raise Refusal(404, f"no ontology has this address; there are {', '.join(sorted(_modules()))}")
+    media_type = negotiation.best(request.headers.get("accept", ""), negotiation.TRIPLES)
+    if media_type is None:
+        raise Refusal(406, f"the ontology comes as {', '.join(negotiation.TRIPLES)}; none of them is in Accept")
+    return Response(_written(file, negotiation.TRIPLES[media_type]), media_type=media_type, headers={"Vary": "Accept"})
+
+
+@cache
+def _modules() -> dict[str, Path]:
+    found = {}
+    for file in sorted(folder("ontology").glob("*.ttl")):
+        for triple in read_turtle(file):
+            path = _path(triple)
+            if path is not None:
+                found[path] = file
+    return found
+
+
+def _path(triple: Triple) -> str | None:
+    """Return the path of an ontology's IRI, or of its version IRI, where the triple says one."""
+    if triple.predicate.value == f"{OWL}versionIRI" and isinstance(triple.object, NamedNode):
+        return urlsplit(triple.object.value).path
+    is_ontology = triple.predicate.value == f"{RDF}type" and triple.object == NamedNode(f"{OWL}Ontology")
+    return urlsplit(triple.subject.value).path if is_ontology and isinstance(triple.subject, NamedNode) else None
+
+
+@cache
+def _written(file: Path, name: str) -> bytes:
+    """Return a module as it is written, comments and all, or in another form."""
+    if name == "Turtle":
+        return file.read_bytes()
+    triples = (quad.triple for quad in parse(path=str(file), format=RdfFormat.TURTLE))
+    written = serialize(triples, format=_FORMATS[name], prefixes=PREFIXES)
+    assert written is not None
+    return written

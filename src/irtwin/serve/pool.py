@@ -1,0 +1,175 @@
+"""The worker processes: lent to one query at a time, ended and replaced where a query must not go on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import signal
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.worker import FRAME
+
+_log = logging.getLogger(__name__)
+_RETRY_AFTER = {"Retry-After": "2"}  # s
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a query may use, and how many may wait."""
+
+    seconds: float = 30.0  # from the first moment to the last byte
+    memory: int = 1 << 30  # bytes of one worker
+    answer: int = 256 << 20  # bytes
+    request: int = 1 << 20  # bytes
+    waiting: int = 64  # queries
+
+
+class Worker:
+    """One worker process."""
+
+    def __init__(self, process: asyncio.subprocess.Process, limits: Limits):
+        self._process = process
+        self._limits = limits
+        self.idle = True  # nothing of an answer is on its way
+
+    @classmethod
+    async def start(cls, folder: Path, limits: Limits) -> Worker:
+        """Start a process, and wait until it has opened the graph."""
+        arguments = map(str, (folder, limits.memory, limits.seconds, limits.answer))
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "irtwin.serve.worker", *arguments),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C in the terminal is the server's alone
+        )
+        worker = cls(process, limits)
+        await worker._frame()
+        return worker
+
+    @property
+    def pid(self) -> int:
+        """The process' id."""
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process is there."""
+        return self._process.returncode is None
+
+    async def ask(self, request: dict[str, Any]) -> str:
+        """Send a query; return the media type of the answer, whose bytes `pieces` gives. Raises Refusal."""
+        assert self._process.stdin is not None
+        self.idle = False
+        self._process.stdin.write(json.dumps(request).encode() + b"\n")
+        _, data = await self._frame()
+        head = json.loads(data)
+        if "status" in head:
+            self.idle = True
+            raise Refusal(head["status"], head["message"])
+        return str(head["media_type"])
+
+    async def pieces(self) -> AsyncIterator[bytes]:
+        """Give the answer's bytes as they come; Refusal where they end too early."""
+        while True:
+            kind, data = await self._frame()
+            if kind == b"E":
+                self.idle = True
+                return
+            yield data
+
+    async def end(self) -> None:
+        """End the process, whatever it is doing."""
+        if self._process.returncode is None:
+            self._process.kill()
+        await self._process.wait()
+
+    async def _frame(self) -> tuple[bytes, bytes]:
+        assert self._process.stdout is not None
+        try:
+            kind, size = FRAME.unpack(await self._process.stdout.readexactly(FRAME.size))
+            return kind, await self._process.stdout.readexactly(size)
+        except (asyncio.IncompleteReadError, ConnectionError):
+            raise self._epitaph(await self._process.wait()) from None
+
+    def _epitaph(self, status: int) -> Refusal:
+        if status == -signal.SIGABRT:
+            return Refusal(503, f"the query needs more than {self._limits.memory >> 20} MB of memory: ask for less")
+        if status == -signal.SIGSEGV:
+            return Refusal(400, "the query is nested too deeply, or too long, to be read")
+        return Refusal(500, f"the query was lost: its worker ended with status {status}; ask again")
+
+
+class Pool:
+    """A fixed number of workers, and a queue of bounded length before them."""
+
+    def __init__(self, folder: Path, size: int, limits: Limits):
+        self._folder = folder
+        self._size = size
+        self._limits = limits
+        self._idle: asyncio.Queue[Worker] = asyncio.Queue()
+        self._starting: set[asyncio.Task[None]] = set()
+        self._waiting = 0
+        self.workers: set[Worker] = set()
+
+    async def open(self) -> None:
+        """Start the workers."""
+        await asyncio.gather(*(self._start() for _ in range(self._size)))
+
+    async def close(self) -> None:
+        """End the workers, and what they do."""
+        for task in self._starting:
+            task.cancel()
+        await asyncio.gather(*(worker.end() for worker in self.workers))
+
+    @asynccontextmanager
+    async def worker(self) -> AsyncIterator[Worker]:
+        """Lend a worker; one that is not done when it is given back is ended. Raises Refusal where all are taken."""
+        worker = await self._wait()
+        try:
+            yield worker
+        finally:
+            if worker.idle and worker.alive:
+                self._idle.put_nowait(worker)
+            else:
+                self._replace(worker)
+
+    async def _wait(self) -> Worker:
+        if self._waiting >= self._limits.waiting:
+            raise Refusal(503, "too many queries are waiting: try again later", _RETRY_AFTER)
+        self._waiting += 1
+        try:
+            async with asyncio.timeout(self._limits.seconds):
+                while not (worker := await self._idle.get()).alive:
+                    self._replace(worker)
+                return worker
+        except TimeoutError:
+            raise Refusal(503, "no worker came free in time: try again later", _RETRY_AFTER) from None
+        finally:
+            self._waiting -= 1
+
+    def _replace(self, worker: Worker) -> None:
+        async def replace() -> None:
+            await worker.end()
+            self.workers.discard(worker)
+            while True:
+                try:
+                    return await self._start()
+                except Refusal as error:
+                    _log.error("no worker can be started: %s", error.message)
+                    await asyncio.sleep(1.0)
+
+        task = asyncio.create_task(replace())
+        self._starting.add(task)
+        task.add_done_callback(self._starting.discard)
+
+    async def _start(self) -> None:
+        worker = await Worker.start(self._folder, self._limits)
+        self.workers.add(worker)
+        self._idle.put_nowait(worker)

@@ -1,0 +1,134 @@
+"""`irtwin serve`: the endpoint, the query page and the ontology behind one address."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import signal
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from irtwin.errors import InputError
+from irtwin.serve import ontology, page
+from irtwin.serve.endpoint import Endpoint, refused
+from irtwin.serve.guard import Guard
+from irtwin.serve.pool import Limits, Pool
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.updates import Updates
+
+_GRACE = 3  # s that answers under way may still take when the server stops
+
+
+def serve(
+    graph: Path,
+    host: str,
+    port: int,
+    *,
+    token: str | None,
+    limits: Limits,
+    announce: Callable[[str], None],
+) -> None:
+    """Serve the graph in a folder until SIGINT or SIGTERM.
+
+    Port 0 takes a free one; `announce` is told the endpoint's address once it answers.
+    Raises InputError where the graph is missing or the port is taken.
+    """
+    if not (graph / "CURRENT").is_file():
+        raise InputError(f"{graph}: no graph here; run `irtwin run DATASET --workspace {graph.parent}` first")
+    listening = _bind(host, port)
+    bound = listening.getsockname()[1]
+    address = f"http://{_in_url(host)}:{bound}/sparql"
+    app = application(graph, host, token=token, limits=limits, opened=lambda: announce(address))
+    config = uvicorn.Config(
+        app,
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        limit_concurrency=4 * limits.waiting,
+        timeout_graceful_shutdown=_GRACE,
+        ws="none",
+    )
+    # uvicorn stops on these, then raises them again: both are the way to end this command, not a failure of it.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: None)
+    uvicorn.Server(config).run(sockets=[listening])
+
+
+def read_token(file: Path | None) -> str | None:
+    """Return the token for updates: from the file, else the environment's IRTWIN_TOKEN, else None."""
+    if file is None:
+        return os.environ.get("IRTWIN_TOKEN") or None
+    try:
+        token = file.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: cannot read the token: {error}") from None
+    if not token:
+        raise InputError(f"{file}: the token file is empty; put a token into it")
+    return token
+
+
+def application(
+    graph: Path, host: str, *, token: str | None, limits: Limits, opened: Callable[[], None] = lambda: None
+) -> Starlette:
+    """Return the ASGI application; its workers live between its start-up and its shutdown."""
+    pool = Pool(graph, max(2, os.cpu_count() or 2), limits)
+    updates = Updates(graph, token, limits)
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        try:
+            await pool.open()
+            opened()
+            yield
+        finally:
+            await pool.close()
+
+    return Starlette(
+        routes=[
+            Route("/", lambda request: page.response(), methods=["GET"]),
+            Route("/sparql", Endpoint(pool, updates, limits)),
+            Route("/questions.json", page.questions, methods=["GET"]),
+            Route("/assets/{name}", page.asset, methods=["GET"]),
+            Route("/irtwin{rest:path}", ontology.module, methods=["GET"]),
+        ],
+        middleware=[Middleware(Guard, local=_is_loopback(host))],
+        exception_handlers={Refusal: _refused},
+        lifespan=lifespan,
+    )
+
+
+def _refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, Refusal)
+    return refused(error)
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listening = socket.socket(family, kind, protocol)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot listen on {host}, port {port}: {reason}; --port 0 takes a free one") from None
+    return listening
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

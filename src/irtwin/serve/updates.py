@@ -1,0 +1,95 @@
+"""SPARQL updates: for who has the token, one at a time, each in a process of its own that can be ended."""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.serve.pool import Limits
+from irtwin.serve.protocol import Operation, Refusal
+from irtwin.serve.snapshot import OLDEST
+
+
+class Updates:
+    """The way in for updates; closed where there is no token."""
+
+    def __init__(self, folder: Path, token: str | None, limits: Limits):
+        self._folder = folder
+        self._token = token
+        self._limits = limits
+        self._turn = asyncio.Lock()
+        self._last = -float("inf")
+
+    @property
+    def allowed(self) -> bool:
+        """Whether the endpoint takes updates at all."""
+        return self._token is not None
+
+    @property
+    def just_now(self) -> bool:
+        """Whether an update is so young that a worker may not have seen it."""
+        return time.monotonic() - self._last < 2 * OLDEST
+
+    async def do(self, operation: Operation, authorization: str) -> None:
+        """Do an update, whole or not at all. Raises Refusal."""
+        if self._token is None:
+            raise Refusal(403, "this endpoint is read-only")
+        if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
+            raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
+        if operation.default_graphs or operation.named_graphs:
+            raise Refusal(400, "using-graph-uri is not supported: write USING into the update")
+        async with self._turn:
+            await self._run(operation.text)
+            self._last = time.monotonic()
+
+    async def _run(self, text: str) -> None:
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "irtwin.serve.updates", str(self._folder), str(self._limits.memory)),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            start_new_session=True,
+        )
+        try:
+            async with asyncio.timeout(self._limits.seconds):
+                out, _ = await process.communicate(text.encode())
+        except TimeoutError:
+            raise Refusal(503, f"the update was cancelled after {self._limits.seconds:g} s; nothing changed") from None
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()
+        if process.returncode != 0:
+            raise Refusal(500, "the update failed: too deeply nested, or out of memory; nothing changed")
+        answer = json.loads(out)
+        if answer:
+            raise Refusal(answer["status"], answer["message"], answer["headers"])
+
+
+def main(folder: Path, memory: int) -> None:
+    """Do the update on standard input; write what is wrong with it, as JSON."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    answer: dict[str, object] = {}
+    try:
+        graph = KnowledgeGraph(folder)
+    except InputError:
+        message = "another process is writing the graph: try again later"
+        answer = {"status": 503, "message": message, "headers": {"Retry-After": "5"}}
+    else:
+        with graph:
+            try:
+                graph.update(sys.stdin.buffer.read().decode())
+            except InputError as error:
+                answer = {"status": 400, "message": str(error), "headers": {}}
+    json.dump(answer, sys.stdout)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))

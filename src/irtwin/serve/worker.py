@@ -1,0 +1,134 @@
+"""A process that answers one query at a time, so that a query can be ended for real: by ending the process.
+
+Oxigraph cannot be told to stop. The server writes one line of JSON to standard input for each query and reads frames
+from standard output: a letter, the length of what follows, and that. `H` is a head (JSON), `D` a piece of the answer,
+`E` the end. A head with a `status` is a refusal, and all that comes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import resource
+import struct
+import sys
+from pathlib import Path
+from typing import IO, Any, cast
+
+from pyoxigraph import QueryResultsFormat, QueryTriples, RdfFormat, serialize
+
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import PREFIXES
+from irtwin.serve import negotiation
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.snapshot import Snapshot
+
+FRAME = struct.Struct(">cI")
+_PIECE = 1 << 20  # bytes; a failure before the first piece is full can still be told as such
+
+
+class _Sink:
+    """A binary file that sends what is written to it in frames, the head before the first."""
+
+    def __init__(self, out: IO[bytes], most_bytes: int):
+        self.media_type = ""
+        self.begun = False
+        self._out = out
+        self._left = most_bytes
+        self._held = bytearray()
+
+    def write(self, data: bytes) -> int:
+        self._left -= len(data)
+        if self._left < 0:
+            raise Refusal(503, "the answer is larger than this endpoint sends: add a LIMIT, or ask for less")
+        self._held += data
+        if len(self._held) >= _PIECE:
+            self._send()
+        return len(data)
+
+    def flush(self) -> None:
+        """Leave it to `end`: pieces are sent when they are full."""
+
+    def end(self) -> None:
+        self._send()
+        _frame(self._out, b"E", b"")
+
+    def _send(self) -> None:
+        if not self.begun:
+            _frame(self._out, b"H", json.dumps({"media_type": self.media_type}).encode())
+            self.begun = True
+        _frame(self._out, b"D", bytes(self._held))
+        self._held.clear()
+
+
+def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
+    """Answer queries on the graph in `folder` until standard input ends; memory in bytes, `seconds` for each."""
+    out = sys.stdout.buffer
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    snapshot = Snapshot(folder)
+    _frame(out, b"H", b"{}")
+    for line in sys.stdin.buffer:
+        _limit_processor_time(seconds)
+        request = json.loads(line)
+        sink = _Sink(out, most_bytes)
+        try:
+            try:
+                _answer(snapshot.current(request["at_once"]), request, sink)
+            except (OSError, RuntimeError):  # the writer removed a file that this view still needed
+                if sink.begun:
+                    raise
+                _answer(snapshot.renewed(), request, sink)
+        except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
+            if sink.begun:
+                sys.exit(f"irtwin: an answer was broken off: {error}")
+            _refuse(out, error)
+
+
+def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
+    found = graph.answer(request["text"], request["default_graphs"], request["named_graphs"])
+    offered = negotiation.TRIPLES if isinstance(found, QueryTriples) else negotiation.SOLUTIONS
+    media_type = negotiation.best(request["accept"], offered)
+    if media_type is None:
+        raise Refusal(406, f"this answer comes as {', '.join(offered)}; none of them is in Accept")
+    sink.media_type = media_type
+    name = offered[media_type]
+    file = cast(IO[bytes], sink)
+    if isinstance(found, QueryTriples):
+        serialize(found, file, format=_RDF[name], prefixes=PREFIXES)
+    else:
+        found.serialize(file, format=_RESULTS[name])
+    sink.end()
+
+
+_RDF = {form.name: form for form in (RdfFormat.TURTLE, RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
+_RESULTS = {
+    "JSON": QueryResultsFormat.JSON,
+    "XML": QueryResultsFormat.XML,
+    "CSV": QueryResultsFormat.CSV,
+    "TSV": QueryResultsFormat.TSV,
+}
+
+
+def _refuse(out: IO[bytes], error: Exception) -> None:
+    status = error.status if isinstance(error, Refusal) else 400 if isinstance(error, InputError) else 500
+    message = "the query needs more memory than it may have" if isinstance(error, MemoryError) else str(error)
+    _frame(out, b"H", json.dumps({"status": status, "message": message}).encode())
+
+
+def _limit_processor_time(seconds: float) -> None:
+    """Have the system end this process should it work on a query for far too long, even if the server is gone."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    used = usage.ru_utime + usage.ru_stime
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(used + 2 * seconds) + 1, hard))
+
+
+def _frame(out: IO[bytes], kind: bytes, data: bytes) -> None:
+    out.write(FRAME.pack(kind, len(data)) + data)
+    out.flush()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))
