@@ -17,6 +17,7 @@ from test_mapping import PREFIXES
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database, refresh
+from irtwin.knowledge.mapping.remembered import RememberedRows
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.storage.engine import open_engine
 
@@ -112,13 +113,13 @@ def place(tmp_path: Path) -> Place:
 def full_runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """A list that grows by each full run."""
     counted: list[int] = []
-    replace = KnowledgeGraph.replace
+    forget = RememberedRows.forget
 
-    def counting(graph: KnowledgeGraph, quads: Iterable[Quad], *below: str) -> list[str]:
+    def counting(rows: RememberedRows) -> None:
         counted.append(1)
-        return replace(graph, quads, *below)
+        forget(rows)
 
-    monkeypatch.setattr(KnowledgeGraph, "replace", counting)
+    monkeypatch.setattr(RememberedRows, "forget", counting)
     return counted
 
 

@@ -23,6 +23,7 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+from irtwin.knowledge.series_functions import Functions, series_functions
 from irtwin.knowledge.server import SparqlServer, is_url
 from irtwin.knowledge.sparql_text import asks_another_server, bound
 from irtwin.knowledge.table import Table, to_python
@@ -41,10 +42,14 @@ class KnowledgeGraph:
 
     The store's default graph holds the union of the named graphs, each triple once: Oxigraph's own union
     repeats a triple that several graphs hold, and a sum would count it twice.
+
+    Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
+    in `workspace`, which a folder's parent is if none is given.
     """
 
-    def __init__(self, place: Path | str | None = None):
+    def __init__(self, place: Path | str | None = None, workspace: Path | None = None):
         self._store: Store | SparqlServer
+        self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         try:
             if place is None:
                 self._store = Store()
@@ -61,6 +66,7 @@ class KnowledgeGraph:
         """
         graph = cls.__new__(cls)
         graph._store = Store.read_only(str(path))
+        graph._workspace = path.parent
         return graph
 
     def __enter__(self) -> Self:
@@ -95,6 +101,13 @@ class KnowledgeGraph:
             self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
+
+    def fill(self, quads: Iterable[Quad], *below: str) -> None:
+        """Do what `replace` does, where no named graph has such an IRI yet: whole or not at all, in flat memory."""
+        if isinstance(self._store, SparqlServer):
+            self.replace(quads, *below)
+        else:
+            self._store.bulk_extend(it for quad in _belonging(quads, below) for it in (quad, *in_graph([quad.triple])))
 
     def change(self, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
         """Take quads out of their named graphs and put others in, in one transaction; the rest stays untouched.
@@ -137,7 +150,8 @@ class KnowledgeGraph:
         `bindings` gives variables the IRI that they stand for. The usual prefixes need no PREFIX.
         InputError where the text is no such query, asks another server, or has too many answers.
         """
-        answer = self.answer(bound(text, bindings or {}))
+        faults: dict[str, None] = {}
+        answer = self.answer(bound(text, bindings or {}), faults=faults)
         if isinstance(answer, QueryBoolean):
             return Table(("answer",), ({"answer": bool(answer)},))
         if isinstance(answer, QuerySolutions):
@@ -145,7 +159,7 @@ class KnowledgeGraph:
             rows = (
                 {name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in _counted(answer)
             )
-            return Table(columns, tuple(rows))
+            return Table(columns, tuple(rows), faults)
         columns = ("subject", "predicate", "object")
         found = ((triple.subject, triple.predicate, triple.object) for triple in _counted(answer))
         return Table(columns, tuple(dict(zip(columns, map(to_python, triple), strict=True)) for triple in found))
@@ -157,11 +171,16 @@ class KnowledgeGraph:
         return set(triples)
 
     def answer(
-        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = ()
+        self,
+        text: str,
+        default_graphs: Sequence[str] = (),
+        named_graphs: Sequence[str] = (),
+        faults: dict[str, None] | None = None,
     ) -> QuerySolutions | QueryBoolean | QueryTriples:
         """Answer a query row by row as they are found; InputError where it is none or asks another server.
 
         Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
+        `faults` is told why functions had no answer, while the rows are found.
         """
         if asks_another_server(text):
             raise InputError("SERVICE asks another server, which is not allowed here: ask this graph alone")
@@ -172,12 +191,13 @@ class KnowledgeGraph:
                 prefixes=PREFIXES,
                 default_graph=None if whole else [_graph_name(iri) for iri in default_graphs],
                 named_graphs=None if whole else [_graph_name(iri) for iri in named_graphs],
+                custom_functions=self._functions({} if faults is None else faults),
             )
         except SyntaxError as error:
             raise InputError(f"not a SPARQL query: {error}") from error
         except RuntimeError as error:
             if "function" in str(error):
-                raise InputError(f"{error}: see the functions of ontology/series.ttl and of SPARQL 1.1") from None
+                raise InputError(f"{error}: see the functions of ontology/providers.ttl and of SPARQL 1.1") from None
             raise
 
     def update(self, text: str) -> None:
@@ -190,6 +210,12 @@ class KnowledgeGraph:
             self._store.flush()
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
+
+    def _functions(self, faults: dict[str, None]) -> Functions:
+        """Return the functions that reach the samples, where their files are known."""
+        if self._workspace is None or isinstance(self._store, SparqlServer):
+            return {}
+        return series_functions(self._store, self._workspace, faults)
 
     def as_rdflib(self) -> rdflib.Graph:
         """Return the union of all named graphs as rdflib sees it, to read."""

@@ -27,6 +27,7 @@ from irtwin.knowledge.mapping.source import read, schema_version
 from irtwin.knowledge.mapping.terms import Row
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, OWL
 
+_MAPPED = (GRAPH_SOURCE, GRAPH_ACTIVITY)
 _VERSION_GRAPH = f"{GRAPH_SOURCE}version"
 _ASK_VERSION = f"SELECT ?version {{ GRAPH <{_VERSION_GRAPH}> {{ ?graphs owl:versionInfo ?version }} }}"
 
@@ -57,7 +58,8 @@ def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], fi
                 remembered.version = version
                 return
         remembered.forget()
-        graph.replace(chain(run.added(), [_version(version)]), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        put = graph.replace if graph.graphs(*_MAPPED) else graph.fill
+        put(chain(run.added(), [_version(version)]), *_MAPPED)
         remembered.version = version
 
 
