@@ -276,6 +276,25 @@ def _announce(address: str) -> None:
     click.echo(f"Serving {address}; Ctrl-C stops.")
 
 
+@cli.command()
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF file to write.")
+def reason(source: Path, out: Path) -> None:
+    """Write an RDF file and all that OWL 2 RL infers.
+
+    The suffixes tell the formats. Where SOURCE contradicts itself: nothing is written, and the exit status is 3.
+    """
+    from irtwin.knowledge.owl_rl import Contradiction
+    from irtwin.knowledge.owl_rl_file import close_file
+
+    try:
+        inferred = close_file(source, out)
+    except Contradiction as clash:
+        click.echo(f"irtwin: {source}: {clash}", err=True)
+        sys.exit(3)
+    click.echo(f"{out}: {inferred} triples inferred")
+
+
 def _say(line: str) -> None:
     click.echo(line, err=True)
 

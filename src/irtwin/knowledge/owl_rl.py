@@ -1,85 +1,231 @@
-"""The OWL 2 RL closure: the W3C's rules, run as SPARQL until nothing is new."""
+"""The OWL 2 RL closure: the W3C's rules, run over what is new until nothing is."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import cast
 
-from pyoxigraph import BlankNode, NamedNode, QuerySolutions, Store, Triple
+from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import in_graph
-from irtwin.knowledge.vocabulary import OWL, PREFIXES, shorten
-from irtwin.resources import folder
+from irtwin.knowledge import datatypes
+from irtwin.knowledge.owl_rl_program import program
+from irtwin.knowledge.rules import Fact, Facts, Number
+from irtwin.knowledge.terms import Node
+from irtwin.knowledge.vocabulary import OWL, XSD, shorten
 
-_RULE = re.compile(r"^## (\S+)\n(.+)$", re.MULTILINE)
-_HELPER = "urn:irtwin:owl2-rl:"
-_THING = NamedNode(OWL + "Thing")
-_PREFIXES = {**PREFIXES, "rl": _HELPER}
-_LIST_ITEMS = """
-    INSERT { ?list rl:item ?item }
-    WHERE { ?list rdf:rest* ?rest . ?rest rdf:first ?item }"""
+_TRIVIAL = (OWL + "Thing", OWL + "Nothing")
+MOST_CONCLUSIONS = 100_000_000  # each time that a rule draws one counts
+
+
+Statement = tuple[Node, Node, Node]  # unlike a triple, it may be about a literal
+
+
+class Contradiction(InputError):
+    """The graph contradicts itself: the rule that says so, and the terms it says it of."""
 
 
 @dataclass(frozen=True)
-class Rule:
-    """A rule by the W3C's name: a CONSTRUCT that concludes, or a SELECT that finds a contradiction."""
+class Derivation:
+    """A conclusion's rule, by the W3C's name, and the premises that it was drawn from."""
 
-    name: str
-    text: str
-
-    @property
-    def concludes(self) -> bool:
-        """Whether the rule draws a conclusion."""
-        return self.text.startswith("CONSTRUCT")
-
-
-@cache
-def rules() -> tuple[Rule, ...]:
-    """Return the rules of `rules/owl2_rl.rq`."""
-    text = (folder("rules") / "owl2_rl.rq").read_text(encoding="utf-8")
-    return tuple(Rule(*match) for match in _RULE.findall(text))
+    rule: str
+    premises: tuple[Statement, ...]
 
 
 def closure(triples: Iterable[Triple]) -> set[Triple]:
-    """Return what OWL 2 RL infers from the triples and they do not say themselves.
+    """Return what OWL 2 RL infers and is worth keeping in a graph; Contradiction names the first one.
 
-    What is inferred of anonymous class expressions is left out. InputError names the first contradiction.
+    Left out is what holds of everything (x sameAs x, C subClassOf owl:Thing), what is inferred of anonymous class
+    expressions and of datatypes, and one more way to write a literal that stands there already.
     """
-    store = Store()
-    store.extend(in_graph(triples))
-    given = _content(store)
-    store.update(_LIST_ITEMS, prefixes=_PREFIXES)
-    before = 0
-    while len(store) > before:
-        before = len(store)
-        for rule in rules():
-            if rule.concludes:
-                store.update("INSERT" + rule.text.removeprefix("CONSTRUCT"), prefixes=_PREFIXES)
-    _refuse_contradiction(store)
-    return {triple for triple in _content(store) - given if _worth_keeping(triple)}
+    return Closure(triples).worth_keeping()
 
 
-def _content(store: Store) -> set[Triple]:
-    return {quad.triple for quad in store}
+class Closure:
+    """Triples and all that OWL 2 RL infers from them. Contradiction names the first rule that finds one."""
+
+    def __init__(self, triples: Iterable[Triple]):
+        self._program = program()
+        self._terms = self._program.terms.copy()
+        self._facts = Facts()
+        self._drawn = 0
+        self._round: dict[Fact, int] = {}  # in which a fact was found: a conclusion is found after its premises
+        self._named_values: set[Number] = set()
+        self._triples = frozenset(triples)
+        self._given = {self._terms.fact(triple) for triple in self._triples}
+        self._refuse_ill_typed()
+        self._saturate([*self._program.axioms, *self._given, *self._types_of_mentioned()])
+        self._add_reflexives()
+        self._refuse_contradictions()
+
+    def inferred(self) -> Iterator[Triple]:
+        """Return every triple that follows and was not given. What RDF cannot write, of literals, is left out."""
+        helpers, forms = self._helpers(), self._terms.forms
+        for fact in self._round:
+            if fact not in self._given and fact[1] not in helpers:
+                yield from self._terms.triples(fact)
+            elif len(forms[fact[2]]) > 1:  # a given value in the other ways that literals write it
+                yield from (triple for triple in self._terms.triples(fact) if triple not in self._triples)
+
+    def worth_keeping(self) -> set[Triple]:
+        """Return what follows, without what `closure` leaves out."""
+        terms, helpers = self._terms, self._helpers()
+        hidden = {number for number, forms in enumerate(terms.forms) if forms and _is_hidden(forms[0])}
+        kept: set[Triple] = set()
+        for fact in self._round.keys() - self._given - _truisms():
+            subject, predicate, object = fact
+            if subject != object and subject not in hidden and object not in hidden and predicate not in helpers:
+                kept.update(list(terms.triples(fact))[:1])
+        return kept
+
+    def why(self, triple: Triple) -> Derivation | None:
+        """Return how a triple was first inferred; None where it was given, or does not follow."""
+        return self._why(self._terms.fact(triple))
+
+    def _why(self, conclusion: Fact) -> Derivation | None:
+        found = self._round.get(conclusion, 0)
+        if found == 0:
+            return None
+        for rule, join, arguments in self._program.concluding(conclusion):
+            for values in join(self._facts, self._facts, *arguments):
+                premises = self._program.premises(rule, values)
+                if all(self._round[premise] < found for premise in premises):
+                    return Derivation(rule.name, tuple(map(self._shown, premises)))
+        return None
+
+    def _saturate(self, fresh: Iterable[Fact]) -> None:
+        number_of_round = 0
+        fresh = self._unknown(fresh, number_of_round)
+        while fresh:
+            number_of_round += 1
+            for fact in fresh:
+                self._facts.add(fact)
+            new = Facts(fresh)
+            conclusions = (fact for join in self._program.forward for fact in join(self._facts, new))
+            fresh = self._unknown(conclusions, number_of_round)
+            fresh += self._unknown(self._of_values(fresh), number_of_round)
+
+    def _unknown(self, facts: Iterable[Fact], number_of_round: int) -> list[Fact]:
+        known, unknown, drawn = self._round, [], self._drawn
+        for drawn, fact in enumerate(facts, self._drawn):
+            if fact not in known:
+                known[fact] = number_of_round
+                unknown.append(fact)
+            elif drawn > MOST_CONCLUSIONS:
+                raise InputError(
+                    f"OWL 2 RL draws more than {MOST_CONCLUSIONS:,} conclusions, most of them over and over: "
+                    "look for large groups of owl:sameAs, or long chains of a transitive property"
+                )
+        self._drawn = drawn
+        return unknown
+
+    def _types_of_mentioned(self) -> Iterator[Fact]:
+        """Say of each literal which of the datatypes that the graph speaks of contain it (dt-type2)."""
+        nodes = {number for subject, _, object in self._given for number in (subject, object)}
+        mentioned = {iri: number for number in nodes if datatypes.is_datatype(iri := self._iri(number))}
+        if mentioned:
+            for number, value in self._terms.values.items():
+                for iri in datatypes.datatypes_of(value) & mentioned.keys():
+                    yield (number, self._program.type, mentioned[iri])
+
+    def _of_values(self, fresh: list[Fact]) -> Iterator[Fact]:
+        """Say what is known of values that have just been given another name (dt-type2, dt-diff)."""
+        for subject, predicate, object in fresh:
+            if predicate != self._program.same or subject == object:
+                continue
+            if subject in self._terms.values and object in self._terms.values:
+                raise self._two_values((subject, predicate, object))
+            for number in {subject, object} & self._terms.values.keys() - self._named_values:
+                for iri in datatypes.datatypes_of(self._terms.values[number]):
+                    yield (number, self._program.type, self._terms.number(NamedNode(iri)))
+                for other in self._named_values:
+                    yield (number, self._program.different, other)
+                    yield (other, self._program.different, number)
+                self._named_values.add(number)
+
+    def _add_reflexives(self) -> None:
+        """Say of everything that it is the same as itself (eq-ref).
+
+        Rules need not look at that, unless somebody says something about owl:sameAs itself.
+        """
+        same = self._program.same
+        helpers = self._helpers()
+        facts = [fact for fact in self._round if fact[1] not in helpers]
+        reflexive = [(number, same, number) for number in {same, *(number for fact in facts for number in fact)}]
+        if any(same in (fact[0], fact[2]) for fact in facts):
+            self._saturate(reflexive)
+        else:
+            for fact in self._unknown(reflexive, 1):
+                self._facts.add(fact)
+
+    def _refuse_ill_typed(self) -> None:
+        for literal in self._terms.ill_typed:
+            raise _not_of(self._use(self._terms.number(literal)), literal.datatype.value)
+
+    def _refuse_contradictions(self) -> None:
+        for rule, join in self._program.contradictions:
+            for culprits in join(self._facts, self._facts):
+                raise _contradiction(rule.name, ", ".join(map(self._name, culprits)))
+        for kind, members in self._facts.subjects.get(self._program.type, {}).items():
+            if datatypes.is_datatype(self._iri(kind)):
+                for number in members & self._terms.values.keys():
+                    if self._iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
+                        raise _not_of(self._use(number), self._iri(kind))
+
+    def _helpers(self) -> set[Number]:
+        """Return the predicates that only rules speak: their own, and lists that stand for a chain or a key."""
+        lists = (self._facts.objects.get(number, {}) for number in self._program.helpers)
+        return self._program.helpers.union(*lists)
+
+    def _shown(self, fact: Fact) -> Statement:
+        subject, predicate, object = (self._terms.forms[number][0] for number in fact)
+        return (subject, predicate, object)
+
+    def _two_values(self, fact: Fact) -> Contradiction:
+        derivation = self._why(fact)
+        if derivation is None:
+            return _contradiction("dt-diff", " is the same as ".join(map(self._name, fact[::2])))
+        premises = (" ".join(map(show, premise)) for premise in derivation.premises)
+        return _contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises))
+
+    def _use(self, number: Number) -> str:
+        """Return a given triple, as people write it, whose object has the number."""
+        return " ".join(map(self._name, next(fact for fact in self._given if fact[2] == number)))
+
+    def _iri(self, number: Number) -> str:
+        forms = self._terms.forms[number]
+        return forms[0].value if forms and isinstance(forms[0], NamedNode) else ""
+
+    def _name(self, number: Number) -> str:
+        return show(self._terms.forms[number][0])
 
 
-def _refuse_contradiction(store: Store) -> None:
-    for rule in rules():
-        if rule.concludes:
-            continue
-        for found in cast(QuerySolutions, store.query(rule.text + " LIMIT 1", prefixes=_PREFIXES)):
-            culprits = ", ".join(_name(term) for term in found)
-            raise InputError(f"the graph contradicts the ontology (OWL 2 RL rule {rule.name}): {culprits}")
+@cache
+def _truisms() -> frozenset[Fact]:
+    """Return what follows from nothing."""
+    return frozenset(Closure([])._round)
 
 
-def _name(term: object) -> str:
-    return shorten(term.value) if isinstance(term, NamedNode) else str(term)
+def _is_hidden(term: Node) -> bool:
+    if isinstance(term, NamedNode):
+        return term.value in _TRIVIAL or datatypes.is_datatype(term.value)
+    return isinstance(term, BlankNode)
 
 
-def _worth_keeping(triple: Triple) -> bool:
-    anonymous = isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode)
-    return not (anonymous or triple.predicate.value.startswith(_HELPER) or triple.object == _THING)
+def show(term: Node) -> str:
+    """Return a term as people write it, with prefixes."""
+    if isinstance(term, NamedNode):
+        return shorten(term.value)
+    if isinstance(term, Literal) and term.datatype.value != XSD + "string" and term.language is None:
+        return f'"{term.value}"^^{shorten(term.datatype.value)}'
+    return str(term)
+
+
+def _contradiction(rule: str, what: str) -> Contradiction:
+    return Contradiction(f"the graph contradicts the ontology (OWL 2 RL rule {rule}): {what}")
+
+
+def _not_of(use: str, datatype: str) -> Contradiction:
+    return _contradiction("dt-not-type", f"the value is not of {shorten(datatype)} in {use}")

@@ -1,0 +1,198 @@
+"""Rules as the files in `rules/*.rq` write them, and the loops that they become.
+
+A rule is a SPARQL query whose body is triple patterns and inequalities and nothing else: that is Datalog, which can be
+run forward over what is new (semi-naive evaluation) and asked backward for what a conclusion follows from.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+Number = int
+Fact = tuple[Number, Number, Number]  # subject, predicate, object
+Term = str  # as SPARQL writes it: ?x, owl:sameAs, a
+Pattern = tuple[Term, Term, Term]
+Join = Callable[..., Iterator[Any]]  # of facts, or of tuples of numbers
+
+_RULE = re.compile(
+    r"^## (\S+)\n(CONSTRUCT \{ (.+?) \}|SELECT (.+?)) WHERE \{ (.+?)(?: FILTER\((.+)\))? \}$", re.MULTILINE
+)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule by its name. One that `head` is empty for finds a contradiction, shown by `culprits`."""
+
+    name: str
+    head: tuple[Pattern, ...]
+    culprits: tuple[Term, ...]
+    body: tuple[Pattern, ...]
+    unequal: tuple[tuple[Term, Term], ...]
+
+    @cached_property
+    def variables(self) -> tuple[Term, ...]:
+        """The variables of the body."""
+        return tuple(dict.fromkeys(term for pattern in self.body for term in pattern if term.startswith("?")))
+
+
+def read_rules(file: Path) -> tuple[Rule, ...]:
+    """Return the rules of a file, in its order."""
+    return tuple(_rule(found) for found in _RULE.finditer(file.read_text(encoding="utf-8")))
+
+
+def _rule(found: re.Match[str]) -> Rule:
+    name, _, head, culprits, body, condition = found.groups()
+    return Rule(
+        name=name,
+        head=_patterns(head or ""),
+        culprits=tuple((culprits or "").split()),
+        body=_patterns(body),
+        unequal=tuple(_unequal(part) for part in (condition or "").split(" && ") if part),
+    )
+
+
+def _patterns(text: str) -> tuple[Pattern, ...]:
+    return tuple(_pattern(*part.split()) for part in text.split(" . ") if part)
+
+
+def _pattern(subject: Term, predicate: Term, object: Term) -> Pattern:
+    return (subject, "rdf:type" if predicate == "a" else predicate, object)
+
+
+def _unequal(text: str) -> tuple[Term, Term]:
+    left, right = text.split(" != ")
+    return (left, right)
+
+
+class Facts:
+    """Triples of numbers, found by predicate and subject, or by predicate and object."""
+
+    def __init__(self, facts: Sequence[Fact] = ()):
+        self.objects: dict[Number, dict[Number, set[Number]]] = {}
+        self.subjects: dict[Number, dict[Number, set[Number]]] = {}
+        for fact in facts:
+            self.add(fact)
+
+    def __contains__(self, fact: Fact) -> bool:
+        subject, predicate, object = fact
+        return object in self.objects.get(predicate, {}).get(subject, ())
+
+    def __iter__(self) -> Iterator[Fact]:
+        for predicate, objects in self.objects.items():
+            for subject, found in objects.items():
+                for object in found:
+                    yield (subject, predicate, object)
+
+    def add(self, fact: Fact) -> bool:
+        """Add a triple; tell whether it is new."""
+        subject, predicate, object = fact
+        found = self.objects.setdefault(predicate, {}).setdefault(subject, set())
+        if object in found:
+            return False
+        found.add(object)
+        self.subjects.setdefault(predicate, {}).setdefault(object, set()).add(subject)
+        return True
+
+
+def compile_join(
+    rule: Rule,
+    number_of: Callable[[Term], Number],
+    results: Sequence[Sequence[Term]],
+    *,
+    new: int | None = None,
+    given: Sequence[Term] = (),
+) -> Join:
+    """Return the rule's body as a function of all facts and the new ones.
+
+    For each match of the body it yields the values of each of `results`. Pattern number `new` is looked for among
+    the new facts alone; values of the `given` variables are arguments after the facts.
+    """
+    writer = _Writer(rule, number_of, new, given)
+    source = writer.write(results)
+    scope: dict[str, Any] = {"EMPTY": {}}
+    exec(compile(source, f"<{rule.name}>", "exec"), scope)  # the source is made of the project's own rule files alone
+    join: Join = scope["join"]
+    return join
+
+
+class _Writer:
+    """Writes a rule's body as nested loops, the pattern with the fewest open variables next."""
+
+    def __init__(self, rule: Rule, number_of: Callable[[Term], Number], new: int | None, given: Sequence[Term]):
+        self._rule = rule
+        self._number_of = number_of
+        self._new = new
+        self._given = given
+        self._bound = set(given)
+        self._left = dict(enumerate(rule.body))
+        self._unequal = list(rule.unequal)
+        self._lines: list[str] = []
+        self._depth = 1
+
+    def write(self, results: Sequence[Sequence[Term]]) -> str:
+        arguments = ", ".join(["known", "new", *map(self._name, self._given)])
+        self._put("known_objects, known_subjects = known.objects, known.subjects")
+        self._put("new_objects, new_subjects = new.objects, new.subjects")
+        self._bind(*self._given)
+        if self._new is not None:
+            self._start(self._new)
+        while self._left:
+            self._loop(min(self._left, key=self._cost))
+        for result in results:
+            self._put(f"yield ({', '.join(map(self._name, result))},)")
+        return "\n".join([f"def join({arguments}):", *self._lines])
+
+    def _start(self, index: int) -> None:
+        """Begin with the new facts; with their predicates alone where these are open, for others to narrow down."""
+        predicate = self._rule.body[index][1]
+        if self._is_open(predicate):
+            self._loop_over_predicates(predicate, "new")
+        else:
+            self._loop(index)
+
+    def _cost(self, index: int) -> tuple[int, int]:
+        subject, predicate, object = self._left[index]
+        open_ends = sum(self._is_open(term) for term in {subject, object})
+        return (open_ends + 3 * self._is_open(predicate), index)
+
+    def _loop(self, index: int) -> None:
+        subject, predicate, object = self._left.pop(index)
+        facts = "new" if index == self._new else "known"
+        if self._is_open(predicate):
+            self._loop_over_predicates(predicate, facts)
+        s, p, o = map(self._name, (subject, predicate, object))
+        by_subject, by_object = f"{facts}_objects.get({p}, EMPTY)", f"{facts}_subjects.get({p}, EMPTY)"
+        if not self._is_open(subject):
+            self._put(f"{'for' if self._is_open(object) else 'if'} {o} in {by_subject}.get({s}, ()):", deeper=True)
+        elif not self._is_open(object):
+            self._put(f"for {s} in {by_object}.get({o}, ()):", deeper=True)
+        else:
+            self._put(f"for {s}, found in {by_subject}.items():", deeper=True)
+            self._put(f"{'if' if s == o else 'for'} {o} in found:", deeper=True)
+        self._bind(subject, object)
+
+    def _loop_over_predicates(self, predicate: Term, facts: str) -> None:
+        self._put(f"for {self._name(predicate)} in {facts}_objects:", deeper=True)
+        self._bind(predicate)
+
+    def _bind(self, *terms: Term) -> None:
+        self._bound.update(term for term in terms if term.startswith("?"))
+        ready = [pair for pair in self._unequal if not any(map(self._is_open, pair))]
+        for left, right in ready:
+            self._put(f"if {self._name(left)} != {self._name(right)}:", deeper=True)
+            self._unequal.remove((left, right))
+
+    def _put(self, line: str, *, deeper: bool = False) -> None:
+        self._lines.append("    " * self._depth + line)
+        self._depth += deeper
+
+    def _is_open(self, term: Term) -> bool:
+        return term.startswith("?") and term not in self._bound
+
+    def _name(self, term: Term) -> str:
+        return term[1:] + "_" if term.startswith("?") else str(self._number_of(term))
