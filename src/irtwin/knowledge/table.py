@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any, overload
@@ -19,10 +19,14 @@ _FLOATS = {XSD + name for name in ("double", "float", "decimal")}
 
 @dataclass(frozen=True)
 class Table(Sequence[Row]):
-    """The rows that answer a query, with its variables in the order of the query."""
+    """The rows that answer a query, with its variables in the order of the query.
+
+    `faults` says why functions of the query had no answer, each reason once.
+    """
 
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
+    faults: Collection[str] = ()
 
     @overload
     def __getitem__(self, index: int) -> Row: ...

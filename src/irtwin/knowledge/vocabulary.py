@@ -11,6 +11,7 @@ ONTOLOGY = "https://w3id.org/irtwin"
 IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
+SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
 ID = f"{ONTOLOGY}/id/"
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
@@ -27,6 +28,7 @@ PREFIXES = {
     "irt": IRT,
     "effect": EFFECT,
     "provider": PROVIDER,
+    "series": SERIES,
     "id": ID,
     "rdf": RDF,
     "rdfs": RDFS,

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
 from irtwin.storage import files
+from irtwin.storage.summary import ROW_GROUP, with_summary
 
 FOLDER = "series"
 
@@ -30,7 +31,7 @@ def write_series(workspace: Path, table: pa.Table) -> SeriesFile:
     """Store a table, once: the same content has the same name."""
     folder = workspace / FOLDER
     with files.temporary_beside(folder) as temporary:
-        pq.write_table(table, temporary, compression="zstd")
+        pq.write_table(with_summary(table), temporary, compression="zstd", row_group_size=ROW_GROUP)
         series_id = checksum(temporary)
         path = folder / f"{series_id}.parquet"
         if not path.exists():
