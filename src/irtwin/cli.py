@@ -48,21 +48,29 @@ _workspace = click.option(
 _database = click.option(
     "--database", metavar="URL", envvar="IRTWIN_DATABASE", help="SQLAlchemy URL; SQLite in the workspace if not given."
 )
+_graph = click.option(
+    "--graph",
+    "graph_url",
+    metavar="URL",
+    envvar="IRTWIN_GRAPH",
+    help="Query URL of a SPARQL 1.1 server that keeps the graph; a folder of the workspace does if not given.",
+)
 
 
 @cli.command()
 @click.argument("dataset", type=click.Path(path_type=Path))
 @_workspace
 @_database
+@_graph
 @click.option("--repair", is_flag=True, help="Drop bad samples, and say how many and which.")
-def run(dataset: Path, workspace: Path, database: str | None, repair: bool) -> None:
+def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | None, repair: bool) -> None:
     """Take a data set to a twin, a graph and a report.
 
     DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file for each run.
     """
     from irtwin.workflow import run as run_all
 
-    report = run_all(dataset, workspace, database=database, repair=repair, announce=_say)
+    report = run_all(dataset, workspace, database=database, graph_url=graph_url, repair=repair, announce=_say)
     click.echo(report)
 
 
@@ -84,8 +92,9 @@ def demo(workspace: Path) -> None:
 @click.argument("question", required=False)
 @_workspace
 @_database
+@_graph
 @click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True)
-def query(question: str | None, workspace: Path, database: str | None, form: str) -> None:
+def query(question: str | None, workspace: Path, database: str | None, graph_url: str | None, form: str) -> None:
     """Ask the graph a question, by its name or in SPARQL.
 
     Without a QUESTION: list those that have names.
@@ -93,7 +102,12 @@ def query(question: str | None, workspace: Path, database: str | None, form: str
     from irtwin import workflow
     from irtwin.knowledge.queries import to_csv, to_json
 
-    answer = workflow.questions() if question is None else workflow.ask(question, workspace, database=database)
+    if question is None:
+        answer = workflow.questions()
+    else:
+        answer = workflow.ask(question, workspace, database=database, graph_url=graph_url)
+    for fault in answer.faults:
+        _say(f"irtwin: {fault}")
     if form == "table":
         from irtwin.report.terminal import show
 
@@ -116,6 +130,7 @@ def query(question: str | None, workspace: Path, database: str | None, form: str
 @click.option("--repair", is_flag=True, help="Drop bad samples, and say how many and which.")
 @click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Keep the diagnosis there, too.")
 @_database
+@_graph
 def diagnose(
     dataset: Path,
     out: Path,
@@ -126,6 +141,7 @@ def diagnose(
     repair: bool,
     workspace: Path | None,
     database: str | None,
+    graph_url: str | None,
 ) -> None:
     """Say where a twin and its robot differ, and why.
 
@@ -141,6 +157,7 @@ def diagnose(
         repair=repair,
         workspace=workspace,
         database=database,
+        graph_url=graph_url,
         json_file=out,
         report=report,
         twin_file=save_twin,
@@ -172,28 +189,30 @@ def predict(
 @click.argument("robot")
 @_workspace
 @_database
-def adopt(robot: str, workspace: Path, database: str | None) -> None:
+@_graph
+def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
     """Make a diagnosis' twin the robot's own.
 
     What the graph holds of the robot's energy is then populated anew; the page of it is written again.
     """
     from irtwin import workflow
 
-    click.echo(workflow.adopt(robot, workspace, database=database))
+    click.echo(workflow.adopt(robot, workspace, database=database, graph_url=graph_url))
 
 
 @cli.command()
 @_workspace
 @_database
+@_graph
 @click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
-def export(workspace: Path, database: str | None, owl: Path) -> None:
+def export(workspace: Path, database: str | None, graph_url: str | None, owl: Path) -> None:
     """Write the whole graph as one OWL file for Protégé.
 
     Ontology, individuals and inferences, in RDF/XML.
     """
     from irtwin import workflow
 
-    workflow.export(owl, workspace, database=database)
+    workflow.export(owl, workspace, database=database, graph_url=graph_url)
     click.echo(owl)
 
 
@@ -256,7 +275,7 @@ def map_database(mapping: Path, database: str, out: Path) -> None:
 @click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 takes a free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; others may ask it.")
 @click.option("--timeout", type=click.FloatRange(min=0.1), default=30.0, show_default=True, help="Seconds per query.")
-@click.option("--memory", type=click.IntRange(min=128), default=1024, show_default=True, help="MB per query.")
+@click.option("--memory", type=click.IntRange(min=64), default=1024, show_default=True, help="MB per query.")
 @click.option("--token-file", type=click.Path(path_type=Path), help="Allows updates by who sends the token in it.")
 def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
     """Answer SPARQL over HTTP, at /sparql.

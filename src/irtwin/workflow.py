@@ -22,11 +22,10 @@ from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge import queries
 from irtwin.knowledge.export import export_owl
 from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.table import Table
 from irtwin.knowledge.validation import validate
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
@@ -48,12 +47,14 @@ def run(
     workspace: Path | str = WORKSPACE,
     *,
     database: str | None = None,
+    graph_url: str | None = None,
     repair: bool = False,
     announce: Announce = lambda line: None,
 ) -> Path:
     """Take a data set to a twin, a knowledge graph and a report; return the report's path.
 
-    `database` is an SQLAlchemy URL, SQLite in the workspace if None; `announce` is told each step as it ends.
+    `database` is an SQLAlchemy URL, SQLite in the workspace if None; `graph_url` a SPARQL server's, the workspace's own
+    graph if None; `announce` is told each step as it ends.
     Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
@@ -62,7 +63,7 @@ def run(
     _check_effects(data_set)
     for line in data_set.repairs:
         announce(f"  {line}")
-    with Workspace(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+    with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
         announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
         outcome = ingest(place, data_set)
         announce(f"  {outcome}")
@@ -87,6 +88,7 @@ def diagnose(
     repair: bool = False,
     workspace: Path | str | None = None,
     database: str | None = None,
+    graph_url: str | None = None,
     json_file: Path | None = None,
     report: Path | None = None,
     twin_file: Path | None = None,
@@ -118,7 +120,7 @@ def diagnose(
         render_alone(data_set, document, found.evidence, report)
     if workspace is not None:
         announce("Keeping the diagnosis")
-        with Workspace(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+        with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
             ingest(place, data_set)
             record(
                 place,
@@ -154,10 +156,12 @@ def predict(
     write(Path(out), buffer.getvalue())
 
 
-def adopt(robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> Path:
+def adopt(
+    robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+) -> Path:
     """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
     robot_id = identifier(robot)
-    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
         adopt_twin(place, robot_id)
         graph.load_ontology()
         _map(place, graph)
@@ -166,9 +170,11 @@ def adopt(robot: str, workspace: Path | str = WORKSPACE, *, database: str | None
         return _report(place, graph, robot_id)
 
 
-def ask(question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> Table:
+def ask(
+    question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+) -> Table:
     """Answer a named question, or one in SPARQL, from a workspace's graph."""
-    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
         return queries.ask(graph, question)
 
 
@@ -178,9 +184,11 @@ def questions() -> Table:
     return Table(("name", "question"), tuple({"name": q.name, "question": q.question} for q in known))
 
 
-def export(owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None) -> None:
+def export(
+    owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+) -> None:
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
-    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph(place.graph_folder) as graph:
+    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
         export_owl(graph, owl)
 
 
@@ -199,10 +207,15 @@ def _check_effects(data_set: DataSet) -> None:
         raise InputError(f"{data_set.folder / 'dataset.toml'}: [twin] effects: {error}") from error
 
 
+def _graph(place: Workspace, url: str | None) -> KnowledgeGraph:
+    """Open the workspace's graph: in its folder, or on a SPARQL server."""
+    return KnowledgeGraph(url or place.graph_folder, place.folder)
+
+
 def _map(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
     documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-    graph.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    refresh(graph, place.engine, documents, place.mapped_rows)
 
 
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:

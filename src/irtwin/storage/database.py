@@ -52,6 +52,11 @@ class Workspace:
         """Where the graph's store lies."""
         return self.folder / "graph"
 
+    @property
+    def mapped_rows(self) -> Path:
+        """Where the mapping remembers the rows that the graph was made of."""
+        return self.folder / "mapped_rows.db"
+
     def report_path(self, robot_id: str) -> Path:
         """Where a robot's report lies."""
         return self.folder / "reports" / f"{robot_id}.html"
