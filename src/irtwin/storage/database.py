@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, Table, delete, exists, insert, inspect, select
+from sqlalchemy import URL, Table, delete, exists, insert, inspect, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -19,6 +19,7 @@ from irtwin.storage.schema import Activity, ActivityUse, Base, Joint, Robot, Run
 from irtwin.storage.series import FOLDER, inside, read_series, write_series
 
 Outcome = Literal["new", "unchanged", "replaced"]
+LIVE = "live"  # role of runs, and provider of what is known of them
 TWINS, DIAGNOSES = "twins", "diagnoses"
 
 
@@ -74,6 +75,7 @@ class Workspace:
 
         `series` holds the measured samples of each run, by `run_id`. The data set that is there already
         changes nothing; another one of the same robot replaces it, and all that was derived from it is dropped.
+        Runs that were watched live are no part of a data set and stay.
         """
         missing = {run.run_id for run in runs} ^ set(series)
         if missing:
@@ -84,8 +86,9 @@ class Workspace:
             if known and self._holds(session, robot.robot_id, rows):
                 return "unchanged"
             if known:
-                self._drop_robot(session, robot.robot_id)
-            _insert(session, [*rows, *self._store(series, "measured", None)])
+                self._drop_data_set(session, robot.robot_id)
+                session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(_values(robot)))
+            _insert(session, [*rows[1 if known else 0 :], *self._store(series, "measured", None)])
         self.remove_orphans()
         return "replaced" if known else "new"
 
@@ -117,6 +120,14 @@ class Workspace:
             modelled = self._store(series or {}, "modelled", activity.activity_id)
             _insert(session, [activity, *uses, *rows, *modelled])
         self.remove_orphans()
+
+    def keep_live_run(self, run: Run, series: pa.Table, activity: Activity, rows: Sequence[Base]) -> Series:
+        """Keep a run that was watched live, with its samples and what is known of it; return where they lie."""
+        with self._writing() as session:
+            (stored,) = self._store({run.run_id: series}, "measured", None)
+            run.file, run.sha256 = stored.path, stored.series_id
+            _insert(session, [run, stored, activity, *rows])
+        return stored
 
     def drop_robot(self, robot_id: str) -> None:
         """Forget a robot and everything derived from it."""
@@ -197,8 +208,9 @@ class Workspace:
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
         """Whether exactly these source rows are stored already, with their series."""
         stored: list[Base] = []
-        for kind in (Robot, Joint, Run):
+        for kind in (Robot, Joint):
             stored += session.scalars(select(kind).where(kind.robot_id == robot_id))
+        stored += session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
         paths = select(Series.path).join(Run).where(Run.robot_id == robot_id, Series.kind == "measured")
         whole = all(inside(self.folder, path).is_file() for path in session.scalars(paths))
         return whole and {_facts(row) for row in stored} == {_facts(row) for row in rows}
@@ -209,6 +221,15 @@ class Workspace:
         session.execute(delete(Series).where(Series.run_id.in_(select(Run.run_id).where(Run.robot_id == robot_id))))
         for kind in (Run, Joint, Robot):
             session.execute(delete(kind).where(kind.robot_id == robot_id))
+
+    def _drop_data_set(self, session: Session, robot_id: str) -> None:
+        """Drop what a data set said and what was derived from it; the robot stays, and so do its live runs."""
+        made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
+        _drop_activities(session, set(session.scalars(made)))
+        runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
+        session.execute(delete(Series).where(Series.run_id.in_(runs)))
+        session.execute(delete(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
+        session.execute(delete(Joint).where(Joint.robot_id == robot_id))
 
     def _make_tables(self) -> None:
         tables = Base.metadata.sorted_tables
