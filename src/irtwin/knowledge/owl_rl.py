@@ -51,12 +51,20 @@ class Closure:
         self._terms = self._program.terms.copy()
         self._facts = Facts()
         self._drawn = 0
+        self._rounds = 0
         self._round: dict[Fact, int] = {}  # in which a fact was found: a conclusion is found after its premises
         self._named_values: set[Number] = set()
-        self._triples = frozenset(triples)
-        self._given = {self._terms.fact(triple) for triple in self._triples}
+        self._triples: set[Triple] = set()
+        self._given: set[Fact] = set()
+        self._saturate(self._program.axioms)
+        self.add(triples)
+
+    def add(self, triples: Iterable[Triple]) -> None:
+        """Take more triples as given, and infer what follows of them."""
+        self._triples.update(triples)
+        self._given.update(map(self._terms.fact, self._triples))
         self._refuse_ill_typed()
-        self._saturate([*self._program.axioms, *self._given, *self._types_of_mentioned()])
+        self._saturate([*self._given, *self._types_of_mentioned()])
         self._add_reflexives()
         self._refuse_contradictions()
 
@@ -85,9 +93,9 @@ class Closure:
         return self._why(self._terms.fact(triple))
 
     def _why(self, conclusion: Fact) -> Derivation | None:
-        found = self._round.get(conclusion, 0)
-        if found == 0:
+        if conclusion in self._given or conclusion not in self._round:
             return None
+        found = self._round[conclusion]
         for rule, join, arguments in self._program.concluding(conclusion):
             for values in join(self._facts, self._facts, *arguments):
                 premises = self._program.premises(rule, values)
@@ -96,19 +104,19 @@ class Closure:
         return None
 
     def _saturate(self, fresh: Iterable[Fact]) -> None:
-        number_of_round = 0
-        fresh = self._unknown(fresh, number_of_round)
+        fresh = self._unknown(fresh)
         while fresh:
-            number_of_round += 1
+            self._rounds += 1
             for fact in fresh:
                 self._facts.add(fact)
             new = Facts(fresh)
             conclusions = (fact for join in self._program.forward for fact in join(self._facts, new))
-            fresh = self._unknown(conclusions, number_of_round)
-            fresh += self._unknown(self._of_values(fresh), number_of_round)
+            fresh = self._unknown(conclusions)
+            fresh += self._unknown(self._of_values(fresh))
 
-    def _unknown(self, facts: Iterable[Fact], number_of_round: int) -> list[Fact]:
-        known, unknown, drawn = self._round, [], self._drawn
+    def _unknown(self, facts: Iterable[Fact]) -> list[Fact]:
+        """Return those facts that are not known yet, and note the round that they are found in."""
+        known, unknown, drawn, number_of_round = self._round, [], self._drawn, self._rounds
         for drawn, fact in enumerate(facts, self._drawn):
             if fact not in known:
                 known[fact] = number_of_round
@@ -157,7 +165,7 @@ class Closure:
         if any(same in (fact[0], fact[2]) for fact in facts):
             self._saturate(reflexive)
         else:
-            for fact in self._unknown(reflexive, 1):
+            for fact in self._unknown(reflexive):
                 self._facts.add(fact)
 
     def _refuse_ill_typed(self) -> None:

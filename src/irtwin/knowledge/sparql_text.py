@@ -34,9 +34,14 @@ def prologue_and_operations(text: str) -> tuple[str, str]:
     return text[:start], text[start : len(bare) - bare.endswith(";")]
 
 
+def masked(text: str) -> str:
+    """Return a text of the same length with blanks for strings, IRIs, comments, variables and local names."""
+    return _HARMLESS.sub(lambda match: " " * len(match[0]), text)
+
+
 def bound(text: str, bindings: Mapping[str, str]) -> str:
     """Let the variables of a query's outermost group have the given IRIs as their only values."""
-    group = _OUTERMOST_GROUP.search(_HARMLESS.sub(lambda match: " " * len(match[0]), text))
+    group = _OUTERMOST_GROUP.search(masked(text))
     if not bindings or group is None:
         return text
     values = " ".join(f"VALUES ?{name} {{ {NamedNode(iri)} }}" for name, iri in bindings.items())

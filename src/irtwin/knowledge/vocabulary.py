@@ -49,6 +49,7 @@ GRAPH_INFERRED = f"{GRAPH}inferred/"
 GRAPH_OWL_RL = f"{GRAPH_INFERRED}owl_rl"
 GRAPH_SWRL = f"{GRAPH_INFERRED}swrl"
 GRAPH_SHACL = f"{GRAPH_INFERRED}shacl"
+GRAPH_REASONED = f"{GRAPH}reasoned"  # of what the inferred graphs were made
 GRAPH_VALIDATION = f"{GRAPH}validation"
 
 
