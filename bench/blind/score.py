@@ -1,7 +1,7 @@
-"""`python -m blind.score DIAGNOSES LABELS [--out PAGE.md]`: score diagnoses' JSON against the sealed labels.
+"""`python -m blind.score DIAGNOSES LABELS [--healthy DIAGNOSES] [--out PAGE.md]`: score diagnoses against sealed labels.
 
 A score of singles counts cases whose effect leaves at least 1 floor (0.8 measured) unless a row says otherwise.
-A diagnosis that ended in an error is a wrong one.
+A diagnosis that ended in an error is a wrong one. `--healthy`: diagnoses of the same robots without the effect.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ AIMS = {
     "unknown effects abstained from": ">= 90 %",
     "unknown effects located": ">= 90 %",
     "pairs, both found": ">= 80 %",
+    "interval covers what the true form closes": "90 to 98 %",
     "expected calibration error": "<= 0.05",
 }
 
@@ -112,6 +113,21 @@ def calibration(pairs: Iterable[tuple[float, bool]], bins: int = 10) -> tuple[fl
     return float(error), [(float(c), float(s), n) for c, s, n in table]
 
 
+def closed_by_true_form(diagnosis: dict[str, Any], healthy: dict[str, Any]) -> float:
+    """Return the closed fraction of a refit with the true form: it leaves what the healthy robot's twin leaves."""
+    pairs = []
+    for one, other in zip(_equations(diagnosis), _equations(healthy), strict=True):
+        if one["noise_floor"] and one["excess"] is not None:
+            pairs.append((one["excess"], (other["rmse"] / one["noise_floor"]) ** 2 - 1))
+    above, left = np.sum(pairs, axis=0)
+    return float(1 - left / above)
+
+
+def _equations(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
+    gap = diagnosis["gap"]
+    return [*gap.get("torque", {}).values(), *([gap["power"]] if gap.get("power") else [])]
+
+
 def wilson(share: float, count: int) -> tuple[float, float]:
     """Return the 95 % interval of a share."""
     z = 1.96
@@ -120,11 +136,16 @@ def wilson(share: float, count: int) -> tuple[float, float]:
     return float(max(0, middle - half)), float(min(1, middle + half))
 
 
-def page(diagnoses: dict[str, dict[str, Any]], labels: dict[str, dict[str, Any]], seal: str) -> str:
+def page(
+    diagnoses: dict[str, dict[str, Any]],
+    labels: dict[str, dict[str, Any]],
+    healthy: dict[str, dict[str, Any]],
+    seal: str,
+) -> str:
     """Return the page of results."""
     scores: dict[str, list[float]] = defaultdict(list)
     confident: list[tuple[float, bool]] = []
-    closed, seconds, errors = [], [], 0
+    closed, of_closable, seconds, errors = [], [], [], 0
     for name, label in labels.items():
         if name not in diagnoses:
             continue
@@ -138,6 +159,11 @@ def page(diagnoses: dict[str, dict[str, Any]], labels: dict[str, dict[str, Any]]
         fraction = (diagnosis.get("shrink") or {}).get("closed_fraction")
         if fraction and label["kind"] == "single" and label["effects"][0]["gap_over_floor"] >= ENOUGH:
             closed.append(fraction["value"])
+            if "gap" in healthy.get(name, {}):
+                true_form = closed_by_true_form(diagnosis, healthy[name])
+                of_closable.append(fraction["value"] / true_form)
+                low, high = fraction["interval95"]
+                scores["interval covers what the true form closes"].append(float(low <= true_form <= high))
     error, table = calibration(confident)
     lines = [f"{len(seconds)} of {len(labels)} cases, labels' SHA-256 `{seal}`, {errors} ended in an error.", ""]
     lines += ["| score | reached | 95 % interval | aim | cases |", "| --- | --- | --- | --- | --- |"]
@@ -148,6 +174,12 @@ def page(diagnoses: dict[str, dict[str, Any]], labels: dict[str, dict[str, Any]]
     lines.append(f"| expected calibration error | {error:.3f} | | {aim} | {len(confident)} causes |")
     if closed:
         lines.append(f"| closed fraction, median | {np.median(closed):.2f} | | | {len(closed)} |")
+    if of_closable:
+        median, most = np.median(of_closable), np.mean(np.array(of_closable) >= 0.95)
+        lines.append(
+            f"| closed, of what the true form closes: median (share of cases above 0.95) | {median:.2f} ({most:.0%}) "
+            f"| | >= 0.95 | {len(of_closable)} |"
+        )
     if seconds:
         median, largest = np.nanmedian(seconds), np.nanmax(seconds)
         lines.append(f"| seconds a case, median (largest) | {median:.1f} ({largest:.1f}) | | | {len(seconds)} |")
@@ -164,17 +196,23 @@ def _row(score: str, values: list[float]) -> str:
     return f"| {score} | {100 * mean:.0f} % | {100 * low:.0f} to {100 * high:.0f} % | {AIMS.get(score, '')} | {count} |"
 
 
+def _read(folder: Path, labels: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    files = {file.stem: file for file in folder.glob("*.json")}
+    return {name: json.loads(file.read_text(encoding="utf-8")) for name, file in files.items() if name in labels}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m blind.score", description=__doc__)
     parser.add_argument("diagnoses", type=Path, help="a folder of CASE.json")
     parser.add_argument("labels", type=Path, help="labels.json")
+    parser.add_argument("--healthy", type=Path, help="a folder of CASE.json")
     parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
     text = arguments.labels.read_text(encoding="utf-8")
     labels = json.loads(text)
-    files = {file.stem: file for file in arguments.diagnoses.glob("*.json")}
-    diagnoses = {name: json.loads(file.read_text(encoding="utf-8")) for name, file in files.items() if name in labels}
-    result = page(diagnoses, labels, hashlib.sha256(text.encode()).hexdigest())
+    diagnoses = _read(arguments.diagnoses, labels)
+    healthy = _read(arguments.healthy, labels) if arguments.healthy else {}
+    result = page(diagnoses, labels, healthy, hashlib.sha256(text.encode()).hexdigest())
     if arguments.out:
         arguments.out.write_text(result, encoding="utf-8")
     print(result)
