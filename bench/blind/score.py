@@ -1,4 +1,4 @@
-"""`python -m blind.score DIAGNOSES LABELS [--healthy DIAGNOSES] [--out PAGE.md]`: score diagnoses against sealed labels.
+"""`python -m blind.score DIAGNOSES LABELS [--healthy DIAGNOSES] [--out PAGE.md]`: score diagnoses by sealed labels.
 
 A score of singles counts cases whose effect leaves at least 1 floor (0.8 measured) unless a row says otherwise.
 A diagnosis that ended in an error is a wrong one. `--healthy`: diagnoses of the same robots without the effect.
