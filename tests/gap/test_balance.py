@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from irtwin.effects.effect import BASELINE, catalogue
-from irtwin.gap.attribute import Cause
 from irtwin.gap.balance import Balance, filtered, kind_of, refuted
+from irtwin.gap.cause import Cause
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
 from synthetic import arm, as_run, measure, swing, truth

@@ -10,7 +10,8 @@ import pytest
 
 from irtwin.effects.effect import BASELINE, Predicted, catalogue
 from irtwin.effects.stack import Stack
-from irtwin.gap.attribute import Attribution, Cause
+from irtwin.gap.attribute import Attribution
+from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Grouping, torque_system
 from irtwin.gap.experiment import ENOUGH, next_experiment
 from irtwin.gap.finding import Finding

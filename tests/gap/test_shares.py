@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from irtwin.effects.effect import Term, catalogue
-from irtwin.gap.attribute import Attribution, Cause
+from irtwin.gap.attribute import Attribution
+from irtwin.gap.cause import Cause
 from irtwin.gap.hypotheses import MISSING, Column, Variant
 from irtwin.gap.shares import shares
 from irtwin.gap.system import System

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from irtwin.effects.effect import Effect
-from irtwin.gap.attribute import Cause
+from irtwin.gap.cause import Cause
 
 MECHANICAL, SENSOR = "mechanical", "sensor"
 _MATTERS = 0.03  # a share of the mean square of power

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from irtwin.effects.effect import Effect
-from irtwin.gap.attribute import Cause
 from irtwin.gap.case import Case
+from irtwin.gap.cause import Cause
 from irtwin.gap.hypotheses import CHANGED
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin

@@ -11,9 +11,9 @@ import numpy as np
 from irtwin.effects.effect import Effect, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.gap import document
-from irtwin.gap.attribute import Cause
 from irtwin.gap.balance import filtered, refuted
 from irtwin.gap.case import Case, case_of
+from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Torque, power_system, torque_system
 from irtwin.gap.closure import closed_twin
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors

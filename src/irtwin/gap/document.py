@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from irtwin.effects.effect import Quantity, Term
-from irtwin.gap.attribute import Cause
+from irtwin.gap.cause import Cause
 from irtwin.gap.confidence import confidence
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.finding import Finding, noise_before
@@ -56,6 +56,7 @@ def cause(robot: Robot, finding: Finding, one: Cause, largest: float) -> Json:
             "t_between_groups": one.t,
             "p_adjusted_for_the_catalogue": one.p,
             "gain_of_rivals": one.rival_gains,
+            "correlation_with_rivals": one.rival_correlations,
             **_balance(finding, one),
             **acting(one.variants),
         },

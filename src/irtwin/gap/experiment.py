@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from irtwin.effects.effect import Effect
-from irtwin.gap.attribute import Cause
+from irtwin.gap.cause import Cause
 from irtwin.gap.hypotheses import Column, candidate_columns
 from irtwin.gap.programme import TAKEN_OFF, Programme, programmes
 from irtwin.gap.separation import fitted, unimitated

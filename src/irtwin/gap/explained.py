@@ -8,7 +8,7 @@ import numpy as np
 
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
-from irtwin.gap.attribute import Cause
+from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Grouping, Torque, power_system
 from irtwin.gap.finding import Finding, noise_before, twin_values
 from irtwin.gap.system import System

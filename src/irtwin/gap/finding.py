@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.effect import catalogue
-from irtwin.gap.attribute import Attribution, Cause, attribute
+from irtwin.gap.attribute import Attribution, attribute
 from irtwin.gap.balance import Balance
 from irtwin.gap.case import Case
+from irtwin.gap.cause import Cause
 from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.shares import shares
 from irtwin.gap.shrink import HeldOut, held_out

@@ -253,6 +253,26 @@ def scores(
     return found, total - total[inside].T @ weights
 
 
+def canonical_correlation(
+    total: np.ndarray, base: int, chosen: Sequence[int], sets: Sequence[Sequence[int]]
+) -> np.ndarray:
+    """Return the largest canonical correlation of each set of columns with the first set, (S,), after the refit.
+
+    total: (D + 1, D + 1) products of columns. What the prior holds near zero anyway correlates with nothing.
+    """
+    whole, _ = _project(total, total, base, chosen)
+    first = len(sets[0])
+    found = []
+    for columns in sets:
+        products = whole.of(np.array([[*sets[0], *columns]]))[0] + np.eye(first + len(columns))
+        own, other = (
+            np.linalg.pinv(part, hermitian=True) for part in (products[:first, :first], products[first:, first:])
+        )
+        squared = own @ products[:first, first:] @ other @ products[first:, :first]
+        found.append(np.sqrt(np.abs(np.linalg.eigvals(squared)).max()))
+    return np.minimum(found, 1.0)
+
+
 def _change(term: Term) -> Term:
     return Term(term.name, term.unit, term.joint, term.link, 0.0, term.spread)
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from irtwin.effects.drive import CopperLoss
 from irtwin.effects.stack import Stack
-from irtwin.gap.attribute import Cause
 from irtwin.gap.balance import Balance
 from irtwin.gap.case import Case
+from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Torque, power_system
 from irtwin.gap.explained import ExplainedTorque
 from irtwin.gap.finding import noise_before
