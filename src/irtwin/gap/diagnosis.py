@@ -73,7 +73,10 @@ class Diagnosis:
             "robot": robot.name,
             "gap": document.gap(robot.joint_names, self.channels, self.energies),
             "locations": [location.to_json() for location in self.locations],
-            "causes": [document.cause(robot, finding, cause, self.causes[0][1].gain) for finding, cause in self.causes],
+            "causes": [
+                document.cause(robot, finding, cause, self.causes[0][1].gain, self.verdict)
+                for finding, cause in self.causes
+            ],
             "not_testable": [{"effect": one.effect, "why": one.why} for one in self.untestable],
             "shrink": {
                 **document.shrink(self.runs, self.channels, self.floor, self.energies, self.seed),

@@ -15,6 +15,7 @@ from irtwin.gap.finding import Finding, noise_before
 from irtwin.gap.floor import Floor
 from irtwin.gap.occasional import acting
 from irtwin.gap.shrink import closed_fraction, held_out, pooled_interval
+from irtwin.gap.verdict import UNEXPLAINED
 from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
 
@@ -38,14 +39,14 @@ def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErro
     return document
 
 
-def cause(robot: Robot, finding: Finding, one: Cause, largest: float) -> Json:
+def cause(robot: Robot, finding: Finding, one: Cause, largest: float, verdict: str) -> Json:
     """Return a cause with its parameters and evidence; `largest` is the gain of the largest one."""
     closed = finding.closed(one)
     return {
         "effect": one.effect,
         "joints": acted_on(robot, one),
         "scope": one.scope,
-        "confidence": confidence(one.t, closed, min(one.gain / largest, 1.0)),
+        "confidence": confidence(one.t, closed, min(one.gain / largest, 1.0), unexplained=verdict == UNEXPLAINED),
         "parameters": parameters(robot, finding, one),
         "indistinguishable_from": list(one.rivals),
         "evidence": {
