@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
 TWO_ROBOTS = Path(__file__).parents[1] / "knowledge/data/two_robots.trig"
 TOKEN = "a-token-for-tests"
+CLIENT = httpx.Client(timeout=60, limits=httpx.Limits(max_connections=32))
 
 
 @dataclass
@@ -38,14 +39,20 @@ class Server:
 
     def ask(self, query: str, **headers: str) -> httpx.Response:
         body = {"Content-Type": "application/sparql-query", **headers}
-        return httpx.post(self.sparql, content=query, headers=body, timeout=60)
+        return CLIENT.post(self.sparql, content=query, headers=body)
 
     def update(self, text: str, token: str = TOKEN) -> httpx.Response:
         headers = {"Content-Type": "application/sparql-update", "Authorization": f"Bearer {token}"}
-        return httpx.post(self.sparql, content=text, headers=headers, timeout=60)
+        return CLIENT.post(self.sparql, content=text, headers=headers)
 
-    def workers(self) -> list[psutil.Process]:
-        return psutil.Process(self.process.pid).children()
+    def workers(self) -> dict[int, float]:
+        """Return the processor time in seconds of each worker that lives, by its process."""
+        found = {}
+        for worker in psutil.Process(self.process.pid).children():
+            with suppress(psutil.NoSuchProcess):
+                if worker.status() != psutil.STATUS_ZOMBIE:
+                    found[worker.pid] = sum(worker.cpu_times()[:2])
+        return found
 
 
 @contextmanager
@@ -91,7 +98,7 @@ def server(new_graph: Callable[[], Path]) -> Iterator[Server]:
         yield running
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def start() -> Callable[..., object]:
     """Give `serving`, for tests that need a server of their own."""
     return serving

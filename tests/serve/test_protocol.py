@@ -8,6 +8,8 @@ from urllib.parse import urlencode, urlsplit
 import httpx
 import pytest
 
+CLIENT = httpx.Client(timeout=60)
+
 FORM = "application/x-www-form-urlencoded"
 QUERY = "application/sparql-query"
 UPDATE = "application/sparql-update"
@@ -16,7 +18,7 @@ GRAPH_OF_ROBOTS = "https://w3id.org/irtwin/graph/source/robot"
 
 
 def post(server, body: str | bytes, content_type: str, params=None, **headers: str) -> httpx.Response:
-    return httpx.post(server.sparql, content=body, params=params, headers={"Content-Type": content_type, **headers})
+    return CLIENT.post(server.sparql, content=body, params=params, headers={"Content-Type": content_type, **headers})
 
 
 def rows(response: httpx.Response) -> list[dict[str, str]]:
@@ -26,8 +28,8 @@ def rows(response: httpx.Response) -> list[dict[str, str]]:
 
 
 def test_a_query_comes_in_three_ways_and_gets_one_answer(server) -> None:
-    by_get = httpx.get(server.sparql, params={"query": ROBOTS})
-    by_form = httpx.post(server.sparql, data={"query": ROBOTS})
+    by_get = CLIENT.get(server.sparql, params={"query": ROBOTS})
+    by_form = CLIENT.post(server.sparql, data={"query": ROBOTS})
     by_body = post(server, ROBOTS, QUERY)
     with_charset = post(server, ROBOTS, f"{QUERY}; charset=UTF-8")
     assert len(rows(by_get)) == 2
@@ -113,7 +115,7 @@ ENCODED = urlencode({"query": "ASK {}"})
 )
 def test_what_is_refused(server, method, params, content_type, body, status, message) -> None:
     headers = {} if content_type is None else {"Content-Type": content_type}
-    response = httpx.request(method, f"{server.sparql}?{params}", headers=headers, content=body)
+    response = CLIENT.request(method, f"{server.sparql}?{params}", headers=headers, content=body)
     assert response.status_code == status, response.text
     assert message in response.text
     assert response.text.count("\n") == 1 or status == 400
@@ -122,10 +124,10 @@ def test_what_is_refused(server, method, params, content_type, body, status, mes
 
 
 def test_head_and_options(server) -> None:
-    head = httpx.head(server.sparql, params={"query": ROBOTS}, headers={"Accept": "text/csv"})
+    head = CLIENT.head(server.sparql, params={"query": ROBOTS}, headers={"Accept": "text/csv"})
     assert (head.status_code, head.content) == (200, b"")
     assert head.headers["content-type"] == "text/csv; charset=utf-8"
-    options = httpx.options(server.sparql)
+    options = CLIENT.options(server.sparql)
     assert (options.status_code, options.headers["allow"]) == (204, "GET, HEAD, POST, OPTIONS")
 
 
@@ -137,10 +139,10 @@ def test_the_request_chooses_the_dataset(server, way: str) -> None:
     def ask(query: str, *graphs: tuple[str, str]) -> list[dict[str, str]]:
         pairs = [("query", query), *graphs]
         if way == "get":
-            return rows(httpx.get(f"{server.sparql}?{urlencode(pairs)}"))
+            return rows(CLIENT.get(f"{server.sparql}?{urlencode(pairs)}"))
         if way == "form":
             return rows(post(server, urlencode(pairs), FORM))
-        return rows(httpx.post(f"{server.sparql}?{urlencode(graphs)}", content=query, headers={"Content-Type": QUERY}))
+        return rows(CLIENT.post(f"{server.sparql}?{urlencode(graphs)}", content=query, headers={"Content-Type": QUERY}))
 
     whole, robots = int(ask(count)[0]["n"]), int(ask(count, ("default-graph-uri", GRAPH_OF_ROBOTS))[0]["n"])
     assert 0 < robots < whole

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import os
 import signal
 import sys
 from collections.abc import AsyncIterator
@@ -47,6 +48,7 @@ class Worker:
             *(sys.executable, "-m", "irtwin.serve.worker", *arguments),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
+            env={**os.environ, "RUST_BACKTRACE": "0"},  # memory that cannot be had is no bug to trace
             start_new_session=True,  # Ctrl-C in the terminal is the server's alone
         )
         worker = cls(process, limits)
@@ -86,8 +88,10 @@ class Worker:
 
     async def end(self) -> None:
         """End the process, whatever it is doing."""
+        assert self._process.stdout is not None
         if self._process.returncode is None:
             self._process.kill()
+        await self._process.stdout.read()  # asyncio takes a process for ended only once its pipes are empty
         await self._process.wait()
 
     async def _frame(self) -> tuple[bytes, bytes]:

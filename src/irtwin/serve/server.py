@@ -23,6 +23,7 @@ from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.snapshot import Snapshot
 from irtwin.serve.updates import Updates
 
 _GRACE = 3  # s that answers under way may still take when the server stops
@@ -42,8 +43,7 @@ def serve(
     Port 0 takes a free one; `announce` is told the endpoint's address once it answers.
     Raises InputError where the graph is missing or the port is taken.
     """
-    if not (graph / "CURRENT").is_file():
-        raise InputError(f"{graph}: no graph here; run `irtwin run DATASET --workspace {graph.parent}` first")
+    Snapshot(graph)  # what cannot be read is said here, once, rather than by each worker
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
@@ -117,6 +117,7 @@ def _bind(host: str, port: int) -> socket.socket:
         listening = socket.socket(family, kind, protocol)
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
+        listening.listen()
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot listen on {host}, port {port}: {reason}; --port 0 takes a free one") from None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
-import resource
 import sys
 import time
 from pathlib import Path
@@ -15,6 +14,7 @@ from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.snapshot import OLDEST
+from irtwin.serve.worker import limit_memory
 
 
 class Updates:
@@ -74,8 +74,6 @@ class Updates:
 
 def main(folder: Path, memory: int) -> None:
     """Do the update on standard input; write what is wrong with it, as JSON."""
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     answer: dict[str, object] = {}
     try:
         graph = KnowledgeGraph(folder)
@@ -84,6 +82,7 @@ def main(folder: Path, memory: int) -> None:
         answer = {"status": 503, "message": message, "headers": {"Retry-After": "5"}}
     else:
         with graph:
+            limit_memory(memory)
             try:
                 graph.update(sys.stdin.buffer.read().decode())
             except InputError as error:

@@ -63,11 +63,10 @@ class _Sink:
 
 
 def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
-    """Answer queries on the graph in `folder` until standard input ends; memory in bytes, `seconds` for each."""
+    """Answer queries on the graph in `folder` until standard input ends; bytes of memory and seconds for each."""
     out = sys.stdout.buffer
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     snapshot = Snapshot(folder)
+    limit_memory(memory)
     _frame(out, b"H", b"{}")
     for line in sys.stdin.buffer:
         _limit_processor_time(seconds)
@@ -117,12 +116,20 @@ def _refuse(out: IO[bytes], error: Exception) -> None:
     _frame(out, b"H", json.dumps({"status": status, "message": message}).encode())
 
 
+def limit_memory(memory: int) -> None:
+    """Have the system refuse this process more than so many bytes beside those that it has now."""
+    sizes = Path("/proc/self/statm")  # in pages; the sixth is what RLIMIT_DATA counts
+    has = int(sizes.read_text().split()[5]) * resource.getpagesize() if sizes.exists() else 0
+    resource.setrlimit(resource.RLIMIT_DATA, (has + memory, has + memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
 def _limit_processor_time(seconds: float) -> None:
-    """Have the system end this process should it work on a query for far too long, even if the server is gone."""
+    """Have the system end this process should it work on a query for too long, even if the server is gone."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     used = usage.ru_utime + usage.ru_stime
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(used + 2 * seconds) + 1, hard))
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(used + seconds) + 1, hard))
 
 
 def _frame(out: IO[bytes], kind: bytes, data: bytes) -> None:

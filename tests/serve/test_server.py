@@ -1,0 +1,130 @@
+"""The process: how it starts, what it refuses, how it ends; what every response carries."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import psutil
+import pytest
+
+CLIENT = httpx.Client(timeout=60)
+
+
+def irtwin(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "irtwin", "serve", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+
+def refused(*arguments: object) -> str:
+    done = irtwin(*arguments)
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    assert done.stderr.startswith("irtwin: ") and done.stderr.count("\n") == 1
+    return done.stderr
+
+
+def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
+    assert "no graph here; run `irtwin run DATASET`" in refused("--workspace", tmp_path / "none", "--port", 0)
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        message = refused("--workspace", new_graph().parent, "--port", port)
+    assert f"cannot listen on 127.0.0.1, port {port}: Address already in use; --port 0 takes a free one" in message
+
+
+def test_a_host_that_is_not_ours(new_graph: Callable[[], Path]) -> None:
+    assert "cannot listen on 203.0.113.1" in refused("--workspace", new_graph().parent, "--host", "203.0.113.1")
+
+
+@pytest.mark.parametrize(("content", "message"), [(None, "cannot read the token"), (b" \n", "the token file is empty")])
+def test_a_token_file_that_says_nothing(
+    tmp_path: Path, new_graph: Callable[[], Path], content: bytes | None, message: str
+) -> None:
+    file = tmp_path / "token"
+    if content is not None:
+        file.write_bytes(content)
+    assert message in refused("--workspace", new_graph().parent, "--port", 0, "--token-file", file)
+
+
+def test_it_listens_on_this_machine_alone(server) -> None:
+    port = urlsplit(server.url).port
+    listening = [c for c in psutil.Process(server.process.pid).net_connections() if c.status == psutil.CONN_LISTEN]
+    assert [(c.laddr.ip, c.laddr.port) for c in listening] == [("127.0.0.1", port)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path], start, number: int) -> None:
+    with start(new_graph()) as running:
+        workers = list(running.workers())
+        os.kill(running.process.pid, number)
+        assert running.process.wait(timeout=30) == 0
+        assert not any(psutil.pid_exists(worker) for worker in workers)
+        with pytest.raises(httpx.ConnectError):
+            CLIENT.get(running.url)
+
+
+PATHS = ("/", "/sparql", "/sparql?query=ASK{}", "/sparql?query=rubbish", "/irtwin", "/assets/page.js", "/nowhere")
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_every_response_has_the_security_headers(server, path: str) -> None:
+    headers = CLIENT.get(f"{server.url}{path}").headers
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["x-frame-options"] == "DENY"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["cross-origin-resource-policy"] == "same-origin"
+    assert headers["content-security-policy"].startswith("default-src 'none'")
+    assert "access-control-allow-origin" not in headers
+    assert "server" not in headers
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "", "localhost.evil"])
+def test_other_names_of_this_machine_get_nothing(server, host: str) -> None:
+    response = CLIENT.get(f"{server.url}/sparql?query=ASK{{}}", headers={"Host": host})
+    assert (response.status_code, response.text) == (421, "this server answers to localhost only\n")
+
+
+@pytest.mark.parametrize("host", ["localhost", "LOCALHOST:1234", "127.0.0.1", "[::1]:80"])
+def test_its_own_names_do(server, host: str) -> None:
+    assert CLIENT.get(f"{server.url}/sparql?query=ASK{{}}", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/assets/../server.py",
+        "/assets/%2e%2e/server.py",
+        "/assets/..%2f..%2fcli.py",
+        "/assets/%2fetc%2fpasswd",
+        "/assets//etc/passwd",
+        "/assets/page.js%00.css",
+        "/assets/README.md",
+        "/assets/",
+        "/irtwin/../../etc/passwd",
+        "/irtwin/..%2f..%2fpyproject.toml",
+        "/irtwin/robots/kuka_kr6_r700",
+        "/irtwin/robot.ttl",
+        "/irtwinned",
+        "/..",
+        "//etc/passwd",
+        "/%c0%ae%c0%ae/etc/passwd",
+    ],
+)
+def test_no_path_leads_elsewhere(server, path: str) -> None:
+    connection = http.client.HTTPConnection(urlsplit(server.url).netloc, timeout=20)  # sends a path as it is
+    connection.request("GET", path)
+    response = connection.getresponse()
+    body = response.read()
+    assert response.status == 404
+    assert b"root:" not in body and len(body) < 1000

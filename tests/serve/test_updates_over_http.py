@@ -1,0 +1,148 @@
+"""Updates behind a token, and what readers see while the endpoint, or another process, writes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+import rdflib
+from rdflib.plugins.stores.sparqlstore import SPARQLUpdateStore
+
+from irtwin.knowledge.graph import KnowledgeGraph
+
+VALUES = "SELECT ?o { <http://e/s> <http://e/p> ?o } ORDER BY ?o"
+
+
+@pytest.fixture(scope="module")
+def writable(new_graph: Callable[[], Path], start) -> Iterator[object]:
+    with start(new_graph()) as running:
+        yield running
+
+
+def values(server) -> list[str]:
+    return [row["o"]["value"] for row in server.ask(VALUES).json()["results"]["bindings"]]
+
+
+def test_who_has_the_token_writes_and_reads_it_at_once(writable) -> None:
+    for number in range(2):
+        done = writable.update(
+            f"DELETE WHERE {{ <http://e/s> ?p ?o }} ; INSERT DATA {{ <http://e/s> <http://e/p> {number} }}"
+        )
+        assert (done.status_code, done.content) == (204, b"")
+        assert [values(writable) for _ in range(4)] == [[str(number)]] * 4
+
+
+@pytest.mark.parametrize(
+    ("authorization", "status"),
+    [(None, 401), ("Bearer wrong", 401), ("Bearer", 401), ("Basic YS10b2tlbi1mb3ItdGVzdHM6", 401), ("Bearer é", 401)],
+)
+def test_who_has_not_is_refused(writable, authorization: str | None, status: int) -> None:
+    headers = {"Content-Type": "application/sparql-update"}
+    if authorization is not None:
+        headers["Authorization"] = authorization.encode()  # type: ignore[assignment]
+    before = values(writable)
+    response = httpx.post(writable.sparql, content="CLEAR ALL", headers=headers)
+    assert response.status_code == status
+    assert response.headers["www-authenticate"] == "Bearer"
+    assert "a-token-for-tests" not in response.text
+    assert values(writable) == before
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "message"),
+    [
+        ("INSERT DATA {\n <http://e/s> }", 400, "not a SPARQL update: error at 2:"),
+        ("LOAD <file:///etc/passwd>", 400, "LOAD and SERVICE read from elsewhere"),
+        ("LOAD <http://127.0.0.1:1/> INTO GRAPH <http://e/g>", 400, "LOAD and SERVICE read from elsewhere"),
+        ("INSERT { ?s ?p ?o } WHERE { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", 400, "LOAD and SERVICE"),
+        ("DROP GRAPH <http://e/nowhere>", 400, "nothing changed"),
+    ],
+)
+def test_an_update_that_fails_changes_nothing(writable, text: str, status: int, message: str) -> None:
+    before = writable.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content
+    response = writable.update(text)
+    assert (response.status_code, message in response.text) == (status, True), response.text
+    assert writable.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
+
+
+def test_the_dataset_of_an_update_is_written_into_it(writable) -> None:
+    response = httpx.post(
+        writable.sparql,
+        data={"update": "DELETE WHERE { ?s ?p ?o }", "using-graph-uri": "http://e/g"},
+        headers={"Authorization": "Bearer a-token-for-tests"},
+    )
+    assert (response.status_code, "write USING into the update" in response.text) == (400, True)
+
+
+def test_an_update_that_takes_too_long_changes_nothing(new_graph: Callable[[], Path], start) -> None:
+    with start(new_graph(), "--timeout", 3) as running:
+        before = running.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content
+        response = running.update("INSERT { ?a ?b ?i } WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }")
+        assert (response.status_code, response.text[:24]) == (503, "the update was cancelled"), response.text
+        assert running.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
+
+
+def test_rdflib_writes_through_it(writable) -> None:
+    store = SPARQLUpdateStore(
+        writable.sparql, writable.sparql, headers={"Authorization": "Bearer a-token-for-tests"}, context_aware=False
+    )
+    subject, predicate = rdflib.URIRef("http://e/rdflib"), rdflib.URIRef("http://e/p")
+    graph = rdflib.Graph(store)
+    graph.add((subject, predicate, rdflib.Literal('ü "quoted"\n')))
+    assert list(graph.objects(subject, predicate)) == [rdflib.Literal('ü "quoted"\n')]
+
+
+def test_another_process_holding_the_graph_makes_updates_wait(writable) -> None:
+    with KnowledgeGraph(writable.graph):
+        response = writable.update("INSERT DATA { <http://e/s> <http://e/p> 1 }")
+        assert response.status_code == 503
+        assert response.text == "another process is writing the graph: try again later\n"
+        assert response.headers["retry-after"] == "5"
+        assert writable.ask("ASK { ?s ?p ?o }").json()["boolean"] is True
+
+
+WRITER = """
+import sys, time
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.graph import in_graph
+from pyoxigraph import Literal, NamedNode, Triple
+
+with KnowledgeGraph(sys.argv[1]) as graph:
+    print("open", flush=True)
+    for number in range(int(sys.argv[2])):
+        triples = [Triple(NamedNode(f"http://e/{i}"), NamedNode("http://e/v"), Literal(number)) for i in range(50)]
+        graph.replace(in_graph(triples, "http://e/live"), "http://e/live")
+        print(number, time.time(), flush=True)
+        time.sleep(float(sys.argv[3]))
+    sys.stdin.read()
+"""
+STATE = "SELECT (COUNT(*) AS ?n) (MIN(?v) AS ?low) (MAX(?v) AS ?high) { ?s <http://e/v> ?v }"
+
+
+def state(server) -> tuple[int, int, int] | None:
+    (row,) = server.ask(STATE).json()["results"]["bindings"]
+    return (int(row["n"]["value"]), int(row["low"]["value"]), int(row["high"]["value"])) if "low" in row else None
+
+
+def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_graph, start) -> None:
+    folder = new_graph()
+    with start(folder) as running:
+        command = [sys.executable, "-c", WRITER, str(folder), "20", "0.05"]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as writer:
+            assert writer.stdout is not None and writer.stdin is not None
+            assert writer.stdout.readline() == "open\n"
+            seen = []
+            while not (line := writer.stdout.readline()).startswith("19 "):
+                seen.append(state(running))
+            written = float(line.split()[1])
+            while state(running) != (50, 19, 19):
+                assert time.time() - written < 30
+            writer.stdin.close()
+        whole = [found for found in seen if found is not None]
+        assert whole and all(count == 50 and low == high for count, low, high in whole)
+        assert len({high for _, _, high in whole}) > 1
