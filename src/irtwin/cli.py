@@ -90,14 +90,17 @@ def demo(workspace: Path) -> None:
 
 @cli.command()
 @click.argument("question", required=False)
+@click.option("--robot", metavar="NAME", help="Ask it of one robot, by its name.")
 @_workspace
 @_database
 @_graph
 @click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True)
-def query(question: str | None, workspace: Path, database: str | None, graph_url: str | None, form: str) -> None:
+def query(
+    question: str | None, robot: str | None, workspace: Path, database: str | None, graph_url: str | None, form: str
+) -> None:
     """Ask the graph a question, by its name or in SPARQL.
 
-    Without a QUESTION: list those that have names.
+    Without a QUESTION: list those that have names, theme by theme.
     """
     from irtwin import workflow
     from irtwin.knowledge.queries import to_csv, to_json
@@ -105,13 +108,13 @@ def query(question: str | None, workspace: Path, database: str | None, graph_url
     if question is None:
         answer = workflow.questions()
     else:
-        answer = workflow.ask(question, workspace, database=database, graph_url=graph_url)
+        answer = workflow.ask(question, workspace, robot=robot, database=database, graph_url=graph_url)
     for fault in answer.faults:
         _say(f"irtwin: {fault}")
     if form == "table":
         from irtwin.report.terminal import show
 
-        show(answer)
+        show(answer, in_sections=question is None)
     else:
         click.echo(to_json(answer) if form == "json" else to_csv(answer), nl=form == "json")
 
@@ -312,6 +315,32 @@ def reason(source: Path, out: Path) -> None:
         click.echo(f"irtwin: {source}: {clash}", err=True)
         sys.exit(3)
     click.echo(f"{out}: {inferred} triples inferred")
+
+
+@cli.command()
+@click.argument("triple", nargs=-1, required=True)
+@_workspace
+@_database
+@_graph
+@click.option("--json", "as_json", is_flag=True, help="Write nested objects instead of an outline.")
+def explain(
+    triple: tuple[str, ...], workspace: Path, database: str | None, graph_url: str | None, as_json: bool
+) -> None:
+    """Say how a triple of the graph is known.
+
+    By which rule, mapping or provider, from which facts, down to runs, files and checksums. TRIPLE is subject,
+    predicate and object: prefixed names, IRIs, or literals; `?` or nothing stands for anything.
+    """
+    import json
+
+    from irtwin import workflow
+    from irtwin.knowledge.explanation import to_json, to_text
+
+    found = workflow.explain(" ".join(triple), workspace, database=database, graph_url=graph_url)
+    if as_json:
+        click.echo(json.dumps([to_json(each) for each in found], indent=2, ensure_ascii=False))
+    else:
+        click.echo("\n\n".join(map(to_text, found)))
 
 
 def _say(line: str) -> None:

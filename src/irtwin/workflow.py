@@ -20,6 +20,8 @@ from irtwin.gap import diagnosis as gap
 from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge import queries
+from irtwin.knowledge.explain import explain as explain_triples
+from irtwin.knowledge.explanation import Explanation
 from irtwin.knowledge.export import export_owl
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import refresh
@@ -171,17 +173,33 @@ def adopt(
 
 
 def ask(
-    question: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+    question: str,
+    workspace: Path | str = WORKSPACE,
+    *,
+    robot: str | None = None,
+    database: str | None = None,
+    graph_url: str | None = None,
 ) -> Table:
-    """Answer a named question, or one in SPARQL, from a workspace's graph."""
+    """Answer a named question, of all robots or of one by its name, or one in SPARQL, from a workspace's graph."""
     with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        return queries.ask(graph, question)
+        return queries.ask(graph, question, robot)
+
+
+def explain(
+    triple: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+) -> tuple[Explanation, ...]:
+    """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
+    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+        return explain_triples(graph, triple)
 
 
 def questions() -> Table:
-    """Return the questions that have a name."""
+    """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
     known = queries.named_questions().values()
-    return Table(("name", "question"), tuple({"name": q.name, "question": q.question} for q in known))
+    rows = (
+        {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
+    )
+    return Table(("theme", "name", "of", "question"), tuple(rows))
 
 
 def export(

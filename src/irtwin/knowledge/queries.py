@@ -20,29 +20,45 @@ from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.table import Table
 
 _FOLDER = Path(__file__).parent / "questions"
-_HEADER = re.compile(r"^# (title|question): (.+)$", re.MULTILINE)
+_HEADER = re.compile(r"^# (title|question|theme|of): (.+)$", re.MULTILINE)
+THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
 _QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|delete)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Question:
-    """A named SPARQL query; `question` is what it answers, in words."""
+    """A named SPARQL query; `question` is what it answers, in words.
+
+    One that is `of_robot` can be asked of one robot, its variable `?arm`, instead of all.
+    """
 
     name: str
     title: str
     question: str
+    theme: str
+    of_robot: bool
     text: str
 
 
 @cache
 def named_questions() -> Mapping[str, Question]:
-    """Return the questions that have a name, in the order of their names."""
-    return {file.stem: _read(file) for file in sorted(_FOLDER.glob("*.rq"))}
+    """Return the questions that have a name, in the order of their themes and names."""
+    questions = [_read(file) for file in _FOLDER.glob("*.rq")]
+    questions.sort(key=lambda question: (THEMES.index(question.theme), question.name))
+    return {question.name: question for question in questions}
 
 
-def ask(graph: KnowledgeGraph, question: str) -> Table:
-    """Answer a named question, or one in SPARQL."""
-    return graph.query(_text(question))
+def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table:
+    """Answer a named question, of all robots or of the one called `robot`, or a question in SPARQL.
+
+    InputError where the question or the robot is unknown, or the question is not one of a single robot.
+    """
+    if robot is None:
+        return graph.query(_text(question))
+    named = named_questions().get(question)
+    if named is None or not named.of_robot:
+        raise InputError(f"{question!r} is not asked of one robot: leave the robot out")
+    return graph.query(named.text, {"arm": _robot_iri(graph, robot)})
 
 
 def to_json(table: Table) -> str:
@@ -71,7 +87,19 @@ def _plain(value: Any) -> Any:
 def _read(file: Path) -> Question:
     text = file.read_text(encoding="utf-8")
     header = dict(_HEADER.findall(text))
-    return Question(file.stem, header["title"], header["question"], text)
+    return Question(file.stem, header["title"], header["question"], header["theme"], header.get("of") == "robot", text)
+
+
+def _robot_iri(graph: KnowledgeGraph, name: str) -> str:
+    rows = graph.query("SELECT ?arm ?name { ?arm irt:has_Information / irt:IR_Name ?name } ORDER BY ?name")
+    found = {row["name"]: row["arm"] for row in rows}
+    if name not in found:
+        near = get_close_matches(name, found, n=1)
+        known = ", ".join(list(found)[:10]) + (", ..." if len(found) > 10 else "")
+        raise InputError(
+            f"no robot is called {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
+        )
+    return str(found[name])
 
 
 def _text(question: str) -> str:

@@ -1,0 +1,113 @@
+"""Every named question has its answer of four robots: tests/knowledge/questions/NAME.csv, worked out by hand."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+
+import small_fleet
+from irtwin.errors import InputError
+from irtwin.knowledge import shacl_rules
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.queries import THEMES, ask, named_questions, to_csv
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.resources import folder
+from irtwin.storage.database import Workspace
+
+ANSWERS = Path(__file__).parent / "questions"
+QUESTIONS = named_questions()
+
+
+@pytest.fixture(scope="module")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    with Workspace(tmp_path_factory.mktemp("fleet")) as workspace:
+        small_fleet.fill(workspace)
+        documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
+        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    shacl_rules.infer(graph)
+    return graph
+
+
+def cells(text: str) -> list[list[float | str]]:
+    return [[number(cell) for cell in row] for row in csv.reader(io.StringIO(text))]
+
+
+def number(cell: str) -> float | str:
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_the_question_has_its_answer(graph: KnowledgeGraph, name: str) -> None:
+    expected = cells((ANSWERS / f"{name}.csv").read_text(encoding="utf-8"))
+    near = [[pytest.approx(cell) if isinstance(cell, float) else cell for cell in row] for row in expected]
+    assert cells(to_csv(ask(graph, name))) == near
+
+
+@pytest.mark.parametrize("name", [name for name, question in QUESTIONS.items() if question.of_robot])
+def test_asked_of_one_robot_it_gives_that_robots_rows(graph: KnowledgeGraph, name: str) -> None:
+    everything = ask(graph, name)
+    assert everything
+    for robot in ("Arm_A", "Arm_C"):
+        assert list(ask(graph, name, robot)) == [row for row in everything if row["robot"] == robot]
+
+
+def test_there_are_fifty_questions_and_more_and_each_theme_has_some() -> None:
+    assert len(QUESTIONS) >= 50
+    assert {question.theme for question in QUESTIONS.values()} == set(THEMES)
+    assert all("?" in question.question and question.title for question in QUESTIONS.values())
+    assert {file.stem for file in ANSWERS.glob("*.csv")} == set(QUESTIONS)
+
+
+def test_a_robot_that_is_not_there_is_told(graph: KnowledgeGraph) -> None:
+    with pytest.raises(InputError, match=r"no robot is called 'Arm_Q': did you mean Arm_"):
+        ask(graph, "energy_per_run", "Arm_Q")
+    with pytest.raises(InputError, match="known are Arm_A, Arm_B, Arm_C, Arm_D"):
+        ask(graph, "energy_per_run", "xyzzy")
+
+
+@pytest.mark.parametrize("question", ["fleet_totals", "SELECT * { ?s ?p ?o }", "nothing"])
+def test_what_is_not_asked_of_one_robot_is_told(graph: KnowledgeGraph, question: str) -> None:
+    with pytest.raises(InputError, match="is not asked of one robot: leave the robot out"):
+        ask(graph, question, "Arm_A")
+
+
+RAW = {  # what a total says, and the same added up over the runs
+    "irt:Run_Count": "COUNT(?run)",
+    "irt:Total_Run_Time": "SUM(?time)",
+    "irt:Total_Idle_Time": "SUM(?idle * ?time)",
+    "irt:Metered_Run_Count": "COUNT(?energy)",
+    "irt:Metered_Run_Time": "SUM(IF(BOUND(?energy), ?time, 0.0e0))",
+    "irt:Total_Energy": "SUM(?energy)",
+    "irt:Total_Modelled_Energy": "SUM(?modelled)",
+    "irt:Total_Standby_Energy": "SUM(?standby)",
+    "irt:Total_Idle_Energy": "SUM(?idle * ?standby)",
+    "irt:Total_Returned_Energy": "SUM(?returned)",
+    "irt:Least_Payload": "MIN(?payload)",
+    "irt:Greatest_Payload": "MAX(?payload)",
+}
+
+
+@pytest.mark.parametrize("total", RAW)
+def test_a_total_is_what_the_runs_come_to(graph: KnowledgeGraph, total: str) -> None:
+    added_up = graph.query(
+        f"""SELECT ?arm ({RAW[total]} AS ?value) {{
+          ?run irt:run_of ?arm ; irt:Run_Time ?time ; irt:Payload ?payload .
+          OPTIONAL {{ ?run irt:Idle_Share ?idle }}
+          OPTIONAL {{ ?run irt:Energy_Consumption ?energy ; irt:Modelled_Energy ?modelled ;
+                       irt:Standby_Energy ?standby ; irt:Returned_Energy ?returned }}
+          {"FILTER(BOUND(?energy))" if "Total" in total and "Run_Time" not in total else ""}
+        }} GROUP BY ?arm"""
+    )
+    kept = graph.query(f"SELECT ?arm ?value {{ ?total a irt:Robot_Total ; irt:total_of ?arm ; {total} ?value }}")
+    values = {row["arm"]: row["value"] for row in kept}
+    assert values == pytest.approx({row["arm"]: row["value"] for row in added_up if row["arm"] in values})
+    assert len(values) >= 3

@@ -1,0 +1,232 @@
+"""Four robots whose energies are small round numbers, as rows: every named question can be answered of them by hand.
+
+Arm_A was diagnosed as changed, Arm_B as ambiguous, Arm_C as unexplained and burns what its braking gives back;
+Arm_D has a run and no twin. The ledger of each run adds up to its modelled energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from irtwin.knowledge.vocabulary import ID
+from irtwin.storage import gap_schema as gap
+from irtwin.storage import schema
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Base
+
+SOFTWARE = "irtwin 0.1.0"
+JOINTS = {"Arm_A": ["j1", "j2"], "Arm_B": ["j1", "j2"], "Arm_C": ["j1"], "Arm_D": ["j1"]}
+EFFECTS = {
+    "Arm_A": ["rigid_body", "coulomb_friction", "standby_power"],
+    "Arm_B": ["rigid_body", "standby_power"],
+    "Arm_C": ["rigid_body", "coulomb_friction", "standby_power", "no_regeneration"],
+}
+# robot, run, start, s, payload kg, idle share, part, then J: measured, modelled, standby, returned; W: peak, RMSE
+RUNS: list[tuple[Any, ...]] = [
+    ("Arm_A", "fit_1", "2026-03-02 08:00", 10.0, 0.0, 0.1, "fit", 1000.0, 980.0, 500.0, 20.0, 250.0, 4.0),
+    ("Arm_A", "check_1", "2026-03-02 09:00", 20.0, 3.0, 0.2, "held_out", 2000.0, 1760.0, 1000.0, 100.0, 300.0, 15.0),
+    ("Arm_A", "idle_1", "2026-03-03 09:00", 30.0, 0.0, 0.8, "held_out", 1600.0, 1568.0, 1500.0, 0.0, 120.0, 2.0),
+    ("Arm_B", "work_1", "2026-03-02 10:00", 5.0, 0.0, 0.0, "fit", 500.0, 400.0, 100.0, 10.0, 200.0, 25.0),
+    ("Arm_B", "work_2", "2026-03-04 10:00", 8.0, 1.0, 0.05, "held_out", 800.0, 776.0, 160.0, 200.0, 260.0, 5.0),
+    ("Arm_C", "press_1", "2026-03-04 06:00", 10.0, 0.0, 0.5, "fit", 400.0, 400.0, 100.0, 60.0, 90.0, 1.0),
+    ("Arm_C", "press_2", "2026-04-01 06:00", 10.0, 0.0, 0.25, "held_out", 440.0, 400.0, 100.0, 40.0, 95.0, 3.0),
+    ("Arm_D", "first", "2026-03-05 06:00", 4.0, 2.0, None, None, None, None, None, None, None, None),
+]
+REPEATS = {"Arm_C.press_2": "Arm_C.press_1"}
+LEDGER = {  # run: effect, joint, J
+    "Arm_A.fit_1": "rigid_body j1 250, coulomb_friction j1 50, rigid_body j2 150, coulomb_friction j2 30",
+    "Arm_A.check_1": "rigid_body j1 150, coulomb_friction j1 50, rigid_body j2 450, coulomb_friction j2 110",
+    "Arm_A.idle_1": "rigid_body j1 30, coulomb_friction j1 10, rigid_body j2 20, coulomb_friction j2 8",
+    "Arm_B.work_1": "rigid_body j1 200, rigid_body j2 100",
+    "Arm_B.work_2": "rigid_body j1 300, rigid_body j2 316",
+    "Arm_C.press_1": "rigid_body j1 200, coulomb_friction j1 80, no_regeneration - 20",
+    "Arm_C.press_2": "rigid_body j1 196, coulomb_friction j1 80, no_regeneration - 24",
+}
+PARAMETERS = [  # robot, effect, joint, name, value, unit, lower, upper
+    ("Arm_A", "coulomb_friction", "j1", "Fc", 4.0, "N m", 3.9, 4.1),
+    ("Arm_A", "coulomb_friction", "j2", "Fc", 2.5, "N m", 2.3, 2.7),
+    ("Arm_A", "standby_power", None, "P0", 50.0, "W", 49.0, 51.0),
+    ("Arm_B", "standby_power", None, "P0", 20.0, "W", 18.0, 22.0),
+]
+FITS = [  # robot, run, joint, part, RMSE, R squared
+    ("Arm_A", "fit_1", "j1", "fit", 0.5, 0.99),
+    ("Arm_A", "fit_1", "j2", "fit", 0.4, 0.98),
+    ("Arm_A", "check_1", "j1", "held_out", 0.9, 0.95),
+    ("Arm_A", "check_1", "j2", "held_out", 1.2, 0.9),
+    ("Arm_A", "idle_1", "j2", "held_out", 0.2, 0.97),
+    ("Arm_B", "work_2", "j1", "held_out", 0.3, None),
+]
+
+
+def fill(workspace: Workspace) -> None:
+    """Put the fleet into a workspace's database."""
+    with Session(workspace.engine) as session, session.begin():
+        for row in [*_robots(), *_runs(), *_twins(), *_energies(), *_diagnoses()]:
+            session.add(row)
+            session.flush()
+
+
+def _robots() -> Iterator[Base]:
+    makers = {"Arm_A": ("Acme", 30.0), "Arm_B": ("Bolt", 20.0), "Arm_C": ("Acme", 25.0), "Arm_D": ("Bolt", None)}
+    for robot, (maker, weight) in makers.items():
+        yield schema.Robot(
+            robot_id=robot, name=robot, manufacturer=maker, type="articulated", weight_kg=weight, notes="{}",
+            controlled_axes=len(JOINTS[robot]), rated_payload_kg=5.0 if robot == "Arm_A" else None, simulated=True,
+            ambient_temperature_degc=21.0 if robot == "Arm_B" else None, urdf="<robot/>", urdf_sha256="0" * 64,
+            power_measured_at="dc_bus" if robot == "Arm_B" else "mains",
+        )  # fmt: skip
+        for position, joint in enumerate(JOINTS[robot], 1):
+            yield schema.Joint(
+                robot_id=robot, name=joint, position=position, kind="revolute", lower_limit_rad=-3.0,
+                upper_limit_rad=3.0, speed_limit_rad_s=4.0, torque_limit_nm=None if robot == "Arm_B" else 100.0,
+                gear_ratio=50.0 if robot == "Arm_A" else None,
+            )  # fmt: skip
+
+
+def _runs() -> Iterator[Base]:
+    for robot, name, start, seconds, payload, idle, *_ in RUNS:
+        run_id = f"{robot}.{name}"
+        yield schema.Run(
+            run_id=run_id, robot_id=robot, name=name, role="observed", payload_kg=payload, payload_com_x_m=0.0,
+            payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id), start_time=_moment(start),
+            start_time_from="log", run_time_s=seconds, sample_count=int(100 * seconds), sample_rate_hz=100.0,
+            file=f"runs/{name}.csv", sha256=f"log of {run_id}",
+        )  # fmt: skip
+        yield schema.Series(
+            series_id=f"measured {run_id}", run_id=run_id, kind="measured", path=f"series/{run_id}.parquet",
+            row_count=int(100 * seconds), columns="time,q_j1,power",
+        )  # fmt: skip
+        if idle is None:
+            continue
+        made = f"run_state.{run_id}"
+        yield _activity(made, robot, "run_state", "2026-03-05 12:00")
+        yield schema.RunState(run_id=run_id, current_state="standstill", idle_share=idle, activity_id=made)
+        for position, joint in enumerate(JOINTS[robot], 1):
+            yield schema.JointState(
+                run_id=run_id, joint=joint, robot_id=robot, joint_position_rad=0.1 * position, joint_speed_rad_s=0.0,
+                joint_acc_rad_s2=0.0, joint_torque_nm=-20.0 * position, activity_id=made,
+                joint_temperature_degc=40.0 if robot == "Arm_C" else None,
+            )  # fmt: skip
+
+
+def _twins() -> Iterator[Base]:
+    conditions = {"Arm_A": 42.0, "Arm_B": 250.0, "Arm_C": 30.0}
+    for robot, effects in EFFECTS.items():
+        made, twin = f"identification.{robot}", f"{robot}.t1"
+        yield _activity(made, robot, "identification", "2026-03-05 12:01")
+        yield schema.Twin(
+            twin_id=twin, robot_id=robot, created=_moment("2026-03-05 12:01"), file=f"twins/{twin}.json",
+            sha256=f"twin of {robot}", cutoff_hz=10.0, condition_number=conditions[robot], base_parameter_count=11,
+            split="by run", activity_id=made,
+        )  # fmt: skip
+        for effect in effects:
+            yield schema.TwinEffect(twin_id=twin, effect=effect, activity_id=made)
+        for of, name, *_, part in (run[:7] for run in RUNS):
+            if of == robot:
+                yield schema.TwinRun(twin_id=twin, run_id=f"{robot}.{name}", part=part, activity_id=made)
+    for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
+        yield schema.Parameter(
+            parameter_id=f"{robot}.t1.{effect}.{joint or 'robot'}.{name}", twin_id=f"{robot}.t1", robot_id=robot,
+            effect=effect, joint=joint, name=name, value=value, unit=unit, lower=lower, upper=upper,
+            activity_id=f"identification.{robot}",
+        )  # fmt: skip
+    yield schema.BaseParameter(
+        twin_id="Arm_A.t1", number=1, combination="Ia j1 + Izz l1", value=1.5, unit="kg m^2", lower=1.0, upper=2.0,
+        activity_id="identification.Arm_A",
+    )  # fmt: skip
+    for robot, name, joint, part, rmse, r_squared in FITS:
+        yield schema.TorqueFit(
+            twin_id=f"{robot}.t1", run_id=f"{robot}.{name}", joint=joint, part=part, robot_id=robot, rmse_nm=rmse,
+            r_squared=r_squared, activity_id=f"identification.{robot}",
+        )  # fmt: skip
+
+
+def _energies() -> Iterator[Base]:
+    for robot, name, _, seconds, _, _, part, measured, modelled, standby, returned, peak, rmse in RUNS:
+        if part is None:
+            continue
+        run_id, made = f"{robot}.{name}", f"energy.{robot}.{name}"
+        yield _activity(made, robot, "energy", "2026-03-05 12:02")
+        yield schema.RunEnergy(
+            run_id=run_id, twin_id=f"{robot}.t1", part=part, energy_consumption_j=measured, energy_from="measured",
+            run_power_w=measured / seconds, peak_power_w=peak, measured_energy_j=measured, modelled_energy_j=modelled,
+            energy_error_percent=100 * abs(modelled - measured) / measured, power_rmse_w=rmse, standby_energy_j=standby,
+            standby_share=standby / modelled, returned_energy_j=returned, activity_id=made,
+        )  # fmt: skip
+        yield schema.Series(
+            series_id=f"modelled {run_id}", run_id=run_id, kind="modelled", path=f"series/{run_id}.model.parquet",
+            row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
+        )  # fmt: skip
+        entries = [entry.split() for entry in f"standby_power - {standby}, {LEDGER[run_id]}".split(", ")]
+        for effect, joint, joules in entries:
+            yield schema.EnergyShare(
+                twin_id=f"{robot}.t1", run_id=run_id, effect=effect, joint=joint.replace("-", ""), robot_id=robot,
+                energy_j=float(joules), activity_id=made,
+            )  # fmt: skip
+        for joint in JOINTS[robot]:
+            taken = sum(float(joules) for _, at, joules in entries if at == joint)
+            yield schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot, energy_j=taken, activity_id=made)
+
+
+def _diagnoses() -> Iterator[Base]:
+    yield from _diagnosis("Arm_A", "attributed", 12.0)
+    yield from _cause("Arm_A", 1, "coulomb_friction", "j2", "changed", 0.9, ("Fc", 0.8, "N m", 0.4, 1.2))
+    yield from _cause("Arm_A", 2, "viscous_friction", "j1", "changed", 0.6, ("Fv", 0.1, "N m s/rad", -0.1, 0.3))
+    of = {"diagnosis_id": "Arm_A.d1", "activity_id": "diagnosis.Arm_A"}
+    yield gap.GapLocation(
+        **of, robot_id="Arm_A", rank=1, channel="torque", joint="j2", regime="low_speed", follows="speed", share=0.7
+    )
+    yield gap.GapLocation(**of, robot_id="Arm_A", rank=2, channel="power", share=0.2)
+    yield gap.GapShrinkage(**of, closed_fraction=0.8, lower=0.7, upper=0.9)
+    yield gap.GapChange(
+        **of, measure="torque_rmse", part="together", place=0, before=1.0, after=0.4, noise_floor=0.3, lower=0.35,
+        upper=0.45, unit="N m",
+    )  # fmt: skip
+    yield gap.GapChange(**of, measure="torque_rmse", part="alone", place=1, rank=1, before=1.0, after=0.6, unit="N m")
+    yield gap.GapNotTestable(**of, number=1, effect="payload", why="no run carries a load")
+    yield from _diagnosis("Arm_B", "ambiguous", 5.0)
+    of = {"diagnosis_id": "Arm_B.d1", "activity_id": "diagnosis.Arm_B"}
+    yield from _cause("Arm_B", 1, "payload", None, "missing", 0.5, ("m", 1.5, "kg", 1.3, 1.7))
+    yield from _cause("Arm_B", 2, "torque_constant_error", "j2", "missing", 0.4, ("g", 0.1, "1", 0.05, 0.15))
+    yield gap.GapCauseRival(**of, rank=1, effect="torque_constant_error")
+    yield gap.GapCauseRival(**of, rank=2, effect="payload")
+    yield gap.GapExperiment(**of, description='{"motions": ["lift a known mass"]}')
+    yield from _diagnosis("Arm_C", "unexplained", None)
+
+
+def _diagnosis(robot: str, verdict: str, error: float | None) -> Iterator[Base]:
+    made = f"diagnosis.{robot}"
+    yield _activity(made, robot, "diagnosis", "2026-03-06 12:00")
+    yield gap.GapDiagnosis(
+        diagnosis_id=f"{robot}.d1", robot_id=robot, verdict=verdict, created=_moment("2026-03-06 12:00"),
+        energy_error_percent=error, noise_floor_from="repeats", file=f"diagnoses/{robot}.d1.json", sha256="2" * 64,
+        evidence_file=f"diagnoses/{robot}.d1.evidence.json", evidence_sha256="3" * 64, activity_id=made,
+    )  # fmt: skip
+
+
+def _cause(
+    robot: str, rank: int, effect: str, joint: str | None, scope: str, confidence: float, parameter: tuple[Any, ...]
+) -> Iterator[Base]:
+    of: dict[str, Any] = {"diagnosis_id": f"{robot}.d1", "rank": rank, "activity_id": f"diagnosis.{robot}"}
+    yield gap.GapCause(**of, robot_id=robot, effect=effect, scope=scope, confidence=confidence, evidence="{}")
+    if joint is not None:
+        yield gap.GapCauseJoint(**of, robot_id=robot, joint=joint)
+    name, value, unit, lower, upper = parameter
+    yield gap.GapCauseParameter(
+        **of, robot_id=robot, number=1, joint=joint, name=name, value=value, unit=unit, lower=lower, upper=upper
+    )
+
+
+def _activity(activity_id: str, robot: str, provider: str, ended: str) -> Base:
+    return schema.Activity(
+        activity_id=activity_id, robot_id=robot, provider=provider, subject=f"{ID}robot/{robot}", software=SOFTWARE,
+        started=_moment("2026-03-05 12:00"), ended=_moment(ended),
+    )  # fmt: skip
+
+
+def _moment(text: str) -> datetime:
+    return datetime.fromisoformat(text).replace(tzinfo=UTC)
