@@ -134,6 +134,14 @@ class KnowledgeGraph:
         found = (self._store.quads_for_pattern(it.subject, it.predicate, it.object, None) for it in triples)
         return (quad for quads in found for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
 
+    def graphs_with(self, triple: Triple) -> list[str]:
+        """Return the IRIs of the named graphs that hold a triple."""
+        return [quad.graph_name.value for quad in self._holding([triple]) if isinstance(quad.graph_name, NamedNode)]
+
+    def holds(self, triple: Triple) -> bool:
+        """Whether some named graph holds a triple."""
+        return next(iter(self._holding([triple])), None) is not None
+
     def graphs(self, *below: str) -> list[str]:
         """Return the IRIs of the named graphs, of all or of those that start with one of `below`."""
         return sorted(name for name in _names(self._store) if not below or name.startswith(below))

@@ -51,6 +51,8 @@ def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
     Pellet is given only what the rules speak of: with whole individuals it would take minutes.
     """
     terms = _terms_of_rules()
+    if not any(_speaks_of(fact, terms) for fact in facts):
+        return set()
     world = _world([*_swrl_rules(), *facts])
     try:
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, debug=0)

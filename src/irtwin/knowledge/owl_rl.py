@@ -88,9 +88,14 @@ class Closure:
                 kept.update(list(terms.triples(fact))[:1])
         return kept
 
-    def why(self, triple: Triple) -> Derivation | None:
-        """Return how a triple was first inferred; None where it was given, or does not follow."""
-        return self._why(self._terms.fact(triple))
+    def why(self, statement: Statement | Triple) -> Derivation | None:
+        """Return how a statement was first inferred; None where it was given, does not follow, or needs no premise."""
+        subject, predicate, object = map(self._terms.number, statement)
+        return self._why((subject, predicate, object))
+
+    def is_helper(self, statement: Statement) -> bool:
+        """Whether a statement is one that the rules make for themselves, to walk along lists."""
+        return self._terms.number(statement[1]) in self._helpers()
 
     def _why(self, conclusion: Fact) -> Derivation | None:
         if conclusion in self._given or conclusion not in self._round:

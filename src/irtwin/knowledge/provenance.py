@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.table import Row
 
 _MAKERS = """
 SELECT ?activity ?provider ?software ?finished
@@ -26,7 +26,18 @@ _FILES = (
     "SELECT ?file ?checksum WHERE { ?thing irt:File ?file OPTIONAL { ?thing irt:Checksum ?checksum } } ORDER BY ?file"
 )
 
+_RUN = "SELECT ?run WHERE { ?thing irt:series_of ?run FILTER NOT EXISTS { ?thing prov:wasGeneratedBy ?activity } }"
+
 _MENTIONED = "ASK { { ?thing ?p ?o } UNION { ?s ?p ?thing } }"
+
+
+_ACTIVITY = """
+SELECT ?activity ?provider ?software ?finished
+WHERE {
+  OPTIONAL { ?activity prov:wasAssociatedWith ?provider }
+  OPTIONAL { ?activity irt:Software ?software }
+  OPTIONAL { ?activity prov:endedAtTime ?finished }
+}"""
 
 
 @dataclass(frozen=True)
@@ -59,24 +70,49 @@ def trace(graph: KnowledgeGraph, thing: str) -> tuple[Step, ...]:
     return tuple(_back(graph, thing, 0, set()))
 
 
+def makers(graph: KnowledgeGraph, thing: str) -> list[Row]:
+    """Return the activities that made a thing, each with its provider, software and when it finished."""
+    return list(graph.query(_MAKERS, {"thing": thing}))
+
+
+def activity(graph: KnowledgeGraph, iri: str) -> Row:
+    """Return what is known of an activity, like `makers`."""
+    return {**next(iter(graph.query(_ACTIVITY, {"activity": iri})), {}), "activity": iri}
+
+
+def used_by(graph: KnowledgeGraph, activity: str) -> list[str]:
+    """Return the IRIs of what an activity used."""
+    return [row["entity"] for row in graph.query(_INPUTS, {"activity": activity})]
+
+
+def recorded_of(graph: KnowledgeGraph, series: str) -> list[str]:
+    """Return the IRI of the run that samples are of, where no activity made them."""
+    return [row["run"] for row in graph.query(_RUN, {"thing": series})]
+
+
+def file_of(graph: KnowledgeGraph, thing: str) -> tuple[str | None, str | None]:
+    """Return the path and the checksum of the file that a thing is kept in, as far as they are known."""
+    found = next(iter(graph.query(_FILES, {"thing": thing})), {})
+    return (found.get("file"), found.get("checksum"))
+
+
 def _back(graph: KnowledgeGraph, thing: str, depth: int, seen: set[str]) -> Iterator[Step]:
     if thing in seen:
         return
     seen.add(thing)
-    file: dict[str, Any] = next(iter(graph.query(_FILES, {"thing": thing})), {})
-    makers = [row for row in graph.query(_MAKERS, {"thing": thing})] or [{}]
-    for maker in makers:
+    file, checksum = file_of(graph, thing)
+    made_by = makers(graph, thing)
+    for maker in made_by or [{}]:
         yield Step(
             depth=depth,
             thing=thing,
-            file=file.get("file"),
-            checksum=file.get("checksum"),
+            file=file,
+            checksum=checksum,
             activity=maker.get("activity"),
             provider=maker.get("provider"),
             software=maker.get("software"),
             finished=maker.get("finished"),
         )
-    for maker in makers:
-        if maker:
-            for row in graph.query(_INPUTS, {"activity": maker["activity"]}):
-                yield from _back(graph, row["entity"], depth + 1, seen)
+    for maker in made_by:
+        for entity in used_by(graph, maker["activity"]):
+            yield from _back(graph, entity, depth + 1, seen)

@@ -30,6 +30,13 @@ from irtwin.resources import folder
 _NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION)
 _DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
 
+_AROUND = f"""
+CONSTRUCT {{ ?s ?p ?o }}
+WHERE {{
+  {{ VALUES ?s {{ ?nodes }} GRAPH ?g {{ ?s ?p ?o }} }} UNION {{ VALUES ?o {{ ?nodes }} GRAPH ?g {{ ?s ?p ?o }} }}
+  FILTER(?g NOT IN (<{GRAPH_OWL_RL}>, <{GRAPH_REASONED}>, <{GRAPH_VALIDATION}>))
+}}"""
+
 Contents = Mapping[str, set[Triple]]  # of named graphs, by their IRIs
 
 
@@ -65,6 +72,18 @@ def asserted(graph: KnowledgeGraph) -> set[Triple]:
     """Return what nobody inferred: ontology, mapped sources, activities, and what SPARQL updates wrote."""
     names = [name for name in graph.graphs() if not name.startswith(_NOT_ASSERTED)]
     return graph.triples(*names) if names else set()
+
+
+def not_closed(graph: KnowledgeGraph) -> set[Triple]:
+    """Return what the closure was made of: what is asserted, and what rules concluded."""
+    names = [name for name in graph.graphs() if not name.startswith((GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION))]
+    return graph.triples(*names) if names else set()
+
+
+def around(graph: KnowledgeGraph, nodes: Iterable[NamedNode]) -> set[Triple]:
+    """Return that part of `not_closed` that has one of the nodes for subject or object."""
+    values = " ".join(map(str, nodes))
+    return graph.construct(_AROUND.replace("?nodes", values))
 
 
 def check_consistency(graph: KnowledgeGraph) -> None:

@@ -63,6 +63,13 @@ def graph_of(rule: str) -> str:
     return f"{GRAPH_SHACL}/{quote(re.split('[/#]', rule)[-1], safe='')}"
 
 
+def group_of(construct: str) -> tuple[str, str]:
+    """Return the prologue of a rule's CONSTRUCT, and what stands within its WHERE { }."""
+    body = _BODY.search(masked(construct))
+    assert body is not None
+    return construct[: body.start()], construct[body.end() : masked(construct).rindex("}")]
+
+
 def conclusions(triples: Iterable[Triple], rules: Iterable[ShaclRule]) -> dict[str, set[Triple]]:
     """Run rules until nothing is new; return what each concludes, by its name, be it known already or not.
 

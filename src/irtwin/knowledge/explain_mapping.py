@@ -1,0 +1,52 @@
+"""Which triples map of which R2RML mapping says a triple, and from which table."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+from pyoxigraph import NamedNode, Triple
+
+from irtwin.knowledge.mapping.document import LogicalTable, TriplesMap
+from irtwin.knowledge.mapping.reader import read_document
+from irtwin.knowledge.vocabulary import RDF
+from irtwin.resources import folder
+
+_TYPE = NamedNode(RDF + "type")
+
+
+def mapping_of(triple: Triple) -> str:
+    """Return, in words, the first triples map of the shipped mappings that may have made a triple."""
+    for where, triples_map in _triples_maps():
+        if _says(triples_map, triple):
+            return f"mapping {where}, {_table(triples_map.table)}"
+    return "a mapping"
+
+
+@cache
+def _triples_maps() -> tuple[tuple[str, TriplesMap], ...]:
+    """Return the triples maps of `mappings/`, each with its name beside that of its file."""
+    return tuple(
+        (f"mappings/{file.name} #{re.split('[#/]', getattr(node, 'value', ''))[-1]}", triples_map)
+        for file in sorted(folder("mappings").glob("*.r2rml.ttl"))
+        for node, triples_map in read_document(file).triples_maps.items()
+    )
+
+
+def _says(triples_map: TriplesMap, triple: Triple) -> bool:
+    if triples_map.subject.constant != triple.subject and not _fits(triples_map, triple.subject):
+        return False
+    if triple.predicate == _TYPE and triple.object in triples_map.classes:
+        return True
+    return any(triple.predicate == each.constant for pair in triples_map.properties for each in pair.predicates)
+
+
+def _fits(triples_map: TriplesMap, subject: object) -> bool:
+    parts = (re.escape(part) if isinstance(part, str) else "[^/]+" for part in triples_map.subject.template)
+    return isinstance(subject, NamedNode) and re.fullmatch("".join(parts), subject.value) is not None
+
+
+def _table(table: LogicalTable) -> str:
+    if table.query is not None:
+        return f"from {' '.join(table.query.split())}"
+    return f"from table {'.'.join(part.name for part in table.table)}"

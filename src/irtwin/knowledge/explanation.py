@@ -1,0 +1,53 @@
+"""How something is known: what an explanation is, and how it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A triple or an individual, with prefixes; who or what says it; and from what, down to files.
+
+    `meaning` is what the rule or provider does, in words. `file` and `checksum` are of the individual's own file, or
+    of the document that says the triple.
+    """
+
+    what: str
+    by: str
+    because: tuple[Explanation, ...] = ()
+    meaning: str | None = None
+    file: str | None = None
+    checksum: str | None = None
+
+
+def to_text(explanation: Explanation) -> str:
+    """Write an explanation as an indented outline."""
+    return "\n".join(_lines(explanation, ""))
+
+
+def to_json(explanation: Explanation) -> dict[str, Any]:
+    """Write an explanation as nested objects, for JSON; what it lacks is left out."""
+    plain = {name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "checksum")}
+    found = {name: value for name, value in plain.items() if value is not None}
+    if explanation.because:
+        found["because"] = [to_json(each) for each in explanation.because]
+    return found
+
+
+def _lines(explanation: Explanation, margin: str) -> Iterator[str]:
+    yield margin + explanation.what
+    inner = margin + "    "
+    if explanation.by:
+        yield f"{inner}by {explanation.by}"
+    if explanation.meaning:
+        yield f"{inner}({explanation.meaning})"
+    if explanation.file:
+        checksum = f", sha256 {explanation.checksum}" if explanation.checksum else ""
+        yield f"{inner}file {explanation.file}{checksum}"
+    for each in explanation.because:
+        first, *rest = _lines(each, inner + "  ")
+        yield f"{inner}- {first.lstrip()}"
+        yield from rest

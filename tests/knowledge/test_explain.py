@@ -1,0 +1,136 @@
+"""How a triple is known, on two robots whose every fact has a known source."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from pyoxigraph import Quad
+
+from irtwin.errors import InputError
+from irtwin.knowledge import explain as explaining
+from irtwin.knowledge.explain import explain
+from irtwin.knowledge.explanation import Explanation, to_json, to_text
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+
+
+@pytest.fixture(scope="module")
+def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    reason(graph)
+    return graph
+
+
+def only(graph: KnowledgeGraph, pattern: str) -> Explanation:
+    (found,) = explain(graph, pattern)
+    return found
+
+
+def all_within(explanation: Explanation) -> Iterator[Explanation]:
+    yield explanation
+    for each in explanation.because:
+        yield from all_within(each)
+
+
+def test_rules_conclusion_is_followed_down_to_files(reasoned: KnowledgeGraph) -> None:
+    found = only(reasoned, "id:twin/Arm_A.t1 a irt:Twin_To_Reidentify")
+    assert found.by == 'the rule "twin to identify again", in SHACL and in SWRL'
+    assert found.meaning is not None and "misses the energy" in found.meaning
+    assert {each.what for each in found.because} == {
+        'id:run/Arm_A.check_1 irt:Energy_Error "12"^^xsd:double',
+        'id:run/Arm_A.check_1 irt:Part_In_Twin "held_out"',
+        "id:run/Arm_A.check_1 irt:modelled_by id:twin/Arm_A.t1",
+        'irt:default_Limits irt:Energy_Error_Limit "10"^^xsd:double',
+    }
+    files = {each.file: each.checksum for each in all_within(found) if each.file}
+    assert files == {
+        "twins/Arm_A.t1.json": "bbArm_A",
+        "series/aafit_1.parquet": "aafit_1",
+        "ontology/energy.ttl": None,
+    }
+    assert any("provider:identification of irtwin 0.1.0, finished 2026-03-05" in each.by for each in all_within(found))
+    assert "id:run/Arm_A.fit_1" in {each.what for each in all_within(found)}
+
+
+def test_rule_with_an_aggregate_names_what_it_took(reasoned: KnowledgeGraph) -> None:
+    found = only(reasoned, "id:run/Arm_A.fit_1 irt:dominant_Joint ?")
+    assert found.by == 'the rule "dominant joint", in SHACL'
+    assert 'id:joint_energy/Arm_A.fit_1/j1 irt:Energy "300"^^xsd:double' in {each.what for each in found.because}
+
+
+def test_closure_names_rule_and_premises(reasoned: KnowledgeGraph) -> None:
+    found = only(reasoned, "id:joint/Arm_A/j1 irt:joint_of id:robot/Arm_A")
+    assert found.by == "OWL 2 RL, rule prp-inv2"
+    axiom, fact = found.because
+    assert (axiom.what, axiom.file) == ("irt:joint_of owl:inverseOf irt:has_Joint", "ontology/robot.ttl")
+    assert fact.by == "mapping mappings/robot.r2rml.ttl #Joint_Of_Robot, from table joint"
+
+
+def test_source_names_triples_map_and_table(reasoned: KnowledgeGraph) -> None:
+    found = only(reasoned, "id:run/Arm_A.fit_1 irt:Run_Role")
+    assert found.by == "mapping mappings/run_process.r2rml.ttl #Run, from table run"
+    measured = only(reasoned, "id:series/aa/Arm_A.fit_1 irt:Series_Kind")
+    assert "SELECT * FROM series WHERE activity_id IS NULL" in measured.by
+    assert (measured.file, measured.checksum) == ("series/aafit_1.parquet", "aafit_1")
+
+
+def test_every_inferred_triple_is_explained(reasoned: KnowledgeGraph) -> None:
+    explainer = explaining.Explainer(reasoned)
+    for triple in sorted(reasoned.triples("https://w3id.org/irtwin/graph/inferred/"), key=str):
+        found = explainer.triple(triple)
+        assert found.because or found.by == "what is said above", found
+
+
+def test_premises_far_from_the_triple_are_found() -> None:
+    graph = KnowledgeGraph()
+    links = " ".join(f"ex:a{i} ex:next ex:a{i + 1} ." for i in range(9))
+    graph.update("PREFIX ex: <https://example.org/> INSERT DATA { ex:next a owl:TransitiveProperty . " + links + "}")
+    reason(graph)
+    found = only(graph, "<https://example.org/a0> <https://example.org/next> <https://example.org/a9>")
+    assert found.by == "OWL 2 RL, rule prp-trp"
+    stated = {each.what for each in all_within(found) if each.by.startswith("what was written into")}
+    assert len(stated) == 10
+
+
+def test_class_expressions_and_lists_are_walked() -> None:
+    graph = KnowledgeGraph()
+    graph.update(
+        """PREFIX ex: <https://example.org/> INSERT DATA {
+            ex:D owl:equivalentClass [ owl:intersectionOf ( ex:A ex:B ex:C ) ] . ex:x a ex:A, ex:B, ex:C . }"""
+    )
+    reason(graph)
+    found = only(graph, "https://example.org/x a https://example.org/D")
+    said = {each.what for each in all_within(found)}
+    assert {f"https://example.org/x rdf:type https://example.org/{name}" for name in "ABC"} <= said
+    assert not any("urn:irtwin" in what for what in said)
+
+
+def test_written_as_outline_and_as_json(reasoned: KnowledgeGraph) -> None:
+    found = only(reasoned, "id:joint/Arm_A/j1 irt:joint_of ?")
+    text = to_text(found)
+    assert text.splitlines()[:3] == [
+        "id:joint/Arm_A/j1 irt:joint_of id:robot/Arm_A",
+        "    by OWL 2 RL, rule prp-inv2",
+        "    - irt:joint_of owl:inverseOf irt:has_Joint",
+    ]
+    document = json.loads(json.dumps(to_json(found)))
+    assert document["because"][0]["file"] == "ontology/robot.ttl"
+    assert "checksum" not in document
+
+
+@pytest.mark.parametrize(
+    ("pattern", "message"),
+    [
+        ("id:run/nobody irt:Payload ?", "holds no triple id:run/nobody"),
+        ("? ? ?", "more than 100 triples fit"),
+        ("irt:a irt:b irt:c irt:d", "more than subject, predicate and object"),
+        ("irt:a { irt:c", "not a SPARQL query"),
+        ("nobody:a irt:b irt:c", "not a SPARQL query"),
+    ],
+)
+def test_pattern_that_cannot_be_explained_is_refused(reasoned: KnowledgeGraph, pattern: str, message: str) -> None:
+    with pytest.raises(InputError, match=message.replace("?", r"\?")):
+        explain(reasoned, pattern)
