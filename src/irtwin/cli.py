@@ -259,6 +259,22 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     )
 
 
+@cli.command()
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("irtwin-ontology.html"),
+    show_default=True,
+    help="HTML page to write.",
+)
+def docs(out: Path) -> None:
+    """Write the ontology's documentation as one HTML page."""
+    from irtwin.report.ontology import write_page
+
+    write_page(out)
+    click.echo(out)
+
+
 @cli.command("map")
 @click.argument("mapping", type=click.Path(path_type=Path))
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")

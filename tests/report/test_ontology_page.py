@@ -1,0 +1,109 @@
+"""The ontology's documentation page."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from pyoxigraph import NamedNode, RdfFormat, parse
+
+from irtwin.cli import cli
+from irtwin.report.class_tree import Node, class_tree
+from irtwin.report.ontology import page, read_modules
+from irtwin.resources import folder
+
+IRT = "https://w3id.org/irtwin#"
+
+
+class Anchors(HTMLParser):
+    """Where the page can be led to, where it leads, and what it would load."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: set[str] = set()
+        self.loaded: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        said = dict(attrs)
+        if "id" in said:
+            self.ids.append(said["id"] or "")
+        if "href" in said:
+            self.links.add(said["href"] or "")
+        if "src" in said or tag in ("link", "script", "iframe"):
+            self.loaded.add(tag)
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return page(read_modules(folder("ontology")))
+
+
+@pytest.fixture(scope="module")
+def anchors(text: str) -> Anchors:
+    return Anchors(text)
+
+
+def declared() -> set[str]:
+    return {
+        quad.subject.value
+        for file in folder("ontology").glob("*.ttl")
+        for quad in parse(path=str(file), format=RdfFormat.TURTLE)
+        if isinstance(quad.subject, NamedNode) and quad.subject.value.startswith(IRT)
+    }
+
+
+def test_each_term_has_the_anchor_of_its_iri(anchors: Anchors) -> None:
+    assert {iri.removeprefix(IRT) for iri in declared()} <= set(anchors.ids)
+    assert {"effect/coulomb_friction", "unit:N-M", "sosa:Platform"} <= set(anchors.ids)
+
+
+def test_no_anchor_stands_twice_and_no_link_leads_nowhere(anchors: Anchors) -> None:
+    assert len(anchors.ids) == len(set(anchors.ids))
+    assert {link.removeprefix("#") for link in anchors.links} <= set(anchors.ids)
+
+
+def test_the_page_needs_no_network(anchors: Anchors, text: str) -> None:
+    assert all(link.startswith("#") for link in anchors.links)
+    assert anchors.loaded == set()
+    assert "default-src &#39;none&#39;" in text
+
+
+def test_what_the_page_says_of_a_property(text: str) -> None:
+    article = re.search(r'<article id="Energy_Error">.*?</article>', text, re.DOTALL)
+    assert article is not None
+    said = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", article[0]))
+    for words in (
+        "energy error irt:Energy_Error",
+        "Difference of modelled and measured energy over the measured",
+        "domain industrial robot run process",
+        "range xsd:double",
+        "characteristics functional",
+        "unit unit:PERCENT (%)",
+        "example 6.54",
+        "source Yan et al. (2018), equation (15)",
+    ):
+        assert words in said
+
+
+def test_effects_show_their_equations_and_alignments_their_superclasses(text: str) -> None:
+    assert "Fv dq" in text
+    assert '<a href="#sosa:Platform">sosa:Platform</a>' in text
+
+
+def test_the_tree_draws_what_is_below_and_escapes_what_it_is_given() -> None:
+    drawn = class_tree({"one": [Node("a", "A", ["x:<B>"], [Node("b", "B", [], []), Node("c", "C", [], [])])]})
+    assert drawn.count("<circle") == 3
+    assert drawn.count("<path") == 3
+    assert "x:&lt;B&gt;" in drawn
+    assert "<B>" not in drawn
+
+
+def test_the_command_writes_the_page(tmp_path: Path) -> None:
+    out = tmp_path / "ontology.html"
+    assert CliRunner().invoke(cli, ["docs", "--out", str(out)]).exit_code == 0
+    assert "industrial robots and the energy they use" in out.read_text(encoding="utf-8")
