@@ -17,7 +17,7 @@ from irtwin.providers.records import load_robot, load_run, run_iri
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
-from irtwin.storage.database import TWINS, Workspace
+from irtwin.storage.database import LIVE, TWINS, Workspace
 from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
@@ -30,7 +30,8 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
     with workspace.reading() as session:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
         in_order = select(schema.Run.run_id).order_by(schema.Run.start_time, schema.Run.run_id)
-        run_ids = session.scalars(in_order.where(schema.Run.robot_id == robot_id)).all()
+        taken_in = (schema.Run.robot_id == robot_id, schema.Run.role != LIVE)
+        run_ids = session.scalars(in_order.where(*taken_in)).all()
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     cutoff = choose_cutoff(runs.values())
     motions = [condition(run, robot, cutoff) for run in runs.values()]

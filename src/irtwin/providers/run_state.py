@@ -12,7 +12,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import JointState, Run, RunState
 
 # A joint stands still below this share of its fastest speed in the run, or below a speed that no task needs.
-_STILL_SHARE, _STILL_SPEED = 0.005, 1e-3
+STILL_SHARE, STILL_SPEED = 0.005, 1e-3
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
@@ -47,4 +47,4 @@ def provide(workspace: Workspace, run_id: str) -> Made:
 def standstill(motion: Motion) -> np.ndarray:
     """Return where no joint moves, (N,) bool."""
     speed = np.abs(motion.dq)
-    return np.asarray((speed < np.maximum(_STILL_SPEED, _STILL_SHARE * speed.max(axis=0))).all(axis=1))
+    return np.asarray((speed < np.maximum(STILL_SPEED, STILL_SHARE * speed.max(axis=0))).all(axis=1))

@@ -92,7 +92,7 @@ class Run(Base):
     run_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
     name: Mapped[str]
-    role: Mapped[str]
+    role: Mapped[str]  # as the data set says, or "live" for one that was watched, not taken in
     payload_kg: Mapped[float]
     payload_com_x_m: Mapped[float]
     payload_com_y_m: Mapped[float]
@@ -167,10 +167,22 @@ class JointState(Base):
     joint: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
     joint_position_rad: Mapped[float]
-    joint_speed_rad_s: Mapped[float]
-    joint_acc_rad_s2: Mapped[float]
+    joint_speed_rad_s: Mapped[float | None]
+    joint_acc_rad_s2: Mapped[float | None]
     joint_torque_nm: Mapped[float | None]
     joint_temperature_degc: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class LiveState(Base):
+    """How far a live run is, and how well the graph kept up with it."""
+
+    __tablename__ = "live_state"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    state_time: Mapped[datetime]  # of the joint states that the graph shows
+    superseded_states: Mapped[int | None]  # never shown, as a newer one was there; none where a crash forgot them
+    waited_s: Mapped[float | None]  # that the source was made to wait for storage; likewise
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

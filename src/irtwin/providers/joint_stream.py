@@ -1,0 +1,157 @@
+"""States of joints as they are streamed: one JSON object a line, fields as in ROS' sensor_msgs/JointState.
+
+{"robot": "KUKA_KR6_R700", "time": 1764583200.012, "position": [...], "velocity": [...], "effort": [...],
+ "temperature": [...], "power": 512.0}
+
+`time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must, the rest is not. Values are in the order of
+the robot's joints, base to flange, or in that of `name`. `payload`, kg, counts where a run begins.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import socketserver
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, BinaryIO, TypeGuard, cast
+
+from irtwin.errors import InputError
+
+LONGEST_LINE = 1 << 16  # bytes
+_PER_JOINT = ("velocity", "effort", "temperature")
+_GREATEST = 1e300  # neither NaN nor infinite, nor an integer beyond a float
+_LATEST = 253402300799.0  # s: the end of the year 9999
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """The joints of a robot at one moment: `time` in s since 1970, NaN for what was not said; payload None likewise.
+
+    position rad, velocity rad/s, effort N m, temperature degC, each (n,); power W; payload kg.
+    """
+
+    robot_id: str
+    time: float
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
+    effort: tuple[float, ...]
+    temperature: tuple[float, ...]
+    power: float
+    payload: float | None = None
+
+
+class StateReader:
+    """Reads lines for robots that are known: their joints' names, base to flange, by robot_id."""
+
+    def __init__(self, joints: Mapping[str, Sequence[str]]) -> None:
+        self._joints = {robot: tuple(names) for robot, names in joints.items()}
+        self._orders: dict[tuple[str, tuple[str, ...]], tuple[int, ...]] = {}
+
+    def read(self, line: bytes) -> State:
+        """Return the state that a line says. Raises InputError where it says none."""
+        if len(line) > LONGEST_LINE:
+            raise InputError(f"a line is longer than {LONGEST_LINE} bytes")
+        try:
+            said = json.loads(line)
+        except (ValueError, RecursionError):
+            raise InputError("a line is no JSON") from None
+        if not isinstance(said, dict):
+            raise InputError("a line is no JSON object")
+        robot = said.get("robot")
+        if not isinstance(robot, str) or robot not in self._joints:
+            raise InputError(f"no robot {robot!r} in the workspace: run its data set first; known are {self._known}")
+        order = self._order(robot, said.get("name"))
+        time = _number(said, "time")
+        if not 0.0 <= time <= _LATEST:
+            raise InputError("`time` is no time in s since 1970")
+        velocity, effort, temperature = (_numbers(said, name, order) for name in _PER_JOINT)
+        if "position" not in said:
+            raise InputError("`position` is missing")
+        power = _number(said, "power") if "power" in said else math.nan
+        payload = _number(said, "payload") if "payload" in said else None
+        position = _numbers(said, "position", order)
+        return State(robot, time, position, velocity, effort, temperature, power, payload)
+
+    @property
+    def _known(self) -> str:
+        return ", ".join(sorted(self._joints)[:10]) or "none"
+
+    def _order(self, robot: str, names: Any) -> tuple[int, ...]:
+        """Return the place in a message of each joint, (n,)."""
+        joints = self._joints[robot]
+        if names is None:
+            return tuple(range(len(joints)))
+        if not isinstance(names, list) or sorted(map(str, names)) != sorted(joints):
+            raise InputError(f"`name` is to name the joints of {robot}: {', '.join(joints)}")
+        key = (robot, tuple(names))
+        if key not in self._orders:
+            self._orders[key] = tuple(names.index(joint) for joint in joints)
+        return self._orders[key]
+
+
+def feed(
+    lines: Iterable[bytes], reader: StateReader, take: Callable[[State], None], refuse: Callable[[str], None]
+) -> None:
+    """Give each line's state on; a line that says none is refused by its reason and stops nothing."""
+    for line in lines:
+        if line.strip():
+            try:
+                take(reader.read(line))
+            except InputError as error:
+                refuse(str(error))
+
+
+def lines_of(stream: BinaryIO) -> Iterator[bytes]:
+    """Yield a stream's lines, of one that is too long its beginning: memory stays bounded."""
+    while line := stream.readline(LONGEST_LINE + 1):
+        rest = line
+        while len(rest) > LONGEST_LINE and not rest.endswith(b"\n"):
+            rest = stream.readline(LONGEST_LINE + 1)
+        yield line
+
+
+@contextmanager
+def listening(port: int, handle: Callable[[Iterator[bytes]], None]) -> Iterator[int]:
+    """Listen on this machine's own address, where `handle` gets the lines of each client; give the port."""
+
+    class Handler(socketserver.StreamRequestHandler):
+        def handle(self) -> None:
+            handle(lines_of(cast(BinaryIO, self.rfile)))
+
+    class Server(socketserver.ThreadingTCPServer):
+        allow_reuse_address = True
+        daemon_threads = True
+
+    try:
+        server = Server(("127.0.0.1", port), Handler)
+    except OSError as error:
+        raise InputError(f"port {port} cannot be listened on: {error.strerror}") from None
+    with server:
+        threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True).start()
+        try:
+            yield int(server.server_address[1])
+        finally:
+            server.shutdown()
+
+
+def _number(said: Mapping[str, Any], name: str) -> float:
+    value = said.get(name)
+    if not _is_number(value):
+        raise InputError(f"`{name}` is no number")
+    return float(value)
+
+
+def _is_number(value: Any) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and -_GREATEST < value < _GREATEST
+
+
+def _numbers(said: Mapping[str, Any], name: str, order: Sequence[int]) -> tuple[float, ...]:
+    if name not in said:
+        return (math.nan,) * len(order)
+    values = said[name]
+    if not isinstance(values, list) or len(values) != len(order) or not all(map(_is_number, values)):
+        raise InputError(f"`{name}` is to hold {len(order)} numbers, one for each joint")
+    return tuple([float(values[place]) for place in order])

@@ -1,0 +1,67 @@
+"""A run while it is watched: its newest state, and what still has to go into storage and into the graph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from pyoxigraph import Quad
+
+from irtwin.errors import InputError
+from irtwin.providers import live_run
+from irtwin.providers.joint_stream import State
+from irtwin.storage.journal import Header, Journal
+
+
+@dataclass
+class WatchedRun:
+    """A run that lasts. `waiting` is for storage; `shown` is what the graph says of it, None where that is unknown."""
+
+    header: Header
+    joints: Sequence[str]
+    journal: Journal
+    fastest: list[float]
+    began: float = math.nan
+    newest: State | None = None
+    speed: Sequence[float] = ()
+    acceleration: Sequence[float] = ()
+    count: int = 0
+    superseded: int = 0
+    due: bool = False  # the graph lacks the newest state
+    over: bool = False
+    waiting: list[State] = field(default_factory=list)
+    shown: set[Quad] | None = field(default_factory=set)
+
+    @property
+    def length(self) -> float:
+        """Seconds from the first state to the newest."""
+        return 0.0 if self.newest is None else self.newest.time - self.began
+
+    def take(self, state: State) -> None:
+        """Take the next state. Raises InputError where it is no later than the one before."""
+        before, speed_before = self.newest, self.speed
+        if before is None:
+            self.began, self.speed, self.acceleration = state.time, state.velocity, (math.nan,) * len(self.joints)
+        elif state.time <= before.time:
+            raise InputError(f"{state.robot_id}: a state of no later time than the one before; not stored")
+        else:
+            step = state.time - before.time
+            self.speed = live_run.speed_of(state, before)
+            self.acceleration = [(now - was) / step for now, was in zip(self.speed, speed_before, strict=True)]
+        self.fastest = [max(top, abs(now)) for top, now in zip(self.fastest, self.speed, strict=True)]
+        self.newest = state
+        self.count += 1
+        self.waiting.append(state)
+
+    def tables(self, waited: float) -> live_run.Tables:
+        """Return the rows of the run as it is now."""
+        now = self.newest
+        assert now is not None
+        at = live_run.Newest(now.time, now.position, self.speed, self.acceleration, now.effort, now.temperature)
+        current = "moving" if live_run.moving(self.speed, self.fastest) else "standstill"
+        return live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
+
+    def counts(self, waited: float) -> live_run.Values:
+        """Return what the graph says of how well it kept up."""
+        return {"superseded_states": self.superseded, "waited_s": waited}

@@ -1,0 +1,79 @@
+"""Samples on disk as they come, before they are a series: after a crash, all that was written is there.
+
+A file of one live run: a line of JSON that says which, then rows of float64. What a process wrote survives its end; a
+power failure may take what the operating system held back, some 30 s.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Rows = npt.NDArray[np.float64]
+_ENDING = ".journal"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a journal is of; `columns` of its rows, the first of which is `time`."""
+
+    run_id: str
+    robot_id: str
+    payload_kg: float
+    columns: tuple[str, ...]
+
+
+class Journal:
+    """A journal that is being written; locked, so that nobody takes it for one that a crash left."""
+
+    def __init__(self, folder: Path, header: Header) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.path = folder / f"{header.run_id}{_ENDING}"
+        self._file = os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_APPEND, 0o644)
+        fcntl.flock(self._file, fcntl.LOCK_EX)
+        self._write(json.dumps(asdict(header)).encode() + b"\n")
+
+    def append(self, rows: Rows) -> None:
+        """Write rows, (N, columns): they outlive this process when this returns. OSError where the disk is full."""
+        self._write(rows.tobytes())
+
+    def close(self) -> None:
+        """Let go of the file, which stays."""
+        os.close(self._file)
+
+    def _write(self, data: bytes) -> None:
+        view = memoryview(data)
+        while view:
+            view = view[os.write(self._file, view) :]
+
+
+def read_journal(path: Path) -> tuple[Header, Rows]:
+    """Read a journal; of a batch that a crash cut off, the whole rows before the cut. ValueError if it is none."""
+    content = path.read_bytes()
+    line, found, data = content.partition(b"\n")
+    if not found:
+        raise ValueError(f"{path}: ends within its header")
+    said = json.loads(line)
+    header = Header(**{**said, "columns": tuple(said["columns"])})
+    width = len(header.columns)
+    rows = np.frombuffer(data[: len(data) // (8 * width) * 8 * width]).reshape(-1, width)
+    rising = np.diff(rows[:, 0]) > 0  # a power failure may leave zeros at the end
+    return header, rows[: len(rows) if rising.all() else int(np.argmin(rising)) + 1]
+
+
+def left_behind(folder: Path) -> Iterator[Path]:
+    """Yield the journals that nobody writes: those of processes that crashed."""
+    for path in sorted(folder.glob(f"*{_ENDING}")):
+        with path.open("rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+        yield path

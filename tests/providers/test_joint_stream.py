@@ -1,0 +1,98 @@
+"""Lines of a stream: what they say, and what is refused."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import socket
+import threading
+from typing import Any
+
+import pytest
+
+from irtwin.errors import InputError
+from irtwin.providers.joint_stream import LONGEST_LINE, State, StateReader, feed, lines_of, listening
+
+READER = StateReader({"R": ["a1", "a2"]})
+GOOD: dict[str, Any] = {"robot": "R", "time": 5.5, "position": [0.1, 0.2]}
+
+
+def line(**changes: Any) -> bytes:
+    return json.dumps({key: value for key, value in {**GOOD, **changes}.items() if value is not ...}).encode()
+
+
+def test_a_full_line() -> None:
+    said = line(velocity=[1, 2], effort=[3, 4], temperature=[5, 6], power=7, payload=2.5)
+    assert READER.read(said) == State("R", 5.5, (0.1, 0.2), (1.0, 2.0), (3.0, 4.0), (5.0, 6.0), 7.0, 2.5)
+
+
+def test_what_is_not_said_is_nan() -> None:
+    state = READER.read(line())
+    assert all(map(math.isnan, [*state.velocity, *state.effort, *state.temperature, state.power]))
+    assert state.payload is None
+
+
+def test_values_follow_the_names() -> None:
+    state = READER.read(line(name=["a2", "a1"], velocity=[2, 1]))
+    assert (state.position, state.velocity) == ((0.2, 0.1), (1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        (b"{", "no JSON"),
+        (b"\xff\xfe", "no JSON"),
+        (b"[" * 60_000, "no JSON"),
+        (b"[1]", "no JSON object"),
+        (b" " * (LONGEST_LINE + 1), "longer than"),
+        (line(robot="S"), "no robot 'S' in the workspace.*known are R"),
+        (line(robot=["R"]), "no robot"),
+        (line(time=...), "`time` is no number"),
+        (line(time="5"), "`time` is no number"),
+        (line(time=-1), "since 1970"),
+        (line(time=1e18), "since 1970"),
+        (line(position=...), "`position` is missing"),
+        (line(position=[1]), "2 numbers"),
+        (line(position=[1, None]), "2 numbers"),
+        (line(position=[1, True]), "2 numbers"),
+        (line(position=[1, 10**400]), "2 numbers"),
+        (b'{"robot": "R", "time": NaN, "position": [1, 2]}', "`time` is no number"),
+        (b'{"robot": "R", "time": 1, "position": [1, Infinity]}', "2 numbers"),
+        (line(velocity=5), "`velocity` is to hold"),
+        (line(name=["a1"]), "`name` is to name the joints of R: a1, a2"),
+        (line(name=[["a1"], "a2"]), "`name` is to name"),
+        (line(power="x"), "`power` is no number"),
+    ],
+)
+def test_what_is_no_state_is_refused(said: bytes, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        READER.read(said)
+
+
+def test_a_bad_line_stops_nothing() -> None:
+    taken: list[State] = []
+    refused: list[str] = []
+    stream = io.BytesIO(line(time=1) + b"\n\nnonsense\n" + b"x" * (3 * LONGEST_LINE) + b"\n" + line(time=2))
+    feed(lines_of(stream), READER, taken.append, refused.append)
+    assert [state.time for state in taken] == [1.0, 2.0]
+    assert refused == ["a line is no JSON", f"a line is longer than {LONGEST_LINE} bytes"]
+
+
+def test_clients_on_a_port() -> None:
+    taken: list[State] = []
+    done = threading.Semaphore(0)
+
+    def handle(lines) -> None:
+        feed(lines, READER, taken.append, lambda reason: None)
+        done.release()
+
+    with listening(0, handle) as port:
+        for number in range(3):
+            with socket.create_connection(("127.0.0.1", port)) as client:
+                client.sendall(b"".join(line(time=10 * number + step) + b"\n" for step in range(5)))
+        for _ in range(3):
+            assert done.acquire(timeout=10)
+        with pytest.raises(InputError, match=f"port {port} cannot be listened on"), listening(port, handle):
+            pass
+    assert len(taken) == 15

@@ -1,0 +1,241 @@
+"""Robots that are watched: no sample lost, the graph current, and at the end a run like any other."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyoxigraph import Quad
+from sqlalchemy import select
+
+import rows
+from irtwin import resources
+from irtwin.errors import InputError
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.providers import live
+from irtwin.providers.joint_stream import State
+from irtwin.providers.live import LiveTwin
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Run
+
+NOON = 1772366400.0  # 2026-03-01T12:00:00Z
+UNSAID = (math.nan, math.nan)
+NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {
+  ?run irt:Run_Role "live" ; irt:Current_State ?state ; irt:State_Time ?time ; irt:Sample_Count ?count ;
+    irt:Superseded_States ?superseded ; irt:has_Joint_State ?joint .
+  ?joint irt:of_Joint <https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/joint_a1> ; irt:Joint_Position ?q }"""
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[Workspace]:
+    with Workspace(tmp_path) as place:
+        place.ingest(*rows.data_set())
+        yield place
+
+
+@pytest.fixture
+def graph(place: Workspace) -> Iterator[KnowledgeGraph]:
+    with KnowledgeGraph(place.graph_folder) as graph:
+        yield graph
+
+
+def state(number: int, robot: str = rows.ROBOT, said: bool = True) -> State:
+    """A swing at 100 Hz of two joints, the second at rest."""
+    at = 0.01 * number
+    speed = (math.cos(at), 0.0) if said else UNSAID
+    return State(robot, NOON + at, (math.sin(at), 0.5), speed, (10.0, -3.0), UNSAID, 400.0 + number)
+
+
+def quads(graph: KnowledgeGraph) -> set[Quad]:
+    below = (GRAPH_SOURCE, GRAPH_ACTIVITY)
+    found = graph.answer("SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } }")
+    return {
+        Quad(r["s"], r["p"], r["o"], r["g"])
+        for r in found
+        if r["g"].value.startswith(below) and not r["g"].value.endswith("/version")
+    }
+
+
+def mapped(place: Workspace) -> set[Quad]:
+    with KnowledgeGraph() as fresh:
+        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+        fresh.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        return quads(fresh)
+
+
+def live_run(place: Workspace) -> Run:
+    with place.reading() as session:
+        return session.scalars(select(Run).where(Run.role == "live")).one()
+
+
+def wait_for(condition) -> None:
+    until = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < until, "it never came"
+        time.sleep(0.01)
+
+
+def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        for number in range(100):
+            twin.receive(state(number))
+        wait_for(lambda: graph.query(NOW) and graph.query(NOW)[0]["count"] == 100)
+        (row,) = graph.query(NOW)
+        assert row["time"].timestamp() == pytest.approx(NOON + 0.99, abs=1e-6)
+        assert (row["state"], row["q"]) == ("moving", pytest.approx(math.sin(0.99)))
+        assert row["superseded"] == twin.superseded <= 99
+        assert graph.query("ASK { ?run irt:run_of id:robot\\/KUKA_KR6_R700 ; irt:Run_Role 'live' }")[0]["answer"]
+        for number in range(100, 130):
+            twin.receive(State(rows.ROBOT, NOON + 0.01 * number, (1.0, 0.5), (0.0, 0.0), UNSAID, UNSAID, math.nan))
+        wait_for(lambda: graph.query(NOW)[0]["state"] == "standstill")
+        assert len(graph.query(NOW)) == 1
+
+
+@pytest.mark.parametrize("said", [True, False])
+def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: KnowledgeGraph, said: bool) -> None:
+    with LiveTwin(place, graph) as twin:
+        for number in range(500):
+            twin.receive(state(number, said=said))
+        wait_for(lambda: graph.query(NOW) and graph.query(NOW)[0]["count"] == 500)
+        shown = {quad for quad in quads(graph) if quad.predicate.value.endswith(("Joint_Speed", "Joint_Acc"))}
+    assert twin.stored == 500
+    run = live_run(place)
+    table = place.read_series(run.run_id)
+    assert table.column_names[:3] == ["time", "q_joint_a1", "q_joint_a2"]
+    assert ("dq_joint_a1" in table.column_names) == said
+    assert not {"temp_joint_a1"} & set(table.column_names)  # never said
+    np.testing.assert_allclose(table["time"].to_numpy(), 0.01 * np.arange(500), atol=1e-6)
+    np.testing.assert_array_equal(table["power"].to_numpy(), 400.0 + np.arange(500))
+    assert (run.sample_count, run.sample_rate_hz) == (500, pytest.approx(100.0))
+    assert quads(graph) == mapped(place)
+    assert shown <= quads(graph)  # what was shown last is what the run ended with
+    energy = graph.query(f"SELECT (series:integral(id:run\\/{run.run_id}, 'power', 0, 10) AS ?e) {{}}")
+    assert energy[0]["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
+    assert not list((place.folder / "live").iterdir())
+
+
+def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        twin.receive(state(0))
+        twin.receive(state(1))
+    assert place.ingest(*rows.data_set()) == "unchanged"
+    robot, joints, runs, series = rows.data_set()
+    robot.weight_kg = 51.0
+    assert place.ingest(robot, joints, runs, series) == "replaced"
+    assert place.read_series(live_run(place).run_id).num_rows == 2
+    place.drop_robot(rows.ROBOT)
+    with place.reading() as session:
+        assert not session.scalars(select(Run)).all()
+
+
+def test_a_long_stream_becomes_several_runs(
+    place: Workspace, graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "RUN_SECONDS", 1.0)
+    monkeypatch.setattr(live, "BATCH", 0.01)
+    with LiveTwin(place, graph) as twin:
+        for number in range(450):
+            twin.receive(state(number))
+            if number % 50 == 0:
+                time.sleep(0.05)
+    with place.reading() as session:
+        runs = session.scalars(select(Run).where(Run.role == "live").order_by(Run.start_time)).all()
+    assert len(runs) > 1
+    assert sum(run.sample_count for run in runs) == 450
+    power = np.concatenate([place.read_series(run.run_id)["power"].to_numpy() for run in runs])
+    np.testing.assert_array_equal(power, 400.0 + np.arange(450))
+    assert quads(graph) == mapped(place)
+
+
+def test_states_that_are_not_later_are_refused(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        twin.receive(state(5))
+        for number in (5, 4):
+            with pytest.raises(InputError, match="no later time"):
+                twin.receive(state(number))
+        twin.receive(state(6))
+    assert live_run(place).sample_count == 2
+    with pytest.raises(InputError, match="watching is over"):
+        twin.receive(state(7))
+
+
+def test_where_storage_is_slow_the_source_waits(
+    place: Workspace, graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "MOST_WAITING", 10)
+    lines: list[str] = []
+    with LiveTwin(place, graph, lines.append) as twin:
+        for number in range(50):
+            twin.receive(state(number))
+        assert twin.waited > 0.1
+    assert twin.stored == live_run(place).sample_count == 50
+    assert lines == ["storage cannot keep up: the source waits (back-pressure); no sample is lost"]
+    (row,) = graph.query("SELECT ?waited { ?run irt:Run_Role 'live' ; irt:Source_Waited ?waited }")
+    assert row["waited"] == pytest.approx(twin.waited)
+
+
+def test_what_stops_the_work_is_told_to_the_source(
+    place: Workspace, graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("irtwin.storage.journal.Journal.append", full)
+    twin = LiveTwin(place, graph)
+    twin.receive(state(0))
+    wait_for(lambda: twin._failure is not None)
+    with pytest.raises(OSError, match="No space left"):
+        twin.receive(state(1))
+    with pytest.raises(OSError, match="No space left"):
+        twin.stop()
+
+
+WATCHER = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from test_live import state
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.providers.live import LiveTwin
+from irtwin.storage.database import Workspace
+
+with Workspace(Path(sys.argv[1])) as place, KnowledgeGraph(place.graph_folder) as graph:
+    twin = LiveTwin(place, graph)
+    for number in range(10**9):
+        twin.receive(state(number))
+        if number % 100 == 0:
+            print(twin.stored, flush=True)
+"""
+
+
+def test_a_kill_loses_no_stored_sample(place: Workspace, tmp_path: Path) -> None:
+    here = Path(__file__).parent
+    command = [sys.executable, "-c", WATCHER, str(tmp_path), str(here)]
+    environment = {"PYTHONPATH": str(here.parent)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        stored = 0
+        while stored < 1000:
+            stored = int(process.stdout.readline())
+        process.kill()
+        stored = max([stored, *(int(line) for line in process.stdout.read().split())])
+    (journal,) = (tmp_path / "live").iterdir()
+    with journal.open("ab") as file:
+        file.write(b"torn")
+    lines: list[str] = []
+    with KnowledgeGraph(place.graph_folder) as graph, LiveTwin(place, graph, lines.append):
+        run = live_run(place)
+        assert run.sample_count >= stored >= 1000
+        assert place.read_series(run.run_id)["power"].to_numpy().tolist() == [
+            400.0 + i for i in range(run.sample_count)
+        ]
+        assert quads(graph) == mapped(place)
+    assert lines == [f"{run.run_id}: a crash ended this run; its {run.sample_count} samples on disk are kept"]
