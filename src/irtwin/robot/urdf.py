@@ -12,6 +12,7 @@ from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_input
 from irtwin.robot.description import Joint, Link, Robot, Shape
 
 _MOVING = ("revolute", "continuous", "prismatic")
@@ -25,11 +26,7 @@ def read_urdf(path: Path) -> Robot:
     Raises InputError where the file cannot be read, does not parse, or describes no robot that can be modelled.
     """
     try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path}: larger than {_LARGEST // 1_000_000} MB; a URDF is a few hundred kB at most")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); name the robot's URDF file") from error
+        text = read_input(path, _LARGEST).decode()
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save the URDF as UTF-8") from error
     return parse_urdf(text, source=str(path))
@@ -80,6 +77,7 @@ def _links(root: Element, source: str) -> dict[str, Link]:
         value = 0.0 if mass is None else _number(mass.get("value"), f'{source}: mass of link "{name}"')
         if value < 0:
             raise InputError(f'{source}: link "{name}" has the negative mass {value} kg')
+        _check_inertia(element, f'{source}: inertia of link "{name}"')
         shapes = tuple(
             shape
             for visual in element.findall("visual")
@@ -89,6 +87,18 @@ def _links(root: Element, source: str) -> dict[str, Link]:
     if not links:
         raise InputError(f"{source}: has no link; a robot needs <link> and <joint> elements")
     return links
+
+
+def _check_inertia(link: Element, where: str) -> None:
+    """Hold an inertia to be six numbers, none of its moments negative: Pinocchio would take anything for zero."""
+    _placement(link.find("inertial/origin"), where)
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return
+    values = {key: _number(inertia.get(key, "0"), where) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
+    negative = [key for key in ("ixx", "iyy", "izz") if values[key] < 0]
+    if negative:
+        raise InputError(f"{where}: {negative[0]} is negative, {values[negative[0]]} kg m^2")
 
 
 def _shape(visual: Element, materials: dict[str | None, Element], where: str) -> Shape | None:
@@ -203,5 +213,6 @@ def _numbers(text: str | None, count: int, where: str) -> tuple[float, ...]:
     except ValueError:
         values = ()
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise InputError(f'{where}: "{text}" should be {count} finite number{"s" if count > 1 else ""}')
+        shown = text if text is None or len(text) < 60 else f"{text[:60]}..."
+        raise InputError(f'{where}: "{shown}" should be {count} finite number{"s" if count > 1 else ""}')
     return values

@@ -1,0 +1,23 @@
+"""Files that a user names, read with a bound: no pipe that never ends, no device, nothing that fills the memory."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from irtwin.errors import InputError
+
+
+def read_input(path: Path, most: int) -> bytes:
+    """Return a file's content. Raises InputError where it cannot be read or has more than `most` bytes."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path}: is no file; name one that holds the input")
+        if status.st_size > most:
+            raise InputError(f"{path}: is larger than the {most // 1_000_000} MB that are read of such a file")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that is there") from error
+    except ValueError as error:  # a null byte in the name
+        raise InputError(f"{str(path)!r}: is no file name: {error}") from error

@@ -1,0 +1,132 @@
+"""Robots' descriptions that are broken, too large, or meant to do harm."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+LINK = (
+    '<link name="{}"><inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+JOINT = (
+    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+)
+GOOD = f'<robot name="r">{LINK.format("a")}{LINK.format("b")}{JOINT}</robot>'
+
+
+def entities(count: int, copies: int) -> str:
+    """Return a document type whose last entity is the first one, copied `copies` ** `count` times."""
+    made = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * copies}">' for n in range(1, count + 1))
+    return f'<!DOCTYPE robot [<!ENTITY e0 "lol">{made}]>'
+
+
+def chain(length: int) -> str:
+    links = "".join(f'<link name="l{n}"/>' for n in range(length + 1))
+    joints = "".join(
+        f'<joint name="j{n}" type="fixed"><parent link="l{n}"/><child link="l{n + 1}"/></joint>' for n in range(length)
+    )
+    return f'<robot name="r">{links}{joints}</robot>'
+
+
+DTD = "a DTD or an entity"
+DOCUMENT_TYPES = {
+    "billion laughs": f'{entities(9, 10)}<robot name="&e9;"/>',
+    "deep laughs": f'{entities(60, 2)}<robot name="&e60;"/>',
+    "quadratic blow-up": f'<!DOCTYPE robot [<!ENTITY a "{"a" * 100_000}">]><robot name="{"&a;" * 10_000}"/>',
+    "entity of itself": '<!DOCTYPE robot [<!ENTITY a "&b;"><!ENTITY b "&a;">]><robot name="&a;"/>',
+    "outside file": '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="r">&a;</robot>',
+    "outside device": '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///dev/zero">]><robot name="r">&a;</robot>',
+    "outside server": '<!DOCTYPE robot [<!ENTITY a SYSTEM "http://127.0.0.1:1/">]><robot name="r">&a;</robot>',
+    "outside DTD": '<!DOCTYPE robot SYSTEM "http://127.0.0.1:1/robot.dtd"><robot name="r"/>',
+    "public DTD": '<!DOCTYPE robot PUBLIC "-//X//Y" "file:///etc/passwd"><robot name="r"/>',
+    "parameter entity": '<!DOCTYPE robot [<!ENTITY % a SYSTEM "file:///etc/passwd">%a;]><robot name="r"/>',
+    "empty document type": f"<!DOCTYPE robot []>{GOOD}",
+    "default attributes": f'<!DOCTYPE robot [<!ATTLIST robot name CDATA "x">]>{GOOD}',
+}
+MALFORMED = {
+    "nothing": ("", "not well-formed XML"),
+    "blank": (" \n ", "not well-formed XML"),
+    "no XML": ("robot: r", "not well-formed XML"),
+    "null bytes": ("\x00" * 1000, "not well-formed XML|not readable as XML"),
+    "undefined entity": ('<robot name="&nbsp;"/>', "not well-formed XML"),
+    "cut off": (GOOD[: len(GOOD) // 2], "not well-formed XML"),
+    "two roots": (GOOD * 2, "not well-formed XML"),
+    "attribute twice": ('<robot name="r" name="s"/>', "not well-formed XML"),
+    "unknown prefix": ("<x:robot/>", "not well-formed XML"),
+    "strange encoding": (f'<?xml version="1.0" encoding="utf-7"?>{GOOD}', "XML"),
+    "other root": ("<xacro/>", "not <robot>"),
+    "sdf": ("<sdf><model/></sdf>", "not <robot>"),
+    "deep nesting": ("<robot>" + "<a>" * 100_000 + "</a>" * 100_000 + "</robot>", "has no link"),
+    "deeper nesting": ("<robot>" + "<a>" * 2_000_000 + "</a>" * 2_000_000 + "</robot>", "has no link"),
+    "a million attributes": ("<robot " + " ".join(f'a{n}=""' for n in range(300_000)) + "/>", "has no link"),
+    "no link": ('<robot name="r"/>', "has no link"),
+    "link without a name": ("<robot><link/></robot>", 'a link has no "name"'),
+    "link twice": (GOOD.replace("<joint", LINK.format("a") + "<joint"), "two links are named"),
+    "no moving joint": (GOOD.replace("revolute", "fixed"), "no joint moves"),
+    "joint without a name": (GOOD.replace('name="j"', ""), 'a joint has no "name"'),
+    "joint twice": (GOOD.replace("</robot>", f"{JOINT}</robot>"), "stands there twice"),
+    "unknown parent": (GOOD.replace('parent link="a"', 'parent link="x"'), "parent link .* is not defined"),
+    "unknown child": (GOOD.replace('child link="b"', 'child link="x"'), "child link .* is not defined"),
+    "loop": (GOOD.replace('child link="b"', 'child link="a"'), "loop|several bases"),
+    "unknown type": (GOOD.replace("revolute", "teleport"), "cannot be modelled"),
+    "free joint": (GOOD.replace("revolute", "floating"), "cannot be modelled"),
+    "mimic": (GOOD.replace("</joint>", '<mimic joint="j"/></joint>'), "mimics another joint"),
+    "no axis": (GOOD.replace("0 0 1", "0 0 0"), "axis is zero"),
+    "short axis": (GOOD.replace("0 0 1", "0 1"), "3 finite numbers"),
+    "limits swapped": (GOOD.replace('lower="-1"', 'lower="3"'), "lies above"),
+    "not a number": (GOOD.replace('lower="-1"', 'lower="nan"'), "finite number"),
+    "infinite": (GOOD.replace('velocity="1"', 'velocity="inf"'), "finite number"),
+    "beyond a double": (GOOD.replace('effort="1"', 'effort="1e999"'), "finite number"),
+    "code for a number": (GOOD.replace('mass value="1"', 'mass value="__import__(1)"'), "finite number"),
+    "no mass": (GOOD.replace('mass value="1"', "mass"), "finite number"),
+    "negative mass": (GOOD.replace('mass value="1"', 'mass value="-1"'), "negative mass"),
+    "mass beyond a double": (GOOD.replace('mass value="1"', 'mass value="1e999"'), "finite number"),
+    "negative inertia": (GOOD.replace('ixx="1"', 'ixx="-5"'), "inertia"),
+    "inertia that is no number": (GOOD.replace('ixx="1"', 'ixx="x"'), "inertia"),
+    "a number of a million digits": (GOOD.replace('lower="-1"', f'lower="{"9" * 1_000_000}"'), "finite number"),
+    "a chain without a joint that moves": (chain(3000), "no joint moves"),
+}
+
+
+def write(folder: Path, text: str) -> tuple[str, str, str]:
+    (folder / "robot.urdf").write_text(text, encoding="utf-8")
+    return "urdf", str(folder), "robot.urdf"
+
+
+@pytest.mark.parametrize("name", DOCUMENT_TYPES)
+def test_document_types(refused: Callable[..., str], tmp_path: Path, name: str) -> None:
+    assert DTD in refused(*write(tmp_path, DOCUMENT_TYPES[name]))
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_malformed(refused: Callable[..., str], tmp_path: Path, name: str) -> None:
+    text, message = MALFORMED[name]
+    said = refused(*write(tmp_path, text))
+    assert said.startswith(str(tmp_path / "robot.urdf"))
+    assert re.search(message, said), said
+
+
+def test_what_is_no_file(refused: Callable[..., str], tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "large").touch()
+    os.truncate(tmp_path / "large", 10_000_000_000)
+    (tmp_path / "bytes").write_bytes(os.urandom(1000))
+    (tmp_path / "latin").write_bytes('<robot name="é"/>'.encode("latin-1"))
+    (tmp_path / "wide").write_bytes(GOOD.encode("utf-16"))
+    (tmp_path / "round").symlink_to(tmp_path / "round")
+    assert "is no file" in refused("urdf", str(tmp_path), "pipe")
+    assert "is no file" in refused("urdf", str(tmp_path), "/dev/zero")
+    assert "is no file" in refused("urdf", str(tmp_path), ".")
+    assert "is larger than" in refused("urdf", str(tmp_path), "large")
+    assert "is not UTF-8" in refused("urdf", str(tmp_path), "bytes")
+    assert "is not UTF-8" in refused("urdf", str(tmp_path), "latin")
+    assert "is not UTF-8" in refused("urdf", str(tmp_path), "wide")
+    assert "cannot be read" in refused("urdf", str(tmp_path), "round")
+    assert "cannot be read" in refused("urdf", str(tmp_path), "none")
+    assert "is no file name" in refused("urdf", str(tmp_path), "no\0ne")
