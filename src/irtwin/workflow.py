@@ -21,6 +21,7 @@ from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge import queries
 from irtwin.knowledge.explain import explain as explain_triples
+from irtwin.knowledge.explain import explain_one
 from irtwin.knowledge.explanation import Explanation
 from irtwin.knowledge.export import export_owl
 from irtwin.knowledge.graph import KnowledgeGraph
@@ -239,7 +240,7 @@ def _map(place: Workspace, graph: KnowledgeGraph) -> None:
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
     robot = load_robot(place, robot_id)
     out = place.report_path(robot_id)
-    render(graph, robot_iri(robot_id), place.read_file, out, partial(draw_scene, robot))
+    render(graph, robot_iri(robot_id), place.read_file, out, partial(draw_scene, robot), partial(explain_one, graph))
     return out
 
 

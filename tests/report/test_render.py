@@ -3,9 +3,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from pyoxigraph import NamedNode, Triple
 from robots import Factory, PageOf, power_only, six_axis
 
 from irtwin.errors import InputError
+from irtwin.knowledge.explanation import Explanation
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.report.render import content_policy, render
 
@@ -71,6 +73,24 @@ def test_only_the_scripts_of_the_page_may_run(graph: KnowledgeGraph, tmp_path: P
     assert policy.count("'sha256-") == 4
     assert "unsafe-eval" not in policy and "http" not in policy
     assert content_policy(["let more = 2;"]).split("'")[3] in policy
+
+
+def test_conclusions_say_how_they_are_known(graph: KnowledgeGraph, tmp_path: Path):
+    six = six_axis(graph)
+    out = tmp_path / "page.html"
+    file = Explanation("id:run/cycle_6", "what was recorded", file="cycle_6.csv", checksum="c0ffee")
+    asked: list[tuple[str, str, str]] = []
+
+    def explain(subject: str, predicate: str, object: str) -> Explanation:
+        asked.append((subject, predicate, object))
+        return Explanation("a <fact>", "a rule", (file,), meaning="What the rule means.")
+
+    render(graph, six.iri, six.read_series, out, explain=explain)
+    page = out.read_text(encoding="utf-8")
+    for part in ("How do we know", "What the rule means.", "a &lt;fact&gt;", "cycle_6.csv", "c0ffee"):
+        assert part in page
+    assert all(graph.holds(Triple(*map(NamedNode, triple))) for triple in asked)
+    assert any(predicate.endswith("#dominant_Joint") for _, predicate, _ in asked)
 
 
 def test_hostile_names_are_text(graph: KnowledgeGraph, page_of: PageOf):

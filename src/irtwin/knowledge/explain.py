@@ -53,6 +53,12 @@ def explain(graph: KnowledgeGraph, pattern: str) -> tuple[Explanation, ...]:
     return tuple(Explainer(graph).triple(triple) for triple in sorted(triples, key=str))
 
 
+def explain_one(graph: KnowledgeGraph, subject: str, predicate: str, object: str) -> Explanation | None:
+    """Explain one triple of IRIs; None where the graph does not hold it."""
+    triple = Triple(NamedNode(subject), NamedNode(predicate), NamedNode(object))
+    return Explainer(graph).triple(triple) if graph.holds(triple) else None
+
+
 class Explainer:
     """Explains triples of one graph. What it has explained once it refers to after that."""
 

@@ -28,12 +28,18 @@ _SCRIPT = re.compile(r"<script(?![^>]*application/json)[^>]*>(.*?)</script>", re
 
 
 def render(
-    graph: Graph, robot_iri: str, read_series: ReadSeries, out: Path, draw_scene: DrawScene | None = None
+    graph: Graph,
+    robot_iri: str,
+    read_series: ReadSeries,
+    out: Path,
+    draw_scene: DrawScene | None = None,
+    explain: tables.Explain | None = None,
 ) -> None:
     """Write the energy report of a robot to `out`.
 
     Every number comes from the questions in `reports/energy`; samples come from the series that they name.
-    `draw_scene` gets the series of the run that the page opens on, and returns its 3-D scene.
+    `draw_scene` gets the series of the run that the page opens on, and returns its 3-D scene. `explain` says how a
+    conclusion is known.
     """
     bindings = _bindings(graph, robot_iri)
     answers = ask(graph, _questions(), bindings)
@@ -43,7 +49,7 @@ def render(
     scene = None
     if draw_scene is not None and opens is not None:
         scene = draw_scene(Columns.of(read_series(opens["file"], opens["checksum"])))
-    page = _page(answers, bindings, explorer(answers, read_series), scene)
+    page = _page(answers, bindings, explorer(answers, read_series), scene, explain)
     write(out, page.encode())
 
 
@@ -57,7 +63,13 @@ def _bindings(graph: Graph, robot_iri: str) -> dict[str, str]:
     return {"robot": robot_iri} | ({"twin": answer.first["twin"]} if answer.first else {})
 
 
-def _page(answers: Answers, bindings: Mapping[str, str], curves: Mapping[str, Any] | None, scene: str | None) -> str:
+def _page(
+    answers: Answers,
+    bindings: Mapping[str, str],
+    curves: Mapping[str, Any] | None,
+    scene: str | None,
+    explain: tables.Explain | None,
+) -> str:
     folder = resources.folder("reports")
     drawn = figures(answers)
     scripts = {
@@ -75,7 +87,7 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Mapping[str, An
         parameters=tables.parameters(answers["parameters"].rows, answers["joints"].rows),
         run_fits=tables.run_fits(answers["torque_fit"].rows),
         fits=tables.fits(answers["torque_fit_per_joint"].rows),
-        conclusions=tables.conclusions(answers["conclusions"].rows),
+        conclusions=tables.conclusions(answers["conclusions"].rows, explain),
         drawn=drawn,
         curves=curves,
         data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),

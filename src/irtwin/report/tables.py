@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
+from irtwin.knowledge.explanation import Explanation
 from irtwin.report import wording
 from irtwin.report.questions import Row
+
+Explain = Callable[[str, str, str], Explanation | None]  # subject, predicate and object, by their IRIs
 
 
 @dataclass(frozen=True)
@@ -43,12 +46,13 @@ class Parameters:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What was concluded, about which individuals, by which reasoner or rule set."""
+    """What was concluded, about which individuals, by which reasoner or rules, and how the first is known."""
 
     label: str
     definition: str | None
     about: tuple[str, ...]
     by: tuple[str, ...]
+    known: Explanation | None
 
 
 # A rigid body's parameters are many, and few people read them one by one: they stay a list.
@@ -86,8 +90,8 @@ def run_fits(rows: Sequence[Row]) -> dict[tuple[str, str], dict[str, Row]]:
     return by_run
 
 
-def conclusions(rows: Sequence[Row]) -> tuple[Conclusion, ...]:
-    """Gather the individuals about which the same was concluded."""
+def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> tuple[Conclusion, ...]:
+    """Gather the individuals about which the same was concluded; `explain` says of one how it is known."""
     gathered = []
     for iri, group in groupby(rows, key=lambda row: row["conclusion"]):
         found = list(group)
@@ -97,6 +101,9 @@ def conclusions(rows: Sequence[Row]) -> tuple[Conclusion, ...]:
                 definition=found[0]["definition"],
                 about=tuple(dict.fromkeys(_about(row) for row in found)),
                 by=tuple(dict.fromkeys(_reasoner(row["concluded_by"]) for row in found)),
+                known=None
+                if explain is None
+                else explain(*(found[0][name] for name in ("about", "property", "object"))),
             )
         )
     return tuple(gathered)
