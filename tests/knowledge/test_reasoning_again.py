@@ -1,0 +1,155 @@
+"""What is inferred after any change is what would be inferred from nothing, and nothing else is touched."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyoxigraph import Literal, NamedNode, Quad, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge import owl_dl
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.vocabulary import (
+    GRAPH_INFERRED,
+    GRAPH_OWL_RL,
+    GRAPH_REASONED,
+    GRAPH_SHACL,
+    GRAPH_SOURCE,
+    GRAPH_SWRL,
+    RDF,
+    RDFS,
+    individual,
+    term,
+)
+
+SOURCE = GRAPH_SOURCE + "drawn"
+TYPE = RDF + "type"
+RUNS = [individual("run", name) for name in ("one", "two")]
+JOINTS = [individual("joint", name) for name in ("a", "b")]
+
+
+@pytest.fixture(autouse=True)
+def without_java(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Pellet takes seconds to start; one rule in its stead counts how often it was asked."""
+    calls: list[int] = []
+
+    def conclude(facts):
+        calls.append(len(facts))
+        idle = (one for one in facts if one.predicate.value == term("Idle_Share") and float(one.object.value) > 0.5)
+        return {Triple(one.subject, NamedNode(TYPE), NamedNode(term("Idle_Heavy_Run"))) for one in idle}
+
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", conclude)
+    return calls
+
+
+def quad(subject: str, predicate: str, value) -> Quad:
+    return Quad(
+        NamedNode(subject),
+        NamedNode(predicate),
+        value if isinstance(value, Literal) else NamedNode(value),
+        NamedNode(SOURCE),
+    )
+
+
+# Each is a fact that some rule or axiom draws on.
+FACTS = [
+    *(quad(run, TYPE, term("IR_RunProcess")) for run in RUNS),
+    *(quad(run, term("Idle_Share"), Literal(share)) for run, share in zip(RUNS, (0.7, 0.2), strict=True)),
+    quad(term("default_Limits"), term("Idle_Share_Limit"), Literal(0.5)),
+    quad(individual("energy", "x"), TYPE, term("Joint_Energy")),
+    quad(individual("energy", "x"), term("of_Run"), RUNS[0]),
+    quad(individual("energy", "x"), term("of_Joint"), JOINTS[0]),
+    quad(individual("energy", "x"), term("Energy"), Literal(5.0)),
+    quad(individual("energy", "y"), TYPE, term("Joint_Energy")),
+    quad(individual("energy", "y"), term("of_Run"), RUNS[0]),
+    quad(individual("energy", "y"), term("of_Joint"), JOINTS[1]),
+    quad(individual("energy", "y"), term("Energy"), Literal(7.0)),
+    quad(individual("robot", "r"), term("has_Joint"), JOINTS[0]),
+    quad(term("has_Joint"), "http://www.w3.org/2002/07/owl#inverseOf", term("joint_of")),
+    quad(term("IR_RunProcess"), RDFS + "subClassOf", term("Process")),
+    quad(term("Idle_Heavy_Run"), RDFS + "subClassOf", term("Lazy")),
+]
+
+
+def inferred(graph: KnowledgeGraph) -> dict[str, set]:
+    found = {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED)}
+    return {name: triples for name, triples in found.items() if triples}
+
+
+def anew(quads: list[Quad]) -> dict[str, set]:
+    graph = KnowledgeGraph()
+    graph.replace(quads, GRAPH_SOURCE)
+    reason(graph)
+    return inferred(graph)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4))
+def test_any_change_gives_what_a_full_run_gives(states: list[list[Quad]]) -> None:
+    graph = KnowledgeGraph()
+    for quads in states:
+        graph.replace(quads, GRAPH_SOURCE)
+        before = inferred(graph)
+        outcome = reason(graph)
+        after = inferred(graph)
+        assert after == anew(quads)
+        differing = {name for name in {*before, *after} - {GRAPH_REASONED} if before.get(name) != after.get(name)}
+        assert set(outcome.changed) == differing
+
+
+def test_graphs_of_rules_whose_premises_stay_are_not_rewritten() -> None:
+    graph = KnowledgeGraph()
+    graph.replace(FACTS, GRAPH_SOURCE)
+    reason(graph)
+    graph.replace([one for one in FACTS if one.predicate.value != term("Idle_Share")], GRAPH_SOURCE)
+    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}/idle_heavy_run", GRAPH_SWRL)
+    assert graph.triples(f"{GRAPH_SHACL}/dominant_joint")
+
+
+def test_only_what_differs_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = KnowledgeGraph()
+    graph.replace(FACTS, GRAPH_SOURCE)
+    reason(graph)
+    written: list[Quad] = []
+    change = graph.change
+    monkeypatch.setattr(
+        graph, "change", lambda removed, added: (written.extend([*removed, *added]), change(removed, added))
+    )
+    graph.replace([one for one in FACTS if one.object != Literal(7.0)], GRAPH_SOURCE)
+    reason(graph)
+    kept = {(one.subject.value, one.predicate.value) for one in written if one.graph_name.value != GRAPH_REASONED}
+    assert kept == {(RUNS[0], term("dominant_Joint"))}
+
+
+def test_nothing_is_done_where_no_premise_changed(without_java: list[int]) -> None:
+    graph = KnowledgeGraph()
+    graph.replace(FACTS, GRAPH_SOURCE)
+    first = reason(graph)
+    assert len(without_java) == 1
+    again = reason(graph)
+    assert again.changed == ()
+    assert (again.owl_rl, again.swrl, again.shacl) == (first.owl_rl, first.swrl, first.shacl)
+    assert len(without_java) == 1
+
+
+def test_swrl_rules_rest_while_what_they_speak_of_stays(without_java: list[int]) -> None:
+    graph = KnowledgeGraph()
+    graph.replace(FACTS, GRAPH_SOURCE)
+    reason(graph)
+    graph.replace([one for one in FACTS if one.predicate.value != term("has_Joint")], GRAPH_SOURCE)
+    assert GRAPH_OWL_RL in reason(graph).changed
+    assert len(without_java) == 1
+
+
+def test_what_was_inferred_is_dropped_where_the_premises_now_contradict() -> None:
+    graph = KnowledgeGraph()
+    graph.replace(FACTS, GRAPH_SOURCE)
+    reason(graph)
+    wrong = quad(RUNS[0], "http://www.w3.org/2002/07/owl#differentFrom", RUNS[0])
+    graph.replace([*FACTS, wrong], GRAPH_SOURCE)
+    with pytest.raises(InputError, match="eq-diff1"):
+        reason(graph)
+    assert inferred(graph) == {}
+    graph.replace(FACTS, GRAPH_SOURCE)
+    reason(graph)
+    assert inferred(graph) == anew(FACTS)
