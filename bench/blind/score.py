@@ -114,18 +114,23 @@ def calibration(pairs: Iterable[tuple[float, bool]], bins: int = 10) -> tuple[fl
 
 
 def closed_by_true_form(diagnosis: dict[str, Any], healthy: dict[str, Any]) -> float:
-    """Return the closed fraction of a refit with the true form: it leaves what the healthy robot's twin leaves."""
-    pairs = []
-    for one, other in zip(_equations(diagnosis), _equations(healthy), strict=True):
-        if one["noise_floor"] and one["excess"] is not None:
-            pairs.append((one["excess"], (other["rmse"] / one["noise_floor"]) ** 2 - 1))
-    above, left = np.sum(pairs, axis=0)
-    return float(1 - left / above)
+    """Return the closed fraction of a refit with the true form: it leaves what the healthy robot's twin leaves.
+
+    In the channels in which a cause is named, as the diagnosis counts its own.
+    """
+    channels = {cause["evidence"]["channel"] for cause in ranked(diagnosis)}
+    above, left = 0.0, 0.0
+    for channel in channels:
+        for one, other in zip(*(_equations(each, channel) for each in (diagnosis, healthy)), strict=True):
+            if one["noise_floor"] and (one["excess"] or 0) > 0:
+                above += one["excess"]
+                left += (other["rmse"] / one["noise_floor"]) ** 2 - 1
+    return min(1 - left / above, 1.0)
 
 
-def _equations(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
-    gap = diagnosis["gap"]
-    return [*gap.get("torque", {}).values(), *([gap["power"]] if gap.get("power") else [])]
+def _equations(diagnosis: dict[str, Any], channel: str) -> list[dict[str, Any]]:
+    gap = diagnosis["gap"][channel]
+    return list(gap.values()) if channel == "torque" else [gap]
 
 
 def wilson(share: float, count: int) -> tuple[float, float]:

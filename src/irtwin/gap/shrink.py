@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student_t
 
 from irtwin.gap.system import System
 
@@ -39,28 +40,31 @@ def held_out(system: System, noise: np.ndarray, noise_after: np.ndarray, chosen:
 def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]], seed: int) -> tuple[float, list[float]] | None:
     """Return the fraction of the gap above the floor that is closed, with its 95 % interval over groups.
 
-    parts: each channel's groups and noise floor (g,). Equations count by their mean square over the floor's. None where
-    there is no gap.
+    parts: each channel's groups and noise floor (g,). Equations count by their mean square over the floor's, those that
+    have a gap. The interval is Student's, of the deviation under resampling, as groups are few. None without a gap.
     """
+    gaps = [(part, floor, part.rmse(part.before) > floor) for part, floor in parts]
 
     def fraction(generator: np.random.Generator | None) -> float:
         above, below = 0.0, 0.0
-        for part, floor in parts:
+        for part, floor, gap in gaps:
             groups = len(part.rows)
             pick = np.arange(groups) if generator is None else generator.integers(groups, size=groups)
             rows = np.maximum(part.rows[pick].sum(axis=0), 1)
-            above += float(np.sum(part.before[pick].sum(axis=0) / rows / floor**2 - 1))
-            below += float(np.sum(part.after[pick].sum(axis=0) / rows / floor**2 - 1))
-        return 1 - below / above if above > 0 else np.nan
+            above += float(np.sum((part.before[pick].sum(axis=0) / rows / floor**2 - 1)[gap]))
+            below += float(np.sum((part.after[pick].sum(axis=0) / rows / floor**2 - 1)[gap]))
+        return min(1 - below / above, 1.0) if above > 0 else np.nan
 
-    value = fraction(None)
+    value, groups = fraction(None), len(parts[0][0].rows)
     if not np.isfinite(value):
         return None
+    if groups < 2:
+        return value, [value, value]
     generator = np.random.default_rng(seed)
     drawn = np.array([fraction(generator) for _ in range(_RESAMPLED)])
-    drawn = drawn[np.isfinite(drawn)]
-    low, high = np.quantile(drawn, [0.025, 0.975]) if len(drawn) else (value, value)
-    return value, [float(low), float(high)]
+    deviation = drawn[np.isfinite(drawn)].std(ddof=1) * np.sqrt(groups / (groups - 1))
+    half = float(student_t.ppf(0.975, groups - 1) * deviation)
+    return value, [value - half, min(value + half, 1.0)]
 
 
 def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[float]:
