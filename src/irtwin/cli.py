@@ -359,6 +359,54 @@ def explain(
         click.echo("\n\n".join(map(to_text, found)))
 
 
+@cli.command()
+@_workspace
+@_database
+@_graph
+@click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1.")
+def live(workspace: Path, database: str | None, graph_url: str | None, port: int | None) -> None:
+    """Watch robots: store their samples, keep the graph current.
+
+    Reads one JSON object a line from standard input, fields as in ROS' JointState: robot, time (s since 1970),
+    position, velocity, effort, and if known temperature, power, name. Ctrl-C ends it; all samples read are stored.
+    """
+    from irtwin.watch import watch
+
+    watch(workspace, database=database, graph_url=graph_url, port=port, announce=_say)
+
+
+@cli.command()
+@click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
+@_workspace
+@_database
+@_graph
+def backup(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Write a workspace into one ARCHIVE, while others may write.
+
+    Graph, database (its rows, from a server too), series, twins, diagnoses and reports, each with its checksum.
+    """
+    from irtwin import workflow
+
+    workflow.backup(archive, workspace, database=database, graph_url=graph_url)
+    click.echo(archive)
+
+
+@cli.command()
+@click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
+@_workspace
+@_database
+@_graph
+def restore(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Make a new workspace of an ARCHIVE that `backup` wrote.
+
+    Nothing is restored of an archive that is damaged, and nothing is overwritten.
+    """
+    from irtwin.knowledge.backup import restore as restore_all
+
+    restore_all(archive, workspace, database, graph_url)
+    click.echo(workspace)
+
+
 def _say(line: str) -> None:
     click.echo(line, err=True)
 

@@ -20,6 +20,7 @@ from irtwin.gap import diagnosis as gap
 from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge import queries
+from irtwin.knowledge.backup import backup as keep
 from irtwin.knowledge.explain import explain as explain_triples
 from irtwin.knowledge.explain import explain_one
 from irtwin.knowledge.explanation import Explanation
@@ -36,6 +37,7 @@ from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
 from irtwin.report.gap import render_alone
 from irtwin.report.render import render
 from irtwin.report.scene import draw_scene
+from irtwin.serve.snapshot import Snapshot
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
@@ -209,6 +211,18 @@ def export(
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
     with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
         export_owl(graph, owl)
+
+
+def backup(
+    archive: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+) -> None:
+    """Write a workspace into one archive: graph, database, series, twins, diagnoses and reports; others may write."""
+    check_place(archive)
+    with Workspace.existing(Path(workspace), database) as place:
+        graph = KnowledgeGraph(graph_url) if graph_url else None
+        if graph is None and place.graph_folder.exists():
+            graph = Snapshot(place.graph_folder).current()  # takes no lock
+        keep(place, graph, archive)
 
 
 def unpack_demo(workspace: Path) -> Path:

@@ -1,0 +1,258 @@
+"""A workspace in one file, and back."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import func, select
+
+import rows
+from irtwin import resources
+from irtwin.errors import InputError
+from irtwin.knowledge.backup import backup, restore
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Base, Series
+from irtwin.storage.series import checksum
+
+State = tuple[dict[str, list[tuple[object, ...]]], dict[str, str], int]
+
+
+def fill(place: Workspace) -> None:
+    place.ingest(*rows.data_set())
+    made = [*rows.twin(f"{rows.ROBOT}.abc")]
+    place.replace_activity(rows.activity("twin.1", "identification"), [], made, documents={"twins/a.json": b"{}"})
+    report = place.report_path(rows.ROBOT)
+    report.parent.mkdir()
+    report.write_text("<html>")
+    with KnowledgeGraph(place.graph_folder) as graph:
+        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+        graph.load_ontology()
+        graph.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+
+
+def state(place: Workspace) -> State:
+    """Return all rows, the checksums of all files, and how many triples the graph has."""
+    with place.reading() as session:
+        tables = {
+            table.name: sorted((tuple(row) for row in session.execute(select(table))), key=str)
+            for table in Base.metadata.sorted_tables
+        }
+    files = {
+        str(file.relative_to(place.folder)): checksum(file)
+        for folder in ("series", "twins", "reports")
+        for file in (place.folder / folder).glob("*")
+    }
+    with KnowledgeGraph(place.graph_folder) as graph:
+        return tables, files, len(graph.triples()) + sum(len(graph.triples(name)) for name in graph.graphs())
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
+    with Workspace(tmp_path_factory.mktemp("backup") / "before") as place:
+        fill(place)
+        yield place
+
+
+@pytest.fixture(scope="module")
+def kept(filled: Workspace) -> bytes:
+    archive = filled.folder.with_name("kept.zip")
+    with KnowledgeGraph(filled.graph_folder) as graph:
+        backup(filled, graph, archive)
+    return archive.read_bytes()
+
+
+@pytest.fixture
+def archive(kept: bytes, tmp_path: Path) -> Path:
+    (tmp_path / "kept.zip").write_bytes(kept)
+    return tmp_path / "kept.zip"
+
+
+def test_what_is_restored_is_what_was_kept(filled: Workspace, archive: Path, tmp_path: Path) -> None:
+    restore(archive, tmp_path / "after")
+    with Workspace.existing(tmp_path / "after") as place:
+        assert state(place) == state(filled)
+        assert place.read_series(f"{rows.ROBOT}.work").equals(rows.samples(1))
+        assert place.ingest(*rows.data_set()) == "unchanged"
+    left = {path.name for path in (tmp_path / "after").iterdir()}
+    assert left <= {"irtwin.db", "irtwin.db-wal", "irtwin.db-shm", "series", "twins", "reports", "graph"}
+    assert not [path for path in tmp_path.rglob(".*")]
+
+
+@pytest.mark.system
+def test_into_postgresql_and_back(
+    filled: Workspace, archive: Path, tmp_path: Path, new_postgresql_database: Callable[[], str]
+) -> None:
+    url = new_postgresql_database()
+    restore(archive, tmp_path / "after", url)
+    with Workspace(tmp_path / "after", url) as place, KnowledgeGraph(place.graph_folder) as graph:
+        assert not (tmp_path / "after" / "irtwin.db").exists()
+        backup(place, graph, tmp_path / "again.zip")
+    with pytest.raises(InputError, match="holds rows already"):
+        restore(archive, tmp_path / "third", url)
+    assert not (tmp_path / "third").exists()
+    restore(tmp_path / "again.zip", tmp_path / "back")
+    with Workspace(tmp_path / "back") as place:
+        assert state(place) == state(filled)
+
+
+WRITER = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+import rows
+from irtwin.storage.database import Workspace
+with Workspace(Path(sys.argv[1])) as place:
+    for number in range(10**9):
+        robot, joints, runs, series = rows.data_set()
+        for run in runs:
+            run.sha256 = f"{number:064x}"
+            series[run.run_id] = rows.samples(number)
+        place.ingest(robot, joints, runs, series)
+        print(number, flush=True)
+"""
+
+
+def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> None:
+    filled = Workspace(tmp_path / "before")
+    tests = Path(rows.__file__).parent
+    command = [sys.executable, "-c", WRITER, str(filled.folder), str(tests)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        for number in range(2):
+            backup(filled, None, tmp_path / f"{number}.zip")
+        process.kill()
+        written = process.stdout.read().split()
+    filled.close()
+    assert written, "the writer wrote nothing meanwhile"
+    for number in range(2):
+        restore(tmp_path / f"{number}.zip", tmp_path / f"{number}")
+        with Workspace(tmp_path / f"{number}") as place, place.reading() as session:
+            series = session.execute(select(Series.path, Series.series_id)).all()
+            assert len(series) == 2
+            assert all(checksum(place.folder / path) == series_id for path, series_id in series)
+            assert session.scalar(select(func.count()).select_from(Base.metadata.tables["run"])) == 2
+
+
+def altered(archive: Path, change: Callable[[dict[str, bytes]], None], sums: bool = True) -> Path:
+    """Return the archive with other contents, its list made to agree with them if `sums`."""
+    import hashlib
+
+    with zipfile.ZipFile(archive) as source:
+        contents = {name: source.read(name) for name in source.namelist()}
+    manifest = json.loads(contents.pop("manifest.json"))
+    change(contents)
+    if sums:
+        manifest["files"] = {
+            name: {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)} for name, data in contents.items()
+        }
+    other = archive.with_name("other.zip")
+    with zipfile.ZipFile(other, "w") as target:
+        for name, data in contents.items():
+            target.writestr(name, data)
+        target.writestr("manifest.json", json.dumps(manifest))
+    return other
+
+
+def refuse(archive: Path, message: str) -> None:
+    folder = archive.parent / "after"
+    with pytest.raises(InputError, match=message):
+        restore(archive, folder)
+    assert not folder.exists()
+    assert not list(archive.parent.glob(".restore-*"))
+    assert not (archive.parent / "outside").exists()
+
+
+@pytest.mark.parametrize("name", ["../outside", "series/../../outside", "/tmp/outside", "irtwin.db", "graph/CURRENT"])
+def test_names_that_escape_are_refused(archive: Path, name: str) -> None:
+    refuse(altered(archive, lambda contents: contents.update({name: b"x"})), "does not belong into a workspace")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.999])
+def test_a_cut_off_archive_is_told(archive: Path, share: float) -> None:
+    data = archive.read_bytes()
+    archive.write_bytes(data[: int(share * len(data))])
+    refuse(archive, "damaged")
+
+
+def test_no_flipped_byte_is_restored(archive: Path, filled: Workspace) -> None:
+    """Each is told, but for those that mean nothing, as the date of an entry."""
+    data = archive.read_bytes()
+    expected, told = state(filled), 0
+    for place in range(40, len(data), len(data) // 30):
+        archive.write_bytes(data[:place] + bytes([data[place] ^ 0xFF]) + data[place + 1 :])
+        after = archive.with_name(f"after_{place}")
+        try:
+            restore(archive, after)
+        except InputError:
+            told += 1
+            assert not after.exists()
+        else:
+            with Workspace(after) as restored:
+                assert state(restored) == expected
+    assert told > 20
+
+
+def test_contents_that_are_not_those_of_the_list(archive: Path) -> None:
+    def longer(contents: dict[str, bytes]) -> None:
+        contents["graph.nq"] += b"#"
+
+    def other(contents: dict[str, bytes]) -> None:
+        contents["graph.nq"] = b"#" + contents["graph.nq"][1:]
+
+    refuse(altered(archive, longer, sums=False), "not those of its list")
+    refuse(altered(archive, other, sums=False), r"graph\.nq is damaged, its checksum differs")
+    refuse(altered(archive, lambda contents: contents.update(more=b""), sums=False), "not those of its list")
+    refuse(altered(archive, lambda contents: contents.pop("graph.nq"), sums=False), "not those of its list")
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "message"),
+    [
+        ("graph.nq", b"<a", "its graph is damaged"),
+        ("rows/robot.jsonl", b"{}\n", "table robot is of another irtwin"),
+        ("rows/robot.jsonl", b"[\n", "rows of table robot do not fit"),
+        ("rows/joint.jsonl", None, "has no table joint"),
+        ("rows/robot.jsonl", b"", "do not fit"),
+    ],
+)
+def test_contents_that_are_no_workspace(archive: Path, name: str, data: bytes | None, message: str) -> None:
+    def change(contents: dict[str, bytes]) -> None:
+        contents.pop(name)
+        if data is not None:
+            contents[name] = data
+
+    refuse(altered(archive, change), message)
+
+
+def test_what_is_no_backup(tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign.zip"
+    for manifest in (None, "{}", '"x"', '{"format": "irtwin backup", "version": 1}', "[" * 100_000):
+        with zipfile.ZipFile(foreign, "w") as target:
+            target.writestr("a.txt", "a")
+            if manifest is not None:
+                target.writestr("manifest.json", manifest)
+        refuse(foreign, "no irtwin backup|damaged")
+    with zipfile.ZipFile(foreign, "w") as target:
+        target.writestr("manifest.json", '{"format": "irtwin backup", "version": 2, "software": "irtwin 9"}')
+    refuse(foreign, "made by another irtwin.*irtwin 9")
+    refuse(tmp_path / "none.zip", "cannot be read")
+    (tmp_path / "text.zip").write_text("hello")
+    refuse(tmp_path / "text.zip", "no backup at all")
+
+
+def test_nothing_is_overwritten(archive: Path, filled: Workspace, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is there already; restore into a new folder"):
+        restore(archive, filled.folder)
+    (tmp_path / "empty").mkdir()
+    restore(archive, tmp_path / "empty")
+    assert (tmp_path / "empty" / "irtwin.db").is_file()
