@@ -76,6 +76,6 @@ def parse_template(text: str) -> tuple[str | Identifier, ...]:
     return (*parts, buffer) if buffer else tuple(parts)
 
 
-def quoted(identifier: Identifier, preparer: IdentifierPreparer) -> str:
-    """Return an identifier for the database's SQL: a delimited one in its own quotes, a regular one as it is."""
-    return preparer.quote_identifier(identifier.name) if identifier.delimited else identifier.name
+def quoted(name: str, preparer: IdentifierPreparer) -> str:
+    """Return a name in the database's own quotes; SQLAlchemy's own way would double a per cent sign, too."""
+    return preparer.initial_quote + name.replace(preparer.final_quote, 2 * preparer.final_quote) + preparer.final_quote

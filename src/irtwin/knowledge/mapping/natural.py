@@ -123,7 +123,7 @@ def _padded(width: int) -> Natural:
 
 
 def _json(value: Any) -> Lexical:
-    return json.dumps(value), STRING
+    return json.dumps(value, ensure_ascii=False), STRING
 
 
 _BY_TYPE: dict[type, Natural] = {

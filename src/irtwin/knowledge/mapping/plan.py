@@ -18,7 +18,7 @@ from irtwin.knowledge.mapping.document import (
     TermType,
     TriplesMap,
 )
-from irtwin.knowledge.mapping.identifiers import Identifier
+from irtwin.knowledge.mapping.identifiers import Identifier, quoted
 from irtwin.knowledge.mapping.source import Source, describe
 from irtwin.knowledge.mapping.terms import Column, Row, TermMaker, term_maker
 
@@ -105,7 +105,7 @@ class _Select:
     def __init__(self, connection: Connection, sources: dict[str, Source], base_iri: str) -> None:
         self.sources = sources
         self.base_iri = base_iri
-        self.quote = connection.dialect.identifier_preparer.quote_identifier
+        self.preparer = connection.dialect.identifier_preparer
         self.chosen: dict[tuple[str, str], int] = {}  # side and column
         self.conditions: list[str] = []
 
@@ -145,13 +145,17 @@ class _Select:
             self.conditions.append(" = ".join(names))
 
     def qualified(self, side: str, name: str) -> str:
-        return f"{side}.{self.quote(name)}"
+        return f"{side}.{quoted(name, self.preparer)}"
+
+    def selected(self, side: str, name: str) -> str:
+        column = self.qualified(side, name)
+        return f"CAST({column} AS VARCHAR)" if name in self.sources[side].cast else column
 
     @property
     def sql(self) -> str:
         tables = ", ".join(f"{source.sql} {side}" for side, source in self.sources.items())
         condition = f" WHERE {' AND '.join(self.conditions)}" if self.conditions else ""
-        columns = ", ".join(self.qualified(*column) for column in self.chosen)
+        columns = ", ".join(self.selected(*column) for column in self.chosen)
         return f"SELECT {columns or '1'} FROM {tables}{condition}"
 
 

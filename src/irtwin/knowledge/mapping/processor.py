@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Engine
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.plan import Statement, plan
 from irtwin.knowledge.mapping.reader import read_document
-from irtwin.knowledge.mapping.source import read, snapshot_options
+from irtwin.knowledge.mapping.source import read, snapshot
 from irtwin.storage import files
 from irtwin.storage.engine import open_engine
 
@@ -39,15 +39,13 @@ def planned(
 ) -> Iterator[tuple[Connection, list[Statement]]]:
     """Give a read-only snapshot of a database, and the statements that documents make of it."""
     checked = [read_document(path) for path in documents]
-    with engine.connect() as connection:
-        connection.execution_options(**snapshot_options(engine))
-        with connection.begin():
-            statements = [
-                statement
-                for document in checked
-                for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
-            ]
-            yield connection, statements
+    with snapshot(engine) as connection:
+        statements = [
+            statement
+            for document in checked
+            for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
+        ]
+        yield connection, statements
 
 
 def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | None = None) -> None:

@@ -25,6 +25,7 @@ from irtwin.knowledge.mapping.document import (
     TriplesMap,
 )
 from irtwin.knowledge.mapping.identifiers import parse_identifier, parse_table, parse_template
+from irtwin.knowledge.rdf_input import read_rdf, refuse
 
 _RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
 # BCP 47, as far as it is in use: no language of five letters or more is registered.
@@ -39,13 +40,12 @@ _Parsed = TypeVar("_Parsed")
 def read_document(path: Path) -> Document:
     """Read and check a mapping document in Turtle."""
     file_iri = path.resolve().as_uri()
+    content = read_rdf(path, RdfFormat.TURTLE)
     try:
-        parser = parse(path.read_bytes(), RdfFormat.TURTLE, base_iri=file_iri)
+        parser = parse(content, RdfFormat.TURTLE, base_iri=file_iri)
         graph = _Graph((quad.subject, quad.predicate, quad.object) for quad in parser)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except SyntaxError as error:
-        raise InputError(f"{path}: no valid Turtle: {error.msg}") from None
+    except (SyntaxError, MemoryError) as error:
+        refuse(path, error)
     declared = None if parser.base_iri == file_iri else parser.base_iri
     return Document(declared, _Reader(path, graph).triples_maps())
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,9 @@ from irtwin.knowledge.mapping.identifiers import Identifier, quoted
 from irtwin.knowledge.mapping.natural import Natural, by_declared_type, by_value
 
 _CHUNK = 5000  # rows fetched at a time
+# bool, bytea, int8, int2, int4, text, float4, float8, bpchar, varchar,
+# date, time, timestamp, timestamptz, timetz, numeric: the types of section 10.2
+_NATURAL_IN_POSTGRESQL = {16, 17, 20, 21, 23, 25, 700, 701, 1042, 1043, 1082, 1083, 1114, 1184, 1266, 1700}
 _SQL_TOKEN = re.compile(r"""'(?:[^']|'')*'|"(?:[^"]|"")*"|--[^\n]*|/\*.*?\*/|[^'";/-]+|.""", re.DOTALL)
 
 
@@ -24,12 +28,14 @@ _SQL_TOKEN = re.compile(r"""'(?:[^']|'')*'|"(?:[^"]|"")*"|--[^\n]*|/\*.*?\*/|[^'
 class Source:
     """A logical table in SQL, with its columns and how their values read.
 
+    cast: the columns whose values only the database itself can write as strings;
     folded: whether the columns are a table's, so that a regular identifier means a folded name.
     """
 
     where: str
     sql: str
     columns: dict[str, Natural]
+    cast: frozenset[str]
     folded: bool
 
     def column(self, identifier: Identifier, where: str) -> str:
@@ -50,6 +56,17 @@ def snapshot_options(engine: Engine) -> dict[str, Any]:
     return {}  # in SQLite a transaction is a snapshot, and what stands in FROM (...) cannot write
 
 
+@contextmanager
+def snapshot(engine: Engine) -> Iterator[Connection]:
+    """Give a connection that shows one state of the database and can write nothing."""
+    with engine.connect() as connection:
+        connection.execution_options(**snapshot_options(engine))
+        with connection.begin():
+            if engine.dialect.name == "postgresql":
+                connection.exec_driver_sql("SET LOCAL TIME ZONE 'UTC'")  # whatever the server's or the client's is
+            yield connection
+
+
 def schema_version(connection: Connection) -> str:
     """Return what changes whenever a column's declared type does, where that decides on literals: in SQLite."""
     if connection.dialect.name != "sqlite":
@@ -61,7 +78,8 @@ def describe(connection: Connection, table: LogicalTable) -> Source:
     """Find a logical table's columns. Raises InputError where it is not there or the query is not valid."""
     sql = _from_item(connection, table)
     result = run(connection, f"SELECT * FROM {sql} source WHERE 1 = 0", table.where)
-    names = [column[0] for column in result.cursor.description] if result.cursor else []
+    description = result.cursor.description if result.cursor else []
+    names = [column[0] for column in description]
     result.close()
     repeated = _repeated(names, connection.dialect.name)
     if repeated:
@@ -69,7 +87,10 @@ def describe(connection: Connection, table: LogicalTable) -> Source:
     columns: dict[str, Natural] = dict.fromkeys(names, by_value)
     if connection.dialect.name == "sqlite":
         columns |= _declared(connection, sql, table.where)
-    return Source(table.where, sql, columns, folded=table.query is None)
+    cast: frozenset[str] = frozenset()
+    if connection.dialect.name == "postgresql":
+        cast = frozenset(column[0] for column in description if column[1] not in _NATURAL_IN_POSTGRESQL)
+    return Source(table.where, sql, columns, cast, folded=table.query is None)
 
 
 def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Sequence[Any]]]:
@@ -95,7 +116,7 @@ def run(connection: Connection, sql: str, where: str) -> CursorResult[Any]:
 def _from_item(connection: Connection, table: LogicalTable) -> str:
     if table.query is None:
         preparer = connection.dialect.identifier_preparer
-        return ".".join(quoted(part, preparer) for part in table.table)
+        return ".".join(quoted(part.name, preparer) if part.delimited else part.name for part in table.table)
     return f"({_single_query(table.query, table.where)}\n)"
 
 
