@@ -317,7 +317,8 @@ def _announce(address: str) -> None:
 @cli.command()
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF file to write.")
-def reason(source: Path, out: Path) -> None:
+@click.option("--dl", is_flag=True, help="Check consistency and classify in OWL 2 DL instead, by HermiT.")
+def reason(source: Path, out: Path, dl: bool) -> None:
     """Write an RDF file and all that OWL 2 RL infers.
 
     The suffixes tell the formats. Where SOURCE contradicts itself: nothing is written, and the exit status is 3.
@@ -326,7 +327,7 @@ def reason(source: Path, out: Path) -> None:
     from irtwin.knowledge.owl_rl_file import close_file
 
     try:
-        inferred = close_file(source, out)
+        inferred = close_file(source, out, dl=dl)
     except Contradiction as clash:
         click.echo(f"irtwin: {source}: {clash}", err=True)
         sys.exit(3)

@@ -81,3 +81,38 @@ def test_missing_file_and_unfit_place_are_refused(tmp_path: Path) -> None:
     source.write_text(GIVEN)
     with pytest.raises(InputError, match="no RDF format"):
         close_file(source, tmp_path / "out.doc")
+
+
+DL = """
+@prefix ex: <https://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+ex:o a owl:Ontology . ex:p a owl:ObjectProperty . ex:C a owl:Class . ex:D a owl:Class . ex:x a ex:C .
+ex:E a owl:Class ; owl:equivalentClass [ a owl:Restriction ; owl:onProperty ex:p ; owl:minCardinality 1 ] .
+ex:C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty ex:p ; owl:someValuesFrom ex:D ] .
+"""
+
+
+def test_classification_by_hermit(tmp_path: Path) -> None:
+    source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
+    source.write_text(DL)
+    assert CliRunner().invoke(cli, ["reason", str(source), "--out", str(out), "--dl"]).exit_code == 0
+    assert "<https://example.org/C> <http://www.w3.org/2000/01/rdf-schema#subClassOf> <https://example.org/E>" in (
+        out.read_text()
+    )
+
+
+def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
+    source = tmp_path / "in.ttl"
+    source.write_text(DL + "ex:D owl:disjointWith ex:D .")
+    with pytest.raises(InputError, match="HermiT cannot read this as OWL 2 DL"):
+        close_file(source, tmp_path / "out.nt", dl=True)
+
+
+def test_clash_that_only_dl_sees_names_its_statements(tmp_path: Path) -> None:
+    source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
+    source.write_text(DL + "ex:D rdfs:subClassOf owl:Nothing .")
+    outcome = CliRunner().invoke(cli, ["reason", str(source), "--out", str(out), "--dl"])
+    assert outcome.exit_code == 3
+    assert "These statements cannot all be true" in outcome.output
+    assert "some D" in outcome.output
+    assert list(tmp_path.iterdir()) == [source]

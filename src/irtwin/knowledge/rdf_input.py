@@ -1,0 +1,76 @@
+"""RDF files as somebody else wrote them: held to what parsers take in bounded time and memory.
+
+Oxigraph's parsers open no other file and follow no address, but they expand XML entities without a bound, take the
+square of the depth for nested XML, and overflow the stack on triples that are nested too deeply.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers.expat import ExpatError, ParserCreate
+
+from pyoxigraph import RdfFormat
+
+from irtwin.errors import InputError
+from irtwin.input_file import read_input
+
+_LARGEST = 1_000_000_000  # bytes
+_LONGEST_ENTITY = 200  # characters; Protégé abbreviates IRIs by entities
+_DEEPEST = 500  # XML elements, or triples in triples
+_NESTED_TRIPLE = re.compile(rb"<<|>>")
+
+
+def read_rdf(path: Path, form: RdfFormat) -> bytes:
+    """Return an RDF file's content. Raises InputError where it cannot be read or would be too much for the parser."""
+    content = read_input(path, _LARGEST)
+    if form == RdfFormat.RDF_XML:
+        _check_xml(path, content)
+    else:
+        _check_triples(path, content)
+    return content
+
+
+def refuse(path: Path, error: SyntaxError | MemoryError) -> NoReturn:
+    """Turn what a parser says of a file into an InputError."""
+    if isinstance(error, MemoryError):
+        raise InputError(f"{path}: holds a term of more than 16 MB; keep such content in a file of its own") from None
+    line = f", line {error.lineno}" if error.lineno else ""
+    raise InputError(f"{path}{line}: {error.msg}") from error
+
+
+def _check_triples(path: Path, content: bytes) -> None:
+    depth = 0
+    for bracket in _NESTED_TRIPLE.finditer(content):
+        depth = depth + 1 if bracket[0] == b"<<" else max(0, depth - 1)
+        if depth > _DEEPEST:
+            raise InputError(f"{path}: triples are nested more than {_DEEPEST} deep")
+
+
+def _check_xml(path: Path, content: bytes) -> None:
+    """Walk through XML before Oxigraph does; what is not well-formed is left for it to say."""
+    depth = 0
+
+    def start(name: str, attributes: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEEPEST:
+            raise InputError(f"{path}: elements are nested more than {_DEEPEST} deep")
+
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def entity(name: str, is_parameter: bool, value: str | None, *outside: str | None) -> None:
+        if value is None or is_parameter or "&" in value or len(value) > _LONGEST_ENTITY:
+            raise InputError(
+                f"{path}: the XML entity {name!r} is long, made of others or outside; only abbreviations are allowed"
+            )
+
+    parser = ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = start, end, entity
+    try:
+        parser.Parse(content, True)
+    except ExpatError:
+        return
