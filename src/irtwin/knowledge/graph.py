@@ -23,6 +23,7 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+from irtwin.knowledge.rdf_input import read_rdf, refuse
 from irtwin.knowledge.series_functions import Functions, series_functions
 from irtwin.knowledge.server import SparqlServer, is_url
 from irtwin.knowledge.sparql_text import asks_another_server, bound
@@ -123,8 +124,8 @@ class KnowledgeGraph:
         lost = triples - remaining - {quad.triple for quad in given}
         if taken or given:
             self._store.update(
-                f"DELETE DATA {{ {_data(in_graph(lost))} {_data(taken)} }} ;\n"
-                f"INSERT DATA {{ {_data(in_graph(quad.triple for quad in given))} {_data(given)} }}"
+                f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
+                f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
             )
 
     def _holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
@@ -240,11 +241,12 @@ class KnowledgeGraph:
 
 def read_turtle(file: Path) -> Iterator[Triple]:
     """Read a Turtle file; InputError names the file and the line where it is broken."""
+    content = read_rdf(file, RdfFormat.TURTLE)
     try:
-        for quad in parse(path=str(file), format=RdfFormat.TURTLE, rename_blank_nodes=True):
+        for quad in parse(content, format=RdfFormat.TURTLE, rename_blank_nodes=True):
             yield quad.triple
-    except SyntaxError as error:
-        raise InputError(f"{file}, line {error.lineno}: {error.msg}") from error
+    except (SyntaxError, MemoryError) as error:
+        refuse(file, error)
 
 
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
@@ -303,13 +305,15 @@ def _replacement(name: str, triples: set[Triple]) -> str:
 
 
 def _data(quads: Iterable[Quad]) -> str:
-    """Write quads as SPARQL's QuadData."""
-    return "\n".join(
-        f"{quad.triple} ."
-        if isinstance(quad.graph_name, DefaultGraph)
-        else f"GRAPH {quad.graph_name} {{ {quad.triple} }}"
-        for quad in quads
-    )
+    """Write quads of named graphs as SPARQL's QuadData, the triples of each graph together."""
+    by_graph: dict[Any, list[Triple]] = {}
+    for quad in quads:
+        by_graph.setdefault(quad.graph_name, []).append(quad.triple)
+    return "\n".join(f"GRAPH {name} {{ {_triples(triples)} }}" for name, triples in by_graph.items())
+
+
+def _triples(triples: Iterable[Triple]) -> str:
+    return " .\n".join(map(str, triples))
 
 
 def _graph_name(iri: str) -> NamedNode:

@@ -147,15 +147,15 @@ class LiveTwin:
                 tables = run.tables(self.waited)
             with self._showing:
                 if not run.over:
-                    run.shown = self._show(run.header.run_id, run.shown, tables)
+                    quads = run.mapped(tables, self._mapper)
+                    self._show(run.header.run_id, run.shown, quads)
+                    run.shown = quads
 
-    def _show(self, run_id: str, shown: set[Quad] | None, tables: live_run.Tables) -> set[Quad]:
-        """Bring the graph from what it shows of a run, None where that is unknown, to what the rows say."""
-        quads = {quad for table, rows in tables.items() for quad in self._mapper.quads(table, rows)}
+    def _show(self, run_id: str, shown: set[Quad] | None, quads: set[Quad]) -> None:
+        """Bring the graph from what it shows of a run, None where that is unknown, to the quads."""
         if shown is None:
             shown = self._quads_of(run_id)
         self._graph.change(shown - quads, quads - shown)
-        return quads
 
     def _quads_of(self, run_id: str) -> set[Quad]:
         """Return what the graph says of a live run."""
@@ -221,7 +221,7 @@ class LiveTwin:
             if not kept:  # else the crash came right here
                 run, activity, made = live_run.records(tables)
                 self._place.keep_live_run(run, series, activity, made)
-            self._show(header.run_id, shown, tables)
+            self._show(header.run_id, shown, {quad for it in tables.items() for quad in self._mapper.quads(*it)})
         path.unlink()
 
     def _recover(self) -> None:

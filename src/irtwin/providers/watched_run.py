@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pyoxigraph import Quad
 
 from irtwin.errors import InputError
+from irtwin.knowledge.mapping import RowMapper
 from irtwin.providers import live_run
 from irtwin.providers.joint_stream import State
 from irtwin.storage.journal import Header, Journal
@@ -32,6 +33,7 @@ class WatchedRun:
     over: bool = False
     waiting: list[State] = field(default_factory=list)
     shown: set[Quad] | None = field(default_factory=set)
+    _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
 
     @property
     def length(self) -> float:
@@ -61,6 +63,13 @@ class WatchedRun:
         at = live_run.Newest(now.time, now.position, self.speed, self.acceleration, now.effort, now.temperature)
         current = "moving" if live_run.moving(self.speed, self.fastest) else "standstill"
         return live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
+
+    def mapped(self, tables: live_run.Tables, mapper: RowMapper) -> set[Quad]:
+        """Return the quads of the rows; those of tables that are as before are not made again."""
+        for table, rows in tables.items():
+            if table not in self._mapped or self._mapped[table][0] != rows:
+                self._mapped[table] = rows, set(mapper.quads(table, rows))
+        return set().union(*(quads for _, quads in self._mapped.values()))
 
     def counts(self, waited: float) -> live_run.Values:
         """Return what the graph says of how well it kept up."""

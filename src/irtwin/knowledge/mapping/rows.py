@@ -23,13 +23,16 @@ class RowMapper:
         """Read the documents against a database. Raises InputError for a fault in one of them."""
         with planned(engine, documents, base_iri) as (_, statements):
             self._statements = [statement for statement in statements if statement.table]
+        self._of_table: dict[str, list[Statement]] = {}  # as found
 
     def quads(self, table: str, rows: Iterable[Mapping[str, Any]]) -> Iterator[Quad]:
         """Yield what rows of a table become, values by column as the database's driver gives them.
 
         A column that a row lacks is NULL: it makes no quad. ValueError where no document names the table.
         """
-        statements = [statement for statement in self._statements if _reads(statement, table)]
+        if table not in self._of_table:
+            self._of_table[table] = [statement for statement in self._statements if _reads(statement, table)]
+        statements = self._of_table[table]
         if not statements:
             raise ValueError(f"no mapping document reads table {table!r} by its name")
         for row in rows:
