@@ -197,7 +197,8 @@ def _diagnosis(draw: random.Random, robot_id: str, verdict: str, names: list[str
     checksum = f"{draw.getrandbits(256):064x}"
     yield "gap_diagnosis", at | {
         "verdict": verdict, "created": _text(BEGIN + timedelta(days=91)),
-        "energy_error_percent": draw.uniform(1.0, 12.0), "noise_floor_from": "repeats", "file": f"diagnoses/{diagnosis_id}.json", "sha256": checksum,
+        "energy_error_percent": draw.uniform(1.0, 12.0), "noise_floor_from": "repeats",
+        "file": f"diagnoses/{diagnosis_id}.json", "sha256": checksum,
         "evidence_file": f"diagnoses/{diagnosis_id}.evidence.json", "evidence_sha256": checksum,
         "twin_file": f"diagnoses/{diagnosis_id}.twin.json", "twin_sha256": checksum,
     }  # fmt: skip

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import RdfFormat, parse
-from soak import soak
 
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from soak import soak
 
 TWO_ROBOTS = Path(__file__).parents[1] / "knowledge/data/two_robots.trig"
 
