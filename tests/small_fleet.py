@@ -126,6 +126,8 @@ def _twins() -> Iterator[Base]:
         for effect in effects:
             yield schema.TwinEffect(twin_id=twin, effect=effect, activity_id=made)
         for of, name, *_, part in (run[:7] for run in RUNS):
+            if of == robot and part == "fit":
+                yield schema.ActivityUse(activity_id=made, entity=f"{ID}run/{robot}.{name}")
             if of == robot:
                 yield schema.TwinRun(twin_id=twin, run_id=f"{robot}.{name}", part=part, activity_id=made)
     for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
