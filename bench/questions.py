@@ -1,8 +1,8 @@
 """How long each named question takes of a fleet's graph: python bench/questions.py FOLDER [TIMES]
 
 FOLDER is what bench/fleet.py wrote. Questions of one robot are asked of one; the others of the whole fleet. Each is
-asked TIMES times in a row; "first" is its first answer in this process. Of the others the least is given, by the clock and by
-the processor's time, which says what it takes on a machine that does nothing else. Prints the table of
+asked TIMES times in a row; "first" is its first answer in this process. Of the others the least is given, by the clock
+and by the processor's time, which says what it takes on a machine that does nothing else. Prints the table of
 bench/QUESTIONS.md.
 """
 
