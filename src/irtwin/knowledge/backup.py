@@ -12,6 +12,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,7 +20,6 @@ from pyoxigraph import NamedNode, Quad, QuerySolutions, RdfFormat, parse, serial
 from sqlalchemy import Connection, Table, func, insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
-from irtwin import __version__
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.source import snapshot_options
@@ -54,7 +54,7 @@ def backup(place: Workspace, graph: KnowledgeGraph | None, archive: Path) -> Non
         if graph is not None:
             serialize(_quads(graph), str(held / _GRAPH), RdfFormat.N_QUADS)
             contents[_GRAPH] = held / _GRAPH
-        about = {"software": f"irtwin {__version__}", "created": datetime.now(UTC).isoformat(timespec="seconds")}
+        about = {"software": f"irtwin {version('irtwin')}", "created": datetime.now(UTC).isoformat(timespec="seconds")}
         pack(contents, archive, about)
 
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from irtwin import __version__
 from irtwin.providers.joint_stream import State
 from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
@@ -82,7 +82,7 @@ def rows(
         "provider": LIVE,
         "subject": run_iri(header.run_id),
         "started": _moment(began),
-        "software": f"irtwin {__version__}",
+        "software": f"irtwin {version('irtwin')}",
     }
     made = {"run_id": header.run_id, "activity_id": activity_id}
     return {
