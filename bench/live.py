@@ -32,6 +32,7 @@ from irtwin.providers.joint_stream import StateReader, feed, listening
 from irtwin.providers.live import LiveTwin
 from irtwin.storage.database import LIVE, Workspace
 from irtwin.storage.schema import Joint, Robot, Run
+from irtwin.watch import SWITCH
 
 RATE = 83.0  # Hz
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
@@ -76,7 +77,7 @@ def watched_by_queries(graph: KnowledgeGraph, seen: dict[str, list[tuple[float, 
     over = threading.Event()
 
     def ask() -> None:
-        while not over.wait(0.002):
+        while not over.wait(0.002 + 0.0002 * len(seen)):
             rows = graph.query(SHOWN)
             now = time.time()
             for row in rows:
@@ -119,6 +120,7 @@ def oxigraph_server() -> Iterator[str]:
 
 
 def main(robots: int, seconds: float, on_server: bool) -> None:
+    sys.setswitchinterval(SWITCH)
     seen: dict[str, list[tuple[float, float]]] = {}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -134,7 +136,9 @@ def main(robots: int, seconds: float, on_server: bool) -> None:
         with listening(0, lambda lines: feed(lines, reader, twin.receive, print)) as port:
             command = [sys.executable, __file__, "send", str(port), str(robots), str(seconds)]
             with watched_by_queries(graph, seen):
+                used = time.process_time()
                 sent = int(subprocess.run(command, check=True, capture_output=True, text=True).stdout) * robots
+                used = time.process_time() - used
                 time.sleep(1.0)
         began = time.perf_counter()
         twin.stop()
@@ -148,7 +152,8 @@ def main(robots: int, seconds: float, on_server: bool) -> None:
     lag = 1000 * np.concatenate(found)
     stored = sum(run.sample_count for run in runs)
     load = ", ".join(f"{value:.1f}" for value in os.getloadavg()[:2])
-    print(f"{robots} robots, {seconds:g} s, {'server' if on_server else 'embedded'}; load of the machine {load}")
+    place_of_graph = "on a server" if on_server else "embedded"
+    print(f"{robots} robots, {seconds:g} s, graph {place_of_graph}; {used / seconds:.2f} cores used, load {load}")
     print(f"samples sent {sent}, stored {stored}, lost {sent - stored}; source waited {twin.waited:.2f} s")
     print(f"lag of the graph, ms: median {np.median(lag):.0f}, p99 {np.percentile(lag, 99):.0f}, max {lag.max():.0f}")
     print(f"states never shown: {twin.superseded / stored:.1%}; asked {len(seen['R000'])} times; end {stopped:.1f} s")

@@ -15,6 +15,7 @@ from irtwin.providers.joint_stream import StateReader, feed, lines_of, listening
 from irtwin.providers.live import LiveTwin
 from irtwin.storage.database import Workspace
 
+SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 _MOST_REASONS = 20  # said of refused lines
 
 
@@ -30,6 +31,7 @@ def watch(
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
     """
+    sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
     done = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

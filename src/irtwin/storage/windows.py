@@ -97,9 +97,9 @@ class SeriesWindows:
         )
 
     def _read_totals(self, channel: str, ranges: list[tuple[float, float]]) -> tuple[int, float, float, float]:
-        one = _samples_of(channel)
-        totals = "count(value), coalesce(fsum(value), 0), coalesce(min(value), 'inf'), coalesce(max(value), '-inf')"
-        text = f"SELECT {totals} FROM ({' UNION ALL '.join([one] * len(ranges))})"
+        one = self._samples_of(channel)
+        extremes = "coalesce(min(value)::DOUBLE, 'inf'), coalesce(max(value)::DOUBLE, '-inf')"
+        text = f"SELECT count(value), coalesce(fsum(value), 0), {extremes} FROM ({' UNION ALL '.join([one] * len(ranges))})"
         values = [value for edge in ranges for value in (self._file, *map(float, edge))]
         count, total, least, greatest = _connection().execute(text, values).fetchall()[0]
         return int(count), float(total), float(least), float(greatest)
@@ -117,10 +117,15 @@ class SeriesWindows:
 
     def _samples(self, channel: str, start: float, end: float, most: int | None = None) -> tuple[Floats, Floats]:
         limit = "" if most is None else f" LIMIT {most}"
-        found: dict[str, Any] = self._run(
-            f"{_samples_of(channel)} ORDER BY time{limit}", float(start), float(end)
-        ).fetchnumpy()
-        return found["time"], found["value"]
+        text = f"{self._samples_of(channel)}{limit}"  # in the order of the file, which is that of time
+        found: dict[str, Any] = self._run(text, float(start), float(end)).fetchnumpy()
+        return found["time"], found["value"].astype(np.float64, copy=False)
+
+    def _samples_of(self, channel: str) -> str:
+        """Return the query of a window's samples; those of a channel with a summary are all finite."""
+        name = '"' + channel.replace('"', '""') + '"'
+        finite = "" if self._known(channel) else f" AND isfinite({name})"
+        return f"SELECT time, {name} AS value FROM read_parquet(?) WHERE time BETWEEN ? AND ?{finite}"
 
     def _known(self, channel: str) -> tuple[Summary, Channel] | None:
         self._check(channel)
@@ -162,10 +167,3 @@ def _until(time: Floats, values: Floats, at: float) -> float:
     stop = int(np.searchsorted(time, at, side="right"))
     end = np.interp(at, time, values)
     return float(np.trapezoid(np.append(values[:stop], end), np.append(time[:stop], at)))
-
-
-def _samples_of(channel: str) -> str:
-    """Return the query of a window's samples."""
-    name = '"' + channel.replace('"', '""') + '"'
-    source = "read_parquet(?) WHERE time BETWEEN ? AND ?"
-    return f"SELECT time, CAST({name} AS DOUBLE) AS value FROM {source} AND isfinite({name})"
