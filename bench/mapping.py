@@ -1,4 +1,4 @@
-"""How long the mapping takes: 100,000 rows to 400,000 quads in the store, and how much memory it holds.
+"""How long the mapping takes: 100,000 rows to 400,000 quads in the store, how much memory, and what ten changes cost.
 
 python bench/mapping.py [ROWS]
 """
@@ -13,8 +13,10 @@ import time
 from pathlib import Path
 
 from pyoxigraph import Store
+from sqlalchemy import Engine
 
-from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import map_database, refresh
 from irtwin.storage.engine import open_engine
 
 MAPPING = """
@@ -22,7 +24,7 @@ MAPPING = """
 @prefix ex: <http://example.com/> .
 <#Reading> rr:logicalTable [ rr:tableName "reading" ] ;
     rr:subjectMap [ rr:template "http://example.com/reading/{robot}/{number}" ; rr:class ex:Reading ;
-        rr:graphMap [ rr:template "http://example.com/graph/{robot}" ] ] ;
+        rr:graphMap [ rr:template "https://w3id.org/irtwin/graph/source/{robot}" ] ] ;
     rr:predicateObjectMap [ rr:predicate ex:of ; rr:objectMap [ rr:template "http://example.com/robot/{robot}" ] ] ;
     rr:predicateObjectMap [ rr:predicate ex:power ; rr:objectMap [ rr:column "power" ] ] ;
     rr:predicateObjectMap [ rr:predicate ex:state ; rr:objectMap [ rr:column "state" ] ] .
@@ -54,6 +56,25 @@ def main(rows: int) -> None:
             started = time.perf_counter()
             store.bulk_extend(map_database(engine, [mapping]))
             print(f"into a store in {name}: {time.perf_counter() - started:.2f} s, {len(store)} quads")
+        incremental(engine, database, mapping, Path(folder))
+
+
+def incremental(engine: Engine, database: Path, mapping: Path, folder: Path) -> None:
+    """A first run into the graph on disk, one without changes, and one after ten: updates, inserts and deletions."""
+    changes = [
+        *("UPDATE reading SET power = -1 WHERE number = " + str(row) for row in range(0, 4000, 1000)),
+        *("DELETE FROM reading WHERE number = " + str(row) for row in range(1, 3000, 1000)),
+        *(f"INSERT INTO reading VALUES (-{row}, 'robot 7', 0.5, 'idle')" for row in range(1, 4)),
+    ]
+    graph = KnowledgeGraph(folder / "refreshed")
+    for what, statements in (("first run", []), ("no change", []), ("ten changed rows", changes)):
+        with sqlite3.connect(database) as connection:
+            for statement in statements:
+                connection.execute(statement)
+        started = time.perf_counter()
+        refresh(graph, engine, [mapping], folder / "rows.db")
+        print(f"{what}: {time.perf_counter() - started:.2f} s")
+    print(f"the remembered rows take {(folder / 'rows.db').stat().st_size / 1e6:.0f} MB")
 
 
 if __name__ == "__main__":
