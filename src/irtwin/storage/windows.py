@@ -99,7 +99,8 @@ class SeriesWindows:
     def _read_totals(self, channel: str, ranges: list[tuple[float, float]]) -> tuple[int, float, float, float]:
         one = self._samples_of(channel)
         extremes = "coalesce(min(value)::DOUBLE, 'inf'), coalesce(max(value)::DOUBLE, '-inf')"
-        text = f"SELECT count(value), coalesce(fsum(value), 0), {extremes} FROM ({' UNION ALL '.join([one] * len(ranges))})"
+        edges = " UNION ALL ".join([one] * len(ranges))
+        text = f"SELECT count(value), coalesce(fsum(value), 0), {extremes} FROM ({edges})"
         values = [value for edge in ranges for value in (self._file, *map(float, edge))]
         count, total, least, greatest = _connection().execute(text, values).fetchall()[0]
         return int(count), float(total), float(least), float(greatest)

@@ -1,0 +1,76 @@
+"""`irtwin live`, `backup` and `restore`, as they are called."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rows
+from irtwin.storage.database import Workspace
+
+
+def irtwin(*arguments: object, **options: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "irtwin", *map(str, arguments)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, text=True, **pipes, **options)  # type: ignore[call-overload]
+
+
+def lines(count: int) -> str:
+    said = [
+        {"robot": rows.ROBOT, "time": 1e9 + 0.1 * step, "position": [step, 0], "power": 100} for step in range(count)
+    ]
+    return "".join(json.dumps(one) + "\n" for one in said)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    with Workspace(tmp_path / "w") as place:
+        place.ingest(*rows.data_set())
+    return tmp_path / "w"
+
+
+def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(workspace: Path) -> None:
+    out, said = irtwin("live", "--workspace", workspace).communicate(lines(50) + "junk\njunk\n", timeout=120)
+    assert said.count("refused: a line is no JSON") == 1
+    assert "50 samples stored, 2 lines refused" in said
+    archive = workspace.with_name("kept.zip")
+    out, said = irtwin("backup", archive, "--workspace", workspace).communicate(timeout=120)
+    assert (out.strip(), said) == (str(archive), "")
+    after = workspace.with_name("after")
+    irtwin("restore", archive, "--workspace", after).communicate(timeout=120)
+    question = "SELECT (series:integral(?run, 'power', 0, 9) AS ?joules) { ?run irt:State_Time ?at }"
+    for folder in (workspace, after):
+        out, said = irtwin("query", question, "--format", "json", "--workspace", folder).communicate(timeout=120)
+        assert json.loads(out) == [{"joules": pytest.approx(490.0)}], said
+    process = irtwin("restore", archive, "--workspace", after)
+    assert "is there already" in process.communicate(timeout=120)[1]
+    assert process.returncode == 2
+
+
+def test_a_signal_ends_the_watching_and_nothing_is_lost(workspace: Path) -> None:
+    process = irtwin("live", "--port", "0", "--workspace", workspace)
+    assert process.stderr is not None
+    address = process.stderr.readline().split()[-1]
+    host, port = address.split(":")
+    with socket.create_connection((host, int(port))) as client:
+        client.sendall(lines(30).encode() + b"end\n")
+        assert "refused" in process.stderr.readline()  # all before it was taken
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert "30 samples stored" in said
+    assert not list((workspace / "live").iterdir())
+
+
+def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
+    for command in (["live"], ["backup", tmp_path / "a.zip"]):
+        process = irtwin(*command, "--workspace", tmp_path / "none")
+        assert "no workspace here" in process.communicate(timeout=120)[1]
+        assert process.returncode == 2
+    assert not list(tmp_path.iterdir())
