@@ -55,7 +55,7 @@ def judge(diagnosis: dict[str, Any], label: dict[str, Any]) -> dict[str, float]:
         return {
             "unknown effects abstained from": float(diagnosis.get("verdict") in ABSTAIN),
             "unknown effects, nothing named above 0.5": float(all(cause["confidence"] <= 0.5 for cause in causes)),
-            "unknown effects located": float(_located(diagnosis, label["effects"][0])),
+            "unknown effects located": float(located(diagnosis, label["effects"][0])),
         }
     if kind == "pair":
         found = set().union(*(family(cause) for cause in causes)) if causes else set()
@@ -94,7 +94,8 @@ def _regime(diagnosis: dict[str, Any], truth: dict[str, Any]) -> bool:
     return bool(places) and places[0].get("regime") in truth["regimes"]
 
 
-def _located(diagnosis: dict[str, Any], truth: dict[str, Any]) -> bool:
+def located(diagnosis: dict[str, Any], truth: dict[str, Any]) -> bool:
+    """Return whether the first place is where the effect acts."""
     places = diagnosis.get("locations", [])
     if not places or places[0]["channel"] != truth["channel"]:
         return False

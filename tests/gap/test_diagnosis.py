@@ -107,6 +107,15 @@ def test_power_lacks_the_loss_in_the_windings():
     assert (channel.name, cause.effect) == ("power", "copper_loss")
 
 
+def test_an_effect_that_the_search_does_not_know_is_neither_named_nor_a_rival():
+    stribeck = on_joint(1, lambda m: 4 * np.sign(m.dq[:, 1]) * np.exp(-np.abs(m.dq[:, 1]) / 0.1))
+    diagnosis = diagnose(data_set(runs(change=stribeck), effects=WITH_LOSS), unknown=["stribeck_friction"])
+    named = {name for _, cause in diagnosis.causes for name in (cause.effect, *cause.rivals)}
+    assert "stribeck_friction" not in named
+    assert diagnosis.verdict != "no_gap"
+    assert diagnosis.locations[0].joint == "joint_2"
+
+
 def test_one_run_without_power_is_cut_in_time():
     (run, *_) = runs(1, change=on_joint(2, lambda m: 2 * np.sin(5 * m.q[:, 2])))
     run = replace(run, signals=replace(run.signals, power=None))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -90,13 +90,15 @@ def diagnose(
     data_set: DataSet,
     *,
     withhold: Sequence[str] = (),
+    unknown: Sequence[str] = (),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
-    `withhold` takes effects out of the twin and leaves them in the catalogue; `progress` is told each step. Raises
-    InputError on an effect that the catalogue lacks or the twin has not, and where the data set cannot be diagnosed.
+    `withhold` takes effects out of the twin and leaves them in the catalogue; `unknown` are those that the search is
+    not to know; `progress` is told each step. Raises InputError on an effect that the catalogue lacks or the twin has
+    not, and where the data set cannot be diagnosed.
     """
     tell = progress or (lambda line: None)
     tell(f"Filtering {len(data_set.runs)} runs")
@@ -110,13 +112,15 @@ def diagnose(
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        torque = ExplainedTorque(stack, _torque(case, stack, plain, floor, predicted, seed, tell), predicted)
-        torque = _balanced(case, power_stack, torque, predicted, seed) if case.shows("power") else torque
+        found = _torque(case, stack, plain, floor, predicted, frozenset(unknown), seed, tell)
+        torque = ExplainedTorque(stack, found, predicted)
+        if case.shows("power"):
+            torque = _balanced(case, power_stack, torque, predicted, frozenset(unknown), seed)
         explained.append(torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        explained.append(_power(case, power_stack, floor, torque, seed, tell))
+        explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
     verdict = verdict_of(findings, floor)
@@ -164,33 +168,44 @@ def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stac
 
 
 def _torque(
-    case: Case, stack: Stack, plain: System, floor: Floor, predicted: Torque, seed: int, tell: Progress
+    case: Case,
+    stack: Stack,
+    plain: System,
+    floor: Floor,
+    predicted: Torque,
+    unknown: Set[str],
+    seed: int,
+    tell: Progress,
 ) -> Finding:
     found = occasional(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
     system = torque_system(stack, case.with_torque, case.grouping, tried, predicted, tell)
     system = replace(system, episode=found.contact)
-    return find("torque", case, system, floor.torque, seed)
+    return find("torque", case, system, floor.torque, seed, without=unknown)
 
 
-def _balanced(case: Case, stack: Stack, explained: ExplainedTorque, predicted: Torque, seed: int) -> ExplainedTorque:
+def _balanced(
+    case: Case, stack: Stack, explained: ExplainedTorque, predicted: Torque, unknown: Set[str], seed: int
+) -> ExplainedTorque:
     """Let power speak: drop the rivals that it refutes, and try without causes that it does."""
     known, finding = catalogue(), explained.finding
     weighed = balances(case, stack, explained)
     if wrong := refuted(finding.causes, weighed, known):
-        finding = find("torque", case, finding.system, finding.floor, seed, without=wrong)
+        finding = find("torque", case, finding.system, finding.floor, seed, without=wrong | unknown)
         weighed = balances(case, stack, ExplainedTorque(explained.stack, finding, predicted))
     causes = tuple(filtered(one, said, known) for one, said in zip(finding.causes, weighed, strict=True))
     finding = replace(finding, attribution=replace(finding.attribution, causes=causes), balances=weighed)
     return ExplainedTorque(explained.stack, finding, predicted)
 
 
-def _power(case: Case, stack: Stack, floor: Floor, torque: Torque, seed: int, tell: Progress) -> Explained:
+def _power(
+    case: Case, stack: Stack, floor: Floor, torque: Torque, unknown: Set[str], seed: int, tell: Progress
+) -> Explained:
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     level = None if floor.power is None else np.array([floor.power])
-    return explained_power(stack, find("power", case, system, level, seed), torque, power_of)
+    return explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:
