@@ -107,7 +107,7 @@ class Client:
         name = self._chance.choice(list(named_questions()))
         text, accept = named_questions()[name].text, self._chance.choice(RESULTS)
         response = self._ask(text, accept, 200)
-        if self._first.setdefault((name, accept), response.content) != response.content:
+        if response.status_code == 200 and self._first.setdefault((name, accept), response.content) != response.content:
             self._outcome.errors.append(f"{name} as {accept} changed")
 
     def _describe(self) -> None:
@@ -152,9 +152,13 @@ class Client:
         return response
 
     def _count(self, response: httpx.Response, expected: int) -> None:
+        if "retry-after" in response.headers:  # back-pressure, said as such
+            self._outcome.statuses["put off"] += 1
+            return
         self._outcome.statuses[str(response.status_code)] += 1
         if response.status_code != expected:
-            self._outcome.errors.append(f"{response.status_code}, not {expected}: {response.text[:200]!r}")
+            asked = str(response.request.url)[-60:]
+            self._outcome.errors.append(f"{response.status_code}, not {expected}: {response.text[:200]!r}, {asked}")
 
 
 def soak(workspace: Path, seconds: float, clients: int) -> Outcome:

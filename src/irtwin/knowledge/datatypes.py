@@ -85,7 +85,7 @@ def _datatypes_of(space: str, content: Hashable) -> Iterator[str]:
     if isinstance(content, Decimal):
         yield XSD + "decimal"
         if content == content.to_integral_value():
-            yield from (XSD + name for name, bounds in _WHOLE.items() if _within(int(content), *bounds))
+            yield from (XSD + name for name, bounds in _WHOLE.items() if _within(content, *bounds))
     elif space == "text" and isinstance(content, tuple):
         text, language = content
         yield RDF + "PlainLiteral"
@@ -101,7 +101,7 @@ def _datatypes_of(space: str, content: Hashable) -> Iterator[str]:
         yield space
 
 
-def _within(number: int, lowest: int | None, highest: int | None) -> bool:
+def _within(number: Decimal, lowest: int | None, highest: int | None) -> bool:
     return (lowest is None or lowest <= number) and (highest is None or number <= highest)
 
 
@@ -109,7 +109,7 @@ def _read_whole(lowest: int | None, highest: int | None) -> Callable[[str], Valu
     def read(text: str) -> Value:
         _demand(_INTEGER, text)
         number = Decimal(text)
-        if not _within(int(number), lowest, highest):
+        if not _within(number, lowest, highest):
             raise IllTyped(f"{text} is out of range")
         return _decimal(number)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from typing import NoReturn
-from xml.parsers.expat import ExpatError, ParserCreate
+from xml.parsers.expat import ErrorString, ExpatError, ParserCreate
 
 from pyoxigraph import RdfFormat
 
@@ -49,7 +49,7 @@ def _check_triples(path: Path, content: bytes) -> None:
 
 
 def _check_xml(path: Path, content: bytes) -> None:
-    """Walk through XML before Oxigraph does; what is not well-formed is left for it to say."""
+    """Walk through XML before Oxigraph does, which takes a file that was cut off for a whole one."""
     depth = 0
 
     def start(name: str, attributes: object) -> None:
@@ -72,5 +72,6 @@ def _check_xml(path: Path, content: bytes) -> None:
     parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = start, end, entity
     try:
         parser.Parse(content, True)
-    except ExpatError:
-        return
+    except ExpatError as error:
+        where = f"{path}, line {error.lineno}, column {error.offset + 1}"
+        raise InputError(f"{where}: not well-formed XML ({ErrorString(error.code)})") from error

@@ -12,6 +12,7 @@ import math
 import resource
 import struct
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -138,4 +139,5 @@ def _frame(out: IO[bytes], kind: bytes, data: bytes) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))
+    with suppress(BrokenPipeError):  # the server is gone
+        main(Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))

@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 
+_LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
 _WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
 
@@ -107,6 +108,7 @@ def _address(url: str | URL) -> URL:
 
 
 def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST_VALUE)
     connection.isolation_level = None  # transactions begin where _begin_sqlite says
     connection.execute(f"PRAGMA busy_timeout = {int(BUSY_TIMEOUT * 1000)}")
     connection.execute("PRAGMA foreign_keys = ON")

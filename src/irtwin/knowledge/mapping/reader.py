@@ -267,7 +267,8 @@ class _Reader:
         try:
             return parse(text)
         except ValueError as error:
-            self.fault(where, str(error))
+            said = str(error)
+            self.fault(where, said if len(said) < 200 else f"{said[:200]}...")
 
     def fault(self, where: str, message: str) -> NoReturn:
         raise InputError(f"{where}: {message}")
