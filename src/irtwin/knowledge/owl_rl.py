@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain, product
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
@@ -17,6 +18,7 @@ from irtwin.knowledge.vocabulary import OWL, XSD, shorten
 
 _TRIVIAL = (OWL + "Thing", OWL + "Nothing")
 MOST_CONCLUSIONS = 100_000_000  # each time that a rule draws one counts
+MOST_FACTS = 5_000_000  # beside those that were given; they take 1.1 GB
 
 
 Statement = tuple[Node, Node, Node]  # unlike a triple, it may be about a literal
@@ -53,6 +55,7 @@ class Closure:
         self._drawn = 0
         self._rounds = 0
         self._round: dict[Fact, int] = {}  # in which a fact was found: a conclusion is found after its premises
+        self._groups: dict[Number, set[Number]] = {}  # of numbers that are the same
         self._named_values: set[Number] = set()
         self._triples: set[Triple] = set()
         self._given: set[Fact] = set()
@@ -108,16 +111,33 @@ class Closure:
                     return Derivation(rule.name, tuple(map(self._shown, premises)))
         return None
 
-    def _saturate(self, fresh: Iterable[Fact]) -> None:
-        fresh = self._unknown(fresh)
+    def _saturate(self, facts: Iterable[Fact]) -> None:
+        fresh = self._unknown(facts)
         while fresh:
+            fresh += self._equal(fresh)
             self._rounds += 1
             for fact in fresh:
                 self._facts.add(fact)
             new = Facts(fresh)
-            conclusions = (fact for join in self._program.forward for fact in join(self._facts, new))
-            fresh = self._unknown(conclusions)
-            fresh += self._unknown(self._of_values(fresh))
+            by_rules = (fact for join in self._program.forward for fact in join(self._facts, new))
+            fresh = self._unknown(chain(self._of_values(fresh), by_rules))
+
+    def _equal(self, fresh: list[Fact]) -> list[Fact]:
+        """Return what follows of new equalities by symmetry and transitivity, by joining groups of equals."""
+        same, found = self._program.same, list[Fact]()
+        for one, predicate, other in fresh:
+            if predicate != same or one == other:
+                continue
+            ones, others = (self._groups.setdefault(number, {number}) for number in (one, other))
+            if ones is others:
+                continue
+            steps = ([(other, one)], ((it, other) for it in ones), product(ones, others), product(others, ones))
+            for step in steps:  # each from what the ones before it found
+                self._rounds += 1
+                found += self._unknown((left, same, right) for left, right in step if left != right)
+            ones |= others
+            self._groups.update(dict.fromkeys(others, ones))
+        return found
 
     def _unknown(self, facts: Iterable[Fact]) -> list[Fact]:
         """Return those facts that are not known yet, and note the round that they are found in."""
@@ -126,9 +146,9 @@ class Closure:
             if fact not in known:
                 known[fact] = number_of_round
                 unknown.append(fact)
-            elif drawn > MOST_CONCLUSIONS:
+            if drawn > MOST_CONCLUSIONS or len(known) - len(self._given) > MOST_FACTS:
                 raise InputError(
-                    f"OWL 2 RL draws more than {MOST_CONCLUSIONS:,} conclusions, most of them over and over: "
+                    f"OWL 2 RL draws more than {MOST_CONCLUSIONS:,} conclusions or {MOST_FACTS:,} different ones: "
                     "look for large groups of owl:sameAs, or long chains of a transitive property"
                 )
         self._drawn = drawn

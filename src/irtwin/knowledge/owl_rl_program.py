@@ -15,6 +15,7 @@ from irtwin.knowledge.vocabulary import PREFIXES, XSD
 from irtwin.resources import folder
 
 _SPACES = {**PREFIXES, "rl": "urn:irtwin:owl2-rl:"}
+_BY_GROUPS = ("eq-sym", "eq-trans")  # run by joining groups: as loops they take time with the cube of a group
 _NUMBERS = {"rl:zero": "0", "rl:one": "1"}
 
 
@@ -45,7 +46,7 @@ class Program:
         self.forward = [
             compile_join(rule, self.number, rule.head, new=index)
             for rule in self._rules
-            if rule.head
+            if rule.head and rule.name not in _BY_GROUPS
             for index in range(len(rule.body))
         ]
         self.contradictions = [
