@@ -64,5 +64,8 @@ def test_a_browser_gets_the_page_instead(server) -> None:
     accept = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
     response = CLIENT.get(server.sparql, headers={"Accept": accept})
     assert response.headers["content-type"] == "text/html; charset=utf-8"
+    documentation = CLIENT.get(f"{server.url}/irtwin", headers={"Accept": accept})
+    assert documentation.headers["content-type"] == "text/html; charset=utf-8"
+    assert "Industrial_Robot" in documentation.text and "Content-Security-Policy" in documentation.text
     assert CLIENT.get(server.sparql, headers={"Accept": "image/png"}).status_code == 406
     assert CLIENT.get(server.sparql).headers["content-type"].startswith("text/turtle")

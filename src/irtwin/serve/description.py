@@ -21,11 +21,6 @@ _RESULT_FORMATS = (
 _RDF = {form.name: form for form in (RdfFormat.TURTLE, RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
 
 
-def wants_page(accept: str) -> bool:
-    """Whether an Accept header would rather have a page than RDF, as browsers do."""
-    return bool(accept) and negotiation.best(accept, [*negotiation.TRIPLES, "text/html"]) == "text/html"
-
-
 def response(accept: str, address: str, graphs: Sequence[str], updates: bool) -> Response:
     """Describe the service at `address` with its named graphs, in the form that the client prefers."""
     media_type = negotiation.best(accept, negotiation.TRIPLES)

@@ -10,7 +10,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from irtwin.serve import description, page
+from irtwin.serve import description, negotiation, page
 from irtwin.serve.pool import Limits, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
 from irtwin.serve.updates import Updates
@@ -82,7 +82,7 @@ class Endpoint:
 
     async def _describe(self, request: Request) -> Response:
         accept = request.headers.get("accept", "")
-        if description.wants_page(accept):
+        if negotiation.wants_page(accept):
             return page.response()
         graphs = await self._named_graphs()
         return description.response(accept, str(request.url.replace(query="")), graphs, self._updates.allowed)

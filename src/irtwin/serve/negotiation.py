@@ -51,6 +51,11 @@ def best(accept: str, offered: Sequence[str] | Mapping[str, str]) -> str | None:
     return choice if choice is not None and _quality(choice, ranges) > 0 else None
 
 
+def wants_page(accept: str) -> bool:
+    """Whether an Accept header would rather have a page than RDF, as browsers do."""
+    return bool(accept) and best(accept, [*TRIPLES, "text/html"]) == "text/html"
+
+
 def _quality(media_type: str, ranges: Sequence[_Range]) -> float:
     closest = max(ranges, key=lambda found: found.precision(media_type), default=None)
     return closest.quality if closest is not None and closest.precision(media_type) else 0.0

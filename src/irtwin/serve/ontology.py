@@ -16,18 +16,30 @@ from irtwin.resources import folder
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
 
+# The page carries its style and script, and a policy of its own for them.
+_PAGE_HEADERS = {"Vary": "Accept", "Content-Security-Policy": "frame-ancestors 'none'"}
 _FORMATS = {form.name: form for form in (RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
 
 
 def module(request: Request) -> Response:
-    """Return the module whose IRI or version IRI has the request's path."""
+    """Return the module whose IRI or version IRI has the request's path; to a browser, the documentation of all."""
     file = _modules().get(request.url.path)
     if file is None:
         raise Refusal(404, f"no ontology has this address; there are {', '.join(sorted(_modules()))}")
-    media_type = negotiation.best(request.headers.get("accept", ""), negotiation.TRIPLES)
+    accept = request.headers.get("accept", "")
+    if negotiation.wants_page(accept):
+        return Response(_documentation(), media_type="text/html", headers=_PAGE_HEADERS)
+    media_type = negotiation.best(accept, negotiation.TRIPLES)
     if media_type is None:
         raise Refusal(406, f"the ontology comes as {', '.join(negotiation.TRIPLES)}; none of them is in Accept")
     return Response(_written(file, negotiation.TRIPLES[media_type]), media_type=media_type, headers={"Vary": "Accept"})
+
+
+@cache
+def _documentation() -> str:
+    from irtwin.report.ontology import page, read_modules  # a second to import, for browsers only
+
+    return page(read_modules(folder("ontology")))
 
 
 @cache
