@@ -5,17 +5,19 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from contextlib import suppress
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from irtwin.serve import description, negotiation, page
-from irtwin.serve.pool import Limits, Pool, Worker
+from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
 from irtwin.serve.updates import Updates
 
 _METHODS = "GET, HEAD, POST, OPTIONS"
+_TRIES = 3  # workers that may be lost before a query begins
 _log = logging.getLogger(__name__)
 
 
@@ -92,6 +94,12 @@ class Endpoint:
         return Response(status_code=204)
 
     async def _query(self, operation: Operation, request: Request, send: Send, deadline: float) -> None:
+        for _ in range(_TRIES):
+            with suppress(NotBegun):
+                return await self._stream(operation, request, send, deadline)
+        raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
+
+    async def _stream(self, operation: Operation, request: Request, send: Send, deadline: float) -> None:
         async with self._pool.worker() as worker:
             media_type = await self._ask(worker, operation, request.headers.get("accept", ""), deadline)
             headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
@@ -130,7 +138,10 @@ class Endpoint:
     async def _named_graphs(self) -> list[str]:
         deadline = time.monotonic() + self._limits.seconds
         async with self._pool.worker() as worker:
-            await self._ask(worker, Operation("query", description.NAMED_GRAPHS), "text/csv", deadline)
+            try:
+                await self._ask(worker, Operation("query", description.NAMED_GRAPHS), "text/csv", deadline)
+            except NotBegun:
+                raise Refusal(503, "the graph cannot be read just now", {"Retry-After": "2"}) from None
             body = b"".join([piece async for piece in worker.pieces()])
         return body.decode().splitlines()[1:]
 

@@ -32,6 +32,10 @@ class Limits:
     waiting: int = 64  # queries
 
 
+class NotBegun(Exception):
+    """A worker that was lost before it began with a query: another one may take it."""
+
+
 class Worker:
     """One worker process."""
 
@@ -66,11 +70,16 @@ class Worker:
         return self._process.returncode is None
 
     async def ask(self, request: dict[str, Any]) -> str:
-        """Send a query; return the media type of the answer, whose bytes `pieces` gives. Raises Refusal."""
+        """Send a query; return the media type of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun."""
         assert self._process.stdin is not None
         self.idle = False
         self._process.stdin.write(json.dumps(request).encode() + b"\n")
-        _, data = await self._frame()
+        try:
+            kind, data = await self._frame()
+        except Refusal:
+            raise NotBegun from None
+        if kind == b"B":
+            _, data = await self._frame()
         head = json.loads(data)
         if "status" in head:
             self.idle = True

@@ -1,8 +1,8 @@
 """A process that answers one query at a time, so that a query can be ended for real: by ending the process.
 
 Oxigraph cannot be told to stop. The server writes one line of JSON to standard input for each query and reads frames
-from standard output: a letter, the length of what follows, and that. `H` is a head (JSON), `D` a piece of the answer,
-`E` the end. A head with a `status` is a refusal, and all that comes.
+from standard output: a letter, the length of what follows, and that. `B` says that the query begins, `H` is a head
+(JSON), `D` a piece of the answer, `E` the end. A head with a `status` is a refusal, and all that comes.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
         sink = _Sink(out, most_bytes)
         try:
             try:
-                _answer(snapshot.current(request["at_once"]), request, sink)
+                graph = snapshot.current(request["at_once"])
+                _frame(out, b"B", b"")
+                _answer(graph, request, sink)
             except (OSError, RuntimeError):  # the writer removed a file that this view still needed
                 if sink.begun:
                     raise
