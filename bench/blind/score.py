@@ -99,7 +99,7 @@ def located(diagnosis: dict[str, Any], truth: dict[str, Any]) -> bool:
     places = diagnosis.get("locations", [])
     if not places or places[0]["channel"] != truth["channel"]:
         return False
-    return truth["channel"] == "power" or places[0].get("joint") in truth["joints"]
+    return truth["channel"] == "power" or not truth["joints"] or places[0].get("joint") in truth["joints"]
 
 
 def calibration(pairs: Iterable[tuple[float, bool]], bins: int = 10) -> tuple[float, list[tuple[float, float, int]]]:
