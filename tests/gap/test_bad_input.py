@@ -176,6 +176,7 @@ def test_stopped_half_way_nothing_is_left(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # shells ignore it in what runs behind
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:
