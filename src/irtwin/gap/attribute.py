@@ -11,7 +11,7 @@ from irtwin.effects.effect import BASELINE
 from irtwin.gap.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.episodes import brief, in_scope
 from irtwin.gap.hypotheses import MISSING, Hypothesis
-from irtwin.gap.rivals import APART, RIVAL, SAME, causes
+from irtwin.gap.rivals import RIVAL, SAME, causes, told_apart
 from irtwin.gap.significance import p_values
 from irtwin.gap.system import System, Trial, attempt, scores
 
@@ -193,17 +193,12 @@ def _leader(
     known = [int(k) for k in plausible if (left[k].effect, left[k].scope) in before and left[k].joint]
     if known and (nearest := max(known, key=lambda k: gain[k])) != best and gain[nearest] >= RIVAL * gain[best]:
         return nearest
-    equal = [int(k) for k in plausible if _equals(per_group[best] - per_group[k], gain[best])]
+    behind = per_group[best] - per_group
+    equal = [int(k) for k in plausible if behind[k].mean() <= told_apart(behind[k], float(gain[best]), _AT_MOST)]
     equal = [k for k in equal if left[k].scope == left[best].scope and _overlap(left[k], left[best])]
     if left[best].effect == "rigid_body":  # a load imitates bodies that are off, but not all of it
         equal = [k for k in equal if gain[k] >= (1 - SAME) * gain[best]]
     return min(equal, key=lambda k: (left[k].flexibility, -gain[k]), default=best)
-
-
-def _equals(behind: np.ndarray, gain: float) -> bool:
-    """Return whether a hypothesis is behind the best (whose gain is given) by no more than chance, over groups."""
-    error = float(behind.std(ddof=1)) / np.sqrt(len(behind)) if len(behind) > 1 else 0.0
-    return float(behind.mean()) <= max(SAME * gain, min(APART * error, _AT_MOST * gain))
 
 
 def _overlap(one: Hypothesis, other: Hypothesis) -> bool:

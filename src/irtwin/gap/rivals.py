@@ -13,7 +13,7 @@ from irtwin.gap.hypotheses import Hypothesis, Variant
 from irtwin.gap.system import System, attempt, canonical_correlation
 
 RIVAL = 0.8  # of the cause's gain a rival explains
-APART = 2.0  # standard errors between groups that tell rivals apart
+_APART = 2.0  # standard errors between groups that tell rivals apart
 SAME = 0.01  # of the gain: a smaller difference is none
 _LEAST_SHARE = 0.01  # of what the largest cause explains
 
@@ -59,7 +59,7 @@ def _cause(
             continue
         if mean[k] > known.get(name, -np.inf):
             known[name], correlations[name] = float(mean[k]), float(alike[k])
-        if mean[0] - mean[k] < _told_apart(gain[0] - gain[k], float(mean[0])):
+        if mean[0] - mean[k] < told_apart(gain[0] - gain[k], float(mean[0]), 1 - RIVAL):
             equal.append(name)
     return Cause(
         effect=effect,
@@ -75,10 +75,13 @@ def _cause(
     )
 
 
-def _told_apart(behind: np.ndarray, gain: float) -> float:
-    """Return by how much a rival must be behind: `behind` (G,) it is in each group, of the cause's `gain`."""
+def told_apart(behind: np.ndarray, gain: float, most: float) -> float:
+    """Return by how much an effect must be behind a better one to be told from it.
+
+    behind: (G,) it is in each group, of the better one's `gain`; more than `most` of that always tells.
+    """
     error = float(np.std(behind, ddof=1)) / np.sqrt(len(behind)) if len(behind) > 1 else 0.0
-    return max(SAME * gain, min(APART * error, (1 - RIVAL) * gain))
+    return max(SAME * gain, min(_APART * error, most * gain))
 
 
 def _competing(
