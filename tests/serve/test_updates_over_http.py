@@ -138,6 +138,7 @@ def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_g
             assert writer.stdout.readline() == "open\n"
             seen = []
             while not (line := writer.stdout.readline()).startswith("19 "):
+                assert line, "the writer ended"
                 seen.append(state(running))
             written = float(line.split()[1])
             while state(running) != (50, 19, 19):
