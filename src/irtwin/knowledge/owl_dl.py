@@ -47,7 +47,7 @@ def classify(triples: Iterable[Triple]) -> set[Triple]:
     try:
         owlready2.sync_reasoner_hermit(world, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
-        raise Contradiction(f"the graph contradicts the ontology, HermiT finds. {_clash(world)}") from error
+        raise Contradiction(f"statements contradict each other, HermiT finds. {_clash(world)}") from error
     except owlready2.base.OwlReadyJavaError as error:
         reason = re.search(r"Exception: (.+)", str(error))
         raise InputError(f"HermiT cannot read this as OWL 2 DL: {reason[1] if reason else error}") from error

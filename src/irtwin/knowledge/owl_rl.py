@@ -257,7 +257,7 @@ def show(term: Node) -> str:
 
 
 def _contradiction(rule: str, what: str) -> Contradiction:
-    return Contradiction(f"the graph contradicts the ontology (OWL 2 RL rule {rule}): {what}")
+    return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {what}")
 
 
 def _not_of(use: str, datatype: str) -> Contradiction:
