@@ -56,7 +56,9 @@ class Irtwin(Engine):
         self.graph = KnowledgeGraph(folder / "graph")
 
     def load(self, file: Path) -> None:
-        self.graph.fill(_quads(file.read_bytes()), GRAPH)
+        from irtwin.knowledge.graph import in_graph
+
+        self.graph.replace(in_graph((quad.triple for quad in parse(path=file)), GRAPH), GRAPH)
 
     def ask(self, text: str) -> Any:
         return list(self.graph.answer(text))

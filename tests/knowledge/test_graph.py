@@ -3,7 +3,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
-from pyoxigraph import Literal, NamedNode, Quad
+from pyoxigraph import BlankNode, Literal, NamedNode, Quad
 
 from irtwin.errors import InputError
 from irtwin.knowledge import graph as graph_module
@@ -55,6 +55,25 @@ def test_failed_replace_leaves_the_former_content(two_robots: list[Quad], graph:
     with pytest.raises(RuntimeError):
         graph.replace(breaking(), GRAPH_SOURCE)
     assert graph.triples() == before
+
+
+def test_failed_first_load_leaves_nothing(tmp_path: Path) -> None:
+    def breaking():
+        yield quad("x", 1.0, A)
+        raise RuntimeError("the database went away")
+
+    with KnowledgeGraph(tmp_path / "graph") as graph:
+        with pytest.raises(RuntimeError):
+            graph.replace(breaking(), A)
+        assert graph.graphs() == []
+        assert graph.triples() == set()
+
+
+def test_blank_node_of_a_first_load_is_the_same_in_the_union() -> None:
+    graph = KnowledgeGraph()
+    name = NamedNode(A)
+    graph.replace([Quad(BlankNode("b"), NamedNode(term("Energy")), Literal(1.0), name)], A)
+    assert graph.query(f"ASK {{ ?b irt:Energy ?e GRAPH <{A}> {{ ?b irt:Energy ?e }} }}")[0]["answer"] is True
 
 
 def test_quad_outside_the_named_graphs_is_a_bug() -> None:

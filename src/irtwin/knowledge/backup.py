@@ -76,7 +76,7 @@ def restore(archive: Path, folder: Path, database: str | None = None, graph_url:
                 if graph.graphs():
                     raise InputError(f"{graph_url}: the server holds a graph already; give an empty one")
                 if _GRAPH in names:
-                    graph.fill(_read_quads(archive, held / _GRAPH), "")
+                    graph.replace(_read_quads(archive, held / _GRAPH), "")
             with engine.writing(place.engine) as session:
                 for table in Base.metadata.sorted_tables:
                     _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")

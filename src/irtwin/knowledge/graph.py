@@ -91,24 +91,23 @@ class KnowledgeGraph:
     def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
         """Make the quads the whole content of the named graphs whose IRIs start with one of `below`.
 
-        Happens in one transaction, whole or not at all. Graphs that stay as they are are left alone;
-        returns the IRIs of those that changed.
+        Happens whole or not at all: in one transaction or, where there is no such graph yet, as one bulk load, in
+        memory that grows little with their number. Graphs that stay as they are are left alone; returns the IRIs of
+        those that changed.
         """
+        quads = _belonging(quads, below)
+        old = self.graphs(*below)
+        if isinstance(self._store, Store) and not old:
+            self._store.bulk_extend(_with_union(quads))
+            return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
-        new.extend(_belonging(quads, below))
-        names = {*_names(new), *self.graphs(*below)}
+        new.extend(quads)
+        names = {*_names(new), *old}
         changed = sorted(name for name in names if not _same(_read(new, name), _read(self._store, name)))
         if changed:
             self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
-
-    def fill(self, quads: Iterable[Quad], *below: str) -> None:
-        """Do what `replace` does, where no named graph has such an IRI yet: whole or not at all, in flat memory."""
-        if isinstance(self._store, SparqlServer):
-            self.replace(quads, *below)
-        else:
-            self._store.bulk_extend(it for quad in _belonging(quads, below) for it in (quad, *in_graph([quad.triple])))
 
     def change(self, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
         """Take quads out of their named graphs and put others in, in one transaction; the rest stays untouched.
@@ -260,6 +259,13 @@ def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
         if not (isinstance(quad.graph_name, NamedNode) and quad.graph_name.value.startswith(below)):
             raise ValueError(f"a quad of graph {quad.graph_name} does not belong into {', '.join(below)}")
         yield quad
+
+
+def _with_union(quads: Iterable[Quad]) -> Iterator[Quad]:
+    """Yield each quad, and its triple for the default graph."""
+    for quad in quads:
+        yield quad
+        yield Quad(*quad.triple)
 
 
 def _names(store: Store | SparqlServer) -> list[str]:

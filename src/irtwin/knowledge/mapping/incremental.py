@@ -58,8 +58,7 @@ def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], fi
                 remembered.version = version
                 return
         remembered.forget()
-        put = graph.replace if graph.graphs(*_MAPPED) else graph.fill
-        put(chain(run.added(), [_version(version)]), *_MAPPED)
+        graph.replace(chain(run.added(), [_version(version)]), *_MAPPED)
         remembered.version = version
 
 
