@@ -7,6 +7,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -218,10 +219,10 @@ def backup(
 ) -> None:
     """Write a workspace into one archive: graph, database, series, twins, diagnoses and reports; others may write."""
     check_place(archive)
-    with Workspace.existing(Path(workspace), database) as place:
+    with Workspace.existing(Path(workspace), database) as place, ExitStack() as held:
         graph = KnowledgeGraph(graph_url) if graph_url else None
         if graph is None and place.graph_folder.exists():
-            graph = Snapshot(place.graph_folder).current()  # takes no lock
+            graph = held.enter_context(Snapshot(place.graph_folder)).current()  # takes no lock
         keep(place, graph, archive)
 
 

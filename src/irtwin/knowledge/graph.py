@@ -60,14 +60,14 @@ class KnowledgeGraph:
             raise InputError(f"{place}: the graph cannot be opened: {error}") from error
 
     @classmethod
-    def as_it_stands(cls, path: Path) -> Self:
-        """Open what is on disk now, to read; takes no lock, so that another process may write meanwhile.
+    def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
+        """Open what is on disk now, to read; takes no lock. Where another process may write meanwhile: see `snapshot`.
 
-        Raises OSError or RuntimeError where that process changed the files just now: see `snapshot`.
+        Raises OSError or RuntimeError where that process changed the files just now.
         """
         graph = cls.__new__(cls)
         graph._store = Store.read_only(str(path))
-        graph._workspace = path.parent
+        graph._workspace = workspace or path.parent
         return graph
 
     def __enter__(self) -> Self:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from irtwin.serve.linked import remove_left_behind
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.worker import FRAME
 
@@ -140,6 +141,7 @@ class Pool:
         for task in self._starting:
             task.cancel()
         await asyncio.gather(*(worker.end() for worker in self.workers))
+        remove_left_behind(self._folder)
 
     @asynccontextmanager
     async def worker(self) -> AsyncIterator[Worker]:

@@ -43,7 +43,8 @@ def serve(
     Port 0 takes a free one; `announce` is told the endpoint's address once it answers.
     Raises InputError where the graph is missing or the port is taken.
     """
-    Snapshot(graph)  # what cannot be read is said here, once, rather than by each worker
+    with Snapshot(graph):
+        pass  # what cannot be read is said here, once, rather than by each worker
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"

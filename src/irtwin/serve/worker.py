@@ -66,26 +66,21 @@ class _Sink:
 def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
     """Answer queries on the graph in `folder` until standard input ends; bytes of memory and seconds for each."""
     out = sys.stdout.buffer
-    snapshot = Snapshot(folder)
-    limit_memory(memory)
-    _frame(out, b"H", b"{}")
-    for line in sys.stdin.buffer:
-        _limit_processor_time(seconds)
-        request = json.loads(line)
-        sink = _Sink(out, most_bytes)
-        try:
+    with Snapshot(folder) as snapshot:
+        limit_memory(memory)
+        _frame(out, b"H", b"{}")
+        for line in sys.stdin.buffer:
+            _limit_processor_time(seconds)
+            request = json.loads(line)
+            sink = _Sink(out, most_bytes)
             try:
                 graph = snapshot.current(request["at_once"])
                 _frame(out, b"B", b"")
                 _answer(graph, request, sink)
-            except (OSError, RuntimeError):  # the writer removed a file that this view still needed
+            except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
                 if sink.begun:
-                    raise
-                _answer(snapshot.renewed(), request, sink)
-        except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
-            if sink.begun:
-                sys.exit(f"irtwin: an answer was broken off: {error}")
-            _refuse(out, error)
+                    sys.exit(f"irtwin: an answer was broken off: {error}")
+                _refuse(out, error)
 
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
