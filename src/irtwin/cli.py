@@ -279,14 +279,17 @@ def docs(out: Path) -> None:
 @click.argument("mapping", type=click.Path(path_type=Path))
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
-def map_database(mapping: Path, database: str, out: Path) -> None:
+@click.option(
+    "--timeout", type=click.FloatRange(min=0.1), default=600.0, show_default=True, help="Seconds per triples map."
+)
+def map_database(mapping: Path, database: str, out: Path, timeout: float) -> None:
     """Turn a database into triples by an R2RML document.
 
     Any document on any database that SQLAlchemy reaches.
     """
     from irtwin.knowledge.mapping import map_to_file
 
-    map_to_file(mapping, database, out)
+    map_to_file(mapping, database, out, seconds=timeout)
 
 
 @cli.command()

@@ -22,11 +22,15 @@ from irtwin.knowledge.owl_rl_file import close_file
 from irtwin.robot.urdf import read_urdf
 
 SECONDS = 20  # of processor time
+SQL_SECONDS = 2
 MEGABYTES = 700  # beside what the readers' libraries take
 
 ROOMS: dict[str, Callable[..., object]] = {
     "mapping": lambda folder, database: map_to_file(
-        Path(folder, "input.ttl"), database or f"sqlite:///{folder}/data.db", Path(folder, "out.nq")
+        Path(folder, "input.ttl"),
+        database or f"sqlite:///{folder}/data.db",
+        Path(folder, "out.nq"),
+        seconds=SQL_SECONDS,
     ),
     "ontology": lambda folder, name: close_file(Path(folder, name), Path(folder, "out.nt")),
     "urdf": lambda folder, name: read_urdf(Path(folder, name)),

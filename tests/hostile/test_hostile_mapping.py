@@ -27,6 +27,8 @@ def objects(what: str) -> str:
 
 
 DATABASE = "the database refuses it"
+ENDLESS = "<M>: its SQL has not ended after 2 s; mend it"
+NUMBERS = "WITH RECURSIVE number(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM number)"
 SQL = {
     "drop": (query("DROP TABLE person"), DATABASE),
     "delete": (query("DELETE FROM person"), DATABASE),
@@ -49,6 +51,9 @@ SQL = {
     "many unions": (query(" UNION ALL ".join(["SELECT 1 AS id"] * 5000)), DATABASE),
     "many joins": (query("SELECT a0.id FROM " + ", ".join(f"person a{n}" for n in range(200))), DATABASE),
     "many columns": (query("SELECT " + ", ".join(f"1 AS c{n}" for n in range(50_000))), DATABASE),
+    "rows without end": (query(f"{NUMBERS} SELECT n AS id FROM number"), ENDLESS),
+    "no row, without end": (query(f"{NUMBERS} SELECT n AS id FROM number WHERE n < 0"), ENDLESS),
+    "a sum without end": (query(f"{NUMBERS} SELECT sum(n) AS id FROM number"), ENDLESS),
     "syntax": (query("SELEC id"), DATABASE),
     "unknown table": (query("SELECT id FROM nobody"), DATABASE),
     "open string": (query("SELECT 'a AS id"), DATABASE),

@@ -89,6 +89,16 @@ def test_a_time_that_python_has_none_for(engine: Engine, tmp_path: Path) -> None
         objects(engine, tmp_path, "rr:sqlQuery \"SELECT 1 AS id, 'infinity'::timestamp AS v\"", "v")
 
 
+@pytest.mark.parametrize("what", ["n AS id", "sum(n) AS id"])
+def test_sql_without_end(engine: Engine, tmp_path: Path, what: str) -> None:
+    document = tmp_path / "a.r2rml.ttl"
+    numbers = "WITH RECURSIVE t(n) AS (SELECT 1::numeric UNION ALL SELECT n + 1 FROM t)"
+    document.write_text(THINGS % (f'rr:sqlQuery "{numbers} SELECT {what} FROM t"', "id"))
+    with pytest.raises(InputError, match="<T>: its SQL has not ended after 1 s"):
+        for _ in map_database(engine, [document], seconds=1):
+            pass
+
+
 def test_schemas_and_names_of_any_script(engine: Engine, tmp_path: Path) -> None:
     run(
         engine,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,14 +20,17 @@ from irtwin.storage.engine import open_engine
 BASE_IRI = "https://w3id.org/irtwin/id/"
 
 
-def map_database(engine: Engine, documents: Sequence[Path], base_iri: str | None = None) -> Iterator[Quad]:
+def map_database(
+    engine: Engine, documents: Sequence[Path], base_iri: str | None = None, seconds: float = math.inf
+) -> Iterator[Quad]:
     """Yield the quads that mapping documents make of a database, as one snapshot of it shows it.
 
-    base_iri: what relative IRIs lie below; else what a document declares as @base, else BASE_IRI.
+    base_iri: what relative IRIs lie below; else what a document declares as @base, else BASE_IRI;
+    seconds: how long a triples map's SQL may take, with the mapping of its rows.
     The same quad may come more than once. Memory stays flat: rows are read in chunks.
     Raises InputError for a fault in a document, before the first quad, and for a row that does not fit it.
     """
-    with planned(engine, documents, base_iri) as (connection, statements):
+    with planned(engine, documents, base_iri, seconds) as (connection, statements):
         for statement in statements:
             for rows in read(connection, statement.sql, statement.where):
                 for row in rows:
@@ -35,11 +39,11 @@ def map_database(engine: Engine, documents: Sequence[Path], base_iri: str | None
 
 @contextmanager
 def planned(
-    engine: Engine, documents: Sequence[Path], base_iri: str | None = None
+    engine: Engine, documents: Sequence[Path], base_iri: str | None = None, seconds: float = math.inf
 ) -> Iterator[tuple[Connection, list[Statement]]]:
     """Give a read-only snapshot of a database, and the statements that documents make of it."""
     checked = [read_document(path) for path in documents]
-    with snapshot(engine) as connection:
+    with snapshot(engine, seconds) as connection:
         statements = [
             statement
             for document in checked
@@ -48,14 +52,19 @@ def planned(
         yield connection, statements
 
 
-def map_to_file(mapping: Path, database_url: str, out: Path, base_iri: str | None = None) -> None:
-    """Write the quads of one mapping document as N-Quads; the file is there whole or not at all."""
+def map_to_file(
+    mapping: Path, database_url: str, out: Path, base_iri: str | None = None, seconds: float = math.inf
+) -> None:
+    """Write the quads of one mapping document as N-Quads; the file is there whole or not at all.
+
+    seconds: how long a triples map may take. Raises InputError as `map_database` does.
+    """
     if out.is_dir() or not out.parent.is_dir():
         raise InputError(f"{out}: not a file that can be written; name one in a folder that is there")
     engine = open_engine(database_url, must_exist=True)
     try:
         with files.temporary_beside(out.parent) as temporary:
-            serialize(map_database(engine, [mapping], base_iri), str(temporary), RdfFormat.N_QUADS)
+            serialize(map_database(engine, [mapping], base_iri, seconds), str(temporary), RdfFormat.N_QUADS)
             files.put_in_place(temporary, out)
     finally:
         engine.dispose()

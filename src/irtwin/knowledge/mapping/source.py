@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
+import sqlite3
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +21,7 @@ from irtwin.knowledge.mapping.identifiers import Identifier, quoted
 from irtwin.knowledge.mapping.natural import Natural, by_declared_type, by_value
 
 _CHUNK = 5000  # rows fetched at a time
+_STEPS = 100_000  # of SQLite's machine, about a millisecond, between two looks at the clock
 # bool, bytea, int8, int2, int4, text, float4, float8, bpchar, varchar,
 # date, time, timestamp, timestamptz, timetz, numeric: the types of section 10.2
 _NATURAL_IN_POSTGRESQL = {16, 17, 20, 21, 23, 25, 700, 701, 1042, 1043, 1082, 1083, 1114, 1184, 1266, 1700}
@@ -57,13 +61,19 @@ def snapshot_options(engine: Engine) -> dict[str, Any]:
 
 
 @contextmanager
-def snapshot(engine: Engine) -> Iterator[Connection]:
-    """Give a connection that shows one state of the database and can write nothing."""
+def snapshot(engine: Engine, seconds: float = math.inf) -> Iterator[Connection]:
+    """Give a connection that shows one state of the database and can write nothing.
+
+    `seconds`: how long `run` and `read` may take from the start of a query to its last row.
+    """
     with engine.connect() as connection:
         connection.execution_options(**snapshot_options(engine))
-        with connection.begin():
+        connection.info["seconds"] = seconds
+        with connection.begin(), _interrupted_when_late(connection):
             if engine.dialect.name == "postgresql":
                 connection.exec_driver_sql("SET LOCAL TIME ZONE 'UTC'")  # whatever the server's or the client's is
+                if seconds < math.inf:
+                    connection.exec_driver_sql(f"SET LOCAL statement_timeout = {math.ceil(seconds * 1000)}")
             yield connection
 
 
@@ -94,23 +104,27 @@ def describe(connection: Connection, table: LogicalTable) -> Source:
 
 
 def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Sequence[Any]]]:
-    """Yield a query's rows in chunks, one of them in memory at a time."""
+    """Yield a query's rows in chunks, one of them in memory at a time. Raises InputError as `run` does."""
     result = run(connection, sql, where)
     try:
-        yield from result.partitions(_CHUNK)
+        for rows in result.partitions(_CHUNK):
+            if _late(connection):
+                raise _endless(connection, where)
+            yield rows
     except DBAPIError as error:
-        raise _refused(where, error) from None
+        raise _refused(connection, where, error) from None
     finally:
         result.close()
 
 
 def run(connection: Connection, sql: str, where: str) -> CursorResult[Any]:
-    """Run SQL as it stands: `%` and `:` mean nothing here."""
+    """Run SQL as it stands: `%` and `:` mean nothing here. Raises InputError where it fails or takes too long."""
+    connection.info["deadline"] = time.monotonic() + connection.info["seconds"]
     options = {"no_parameters": True, "stream_results": True, "max_row_buffer": _CHUNK}
     try:
         return connection.exec_driver_sql(sql, execution_options=options)
     except DBAPIError as error:
-        raise _refused(where, error) from None
+        raise _refused(connection, where, error) from None
 
 
 def _from_item(connection: Connection, table: LogicalTable) -> str:
@@ -146,5 +160,30 @@ def _repeated(names: Sequence[str], dialect: str) -> str | None:
     return next((name for name, count in Counter(names).items() if count > 1), None)
 
 
-def _refused(where: str, error: DBAPIError) -> InputError:
+@contextmanager
+def _interrupted_when_late(connection: Connection) -> Iterator[None]:
+    """Have SQLite look at the clock; other databases do so themselves, or `read` does between two chunks."""
+    driver = connection.connection.driver_connection
+    if not isinstance(driver, sqlite3.Connection):
+        yield
+        return
+    driver.set_progress_handler(lambda: _late(connection), _STEPS)
+    try:
+        yield
+    finally:
+        driver.set_progress_handler(None, 0)
+
+
+def _late(connection: Connection) -> bool:
+    return time.monotonic() > float(connection.info.get("deadline", math.inf))
+
+
+def _endless(connection: Connection, where: str) -> InputError:
+    seconds = connection.info["seconds"]
+    return InputError(f"{where}: its SQL has not ended after {seconds:g} s; mend it, or give it more time by --timeout")
+
+
+def _refused(connection: Connection, where: str, error: DBAPIError) -> InputError:
+    if _late(connection):
+        return _endless(connection, where)
     return InputError(f"{where}: the database refuses it: {str(error.orig).strip().splitlines()[0]}")
