@@ -1,11 +1,14 @@
 """SPARQL updates: what they do, that the default graph stays the union, and what is refused."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pyoxigraph import DefaultGraph, Literal, NamedNode, Quad, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_UPDATE
+from irtwin.knowledge.updates import keeping_union
+from irtwin.knowledge.vocabulary import GRAPH_UPDATE, PREFIXES
 
 A, B = "http://e/a", "http://e/b"
 
@@ -47,12 +50,39 @@ def values(graph: KnowledgeGraph) -> dict[str, list[int]]:
         ("DROP GRAPH <b>", {"": [1], A: [1]}),
         ("DROP ALL", {"": []}),
         ("INSERT DATA { <x> <p> 3 } ; DELETE DATA { <x> <p> 3 } ; # and back\n", {"": [1, 2], A: [1], B: [1, 2]}),
+        (
+            'insert data { <x> <p> 3 } # DELETE DATA { <x> <p> 1 } "',
+            {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]},
+        ),
+        ("INSERT DATA { <x> <p> 3 . GRAPH <a> { <x> <p> 3 } }", {"": [1, 2, 3], A: [1, 3], B: [1, 2]}),
         ("# nothing", {"": [1, 2], A: [1], B: [1, 2]}),
     ],
 )
 def test_the_default_graph_stays_the_union(graph: KnowledgeGraph, text: str, expected: dict[str, list[int]]) -> None:
     graph.update(f"# PREFIX in a comment\nBASE <http://e/>\nPREFIX : <http://e/> {text}")
     assert values(graph) == expected
+
+
+DATA = st.lists(
+    st.tuples(st.sampled_from(["%s", f"GRAPH <{A}> {{ %s }}", f"GRAPH <{B}> {{ %s }}"]), st.integers(1, 4)), max_size=4
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(updates=st.lists(st.tuples(st.sampled_from(["INSERT", "DELETE"]), DATA), max_size=4))
+def test_data_by_itself_leaves_what_the_whole_comparison_leaves(updates: list[tuple[str, list]]) -> None:
+    looked_up, compared = KnowledgeGraph(), KnowledgeGraph()
+    for operation, data in updates:
+        said = " ".join(where % f"<http://e/x> <http://e/p> {number} ." for where, number in data)
+        text = f"{operation} DATA {{ {said} }}"
+        looked_up.update(text)
+        compared._store.update(keeping_union(text), prefixes=PREFIXES)
+        assert set(looked_up._store) == set(compared._store)
+
+
+def test_data_with_blank_nodes_goes_the_long_way(graph: KnowledgeGraph) -> None:
+    graph.update("INSERT DATA { _:b <http://e/p> 3 }")
+    assert values(graph)[GRAPH_UPDATE] == [3]
 
 
 @pytest.mark.parametrize(

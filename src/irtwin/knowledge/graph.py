@@ -7,9 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from pyoxigraph import (
-    BlankNode,
-    CanonicalizationAlgorithm,
-    Dataset,
     DefaultGraph,
     NamedNode,
     Quad,
@@ -23,12 +20,13 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+from irtwin.knowledge.blank_nodes import has_blank_node, same
 from irtwin.knowledge.rdf_input import read_rdf, refuse
 from irtwin.knowledge.series_functions import Functions, series_functions
 from irtwin.knowledge.server import SparqlServer, is_url
 from irtwin.knowledge.sparql_text import asks_another_server, bound
 from irtwin.knowledge.table import Table, to_python
-from irtwin.knowledge.updates import keeping_union
+from irtwin.knowledge.updates import as_change, keeping_union
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES
 from irtwin.resources import folder
 
@@ -103,7 +101,7 @@ class KnowledgeGraph:
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
         names = {*_names(new), *old}
-        changed = sorted(name for name in names if not _same(_read(new, name), _read(self._store, name)))
+        changed = sorted(name for name in names if not same(_read(new, name), _read(self._store, name)))
         if changed:
             self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
@@ -116,7 +114,7 @@ class KnowledgeGraph:
         """
         taken, given = set(removed), set(added)
         taken -= given
-        if any(isinstance(term, BlankNode) for quad in taken | given for term in (quad.subject, quad.object)):
+        if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
         triples = {quad.triple for quad in taken}
         remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
@@ -214,7 +212,11 @@ class KnowledgeGraph:
         InputError where the text is no update, reads from elsewhere, or fails.
         """
         try:
-            self._store.update(keeping_union(text), prefixes=PREFIXES)
+            change = as_change(text, self._holding)
+            if change is None:
+                self._store.update(keeping_union(text), prefixes=PREFIXES)
+            else:
+                self.change(*change)
             self._store.flush()
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
@@ -274,28 +276,6 @@ def _names(store: Store | SparqlServer) -> list[str]:
 
 def _read(store: Store | SparqlServer, name: str) -> set[Triple]:
     return {quad.triple for quad in store.quads_for_pattern(None, None, None, NamedNode(name))}
-
-
-def _same(some: set[Triple], others: set[Triple]) -> bool:
-    """Whether two graphs say the same, whatever their blank nodes are called."""
-    if some == others or len(some) != len(others):
-        return some == others
-    (named, blank), (other_named, other_blank) = _parted(some), _parted(others)
-    return named == other_named and _canonical(blank) == _canonical(other_blank)
-
-
-def _parted(triples: set[Triple]) -> tuple[set[Triple], set[Triple]]:
-    """Part the triples without blank nodes from those with."""
-    blank = {
-        triple for triple in triples if isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode)
-    }
-    return triples - blank, blank
-
-
-def _canonical(triples: Iterable[Triple]) -> Dataset:
-    found = Dataset(in_graph(triples))
-    found.canonicalize(CanonicalizationAlgorithm.RDFC_1_0)
-    return found
 
 
 def _replacement(name: str, triples: set[Triple]) -> str:

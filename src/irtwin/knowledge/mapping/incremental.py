@@ -16,9 +16,10 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from pyoxigraph import BlankNode, Literal, NamedNode, Quad
+from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import Connection, Engine
 
+from irtwin.knowledge.blank_nodes import has_blank_node
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
@@ -53,7 +54,7 @@ def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], fi
             removed, added = run.changes()
             if not (added or removed):
                 return
-            if not _blank(added | removed):
+            if not has_blank_node(added | removed):
                 graph.change({*removed, _version(current)}, {*added, _version(version)})
                 remembered.version = version
                 return
@@ -141,7 +142,3 @@ def _digest(*parts: str) -> str:
 
 def _version(name: str) -> Quad:
     return Quad(NamedNode(GRAPH_SOURCE), NamedNode(f"{OWL}versionInfo"), Literal(name), NamedNode(_VERSION_GRAPH))
-
-
-def _blank(quads: Iterable[Quad]) -> bool:
-    return any(isinstance(term, BlankNode) for quad in quads for term in (quad.subject, quad.object))
