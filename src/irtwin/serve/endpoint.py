@@ -73,10 +73,9 @@ class Endpoint:
         return bytes(body)
 
     async def _respond(self, operation: Operation | None, request: Request, send: Send) -> None:
-        deadline = time.monotonic() + self._limits.seconds
         try:
             if operation is not None and operation.kind == "query":
-                return await self._query(operation, request, send, deadline)
+                return await self._query(operation, request, send)
             response = await self._describe(request) if operation is None else await self._update(operation, request)
         except Refusal as refusal:
             response = refused(refusal)
@@ -93,14 +92,15 @@ class Endpoint:
         await self._updates.do(operation, request.headers.get("authorization", ""))
         return Response(status_code=204)
 
-    async def _query(self, operation: Operation, request: Request, send: Send, deadline: float) -> None:
+    async def _query(self, operation: Operation, request: Request, send: Send) -> None:
         for _ in range(_TRIES):
             with suppress(NotBegun):
-                return await self._stream(operation, request, send, deadline)
+                return await self._stream(operation, request, send)
         raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
 
-    async def _stream(self, operation: Operation, request: Request, send: Send, deadline: float) -> None:
+    async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
         async with self._pool.worker() as worker:
+            deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
             media_type = await self._ask(worker, operation, request.headers.get("accept", ""), deadline)
             headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
             await send(
@@ -136,8 +136,8 @@ class Endpoint:
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
 
     async def _named_graphs(self) -> list[str]:
-        deadline = time.monotonic() + self._limits.seconds
         async with self._pool.worker() as worker:
+            deadline = time.monotonic() + self._limits.seconds
             try:
                 await self._ask(worker, Operation("query", description.NAMED_GRAPHS), "text/csv", deadline)
             except NotBegun:

@@ -26,7 +26,7 @@ _RETRY_AFTER = {"Retry-After": "2"}  # s
 class Limits:
     """What a query may use, and how many may wait."""
 
-    seconds: float = 30.0  # from the first moment to the last byte
+    seconds: float = 30.0  # to wait for a worker; then again, to the last byte of the answer
     memory: int = 1 << 30  # bytes of one worker
     answer: int = 256 << 20  # bytes
     request: int = 1 << 20  # bytes
