@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from xml_attacks import attacks, entities
 
 PREFIXES = (
     "@prefix : <http://e/> . @prefix owl: <http://www.w3.org/2002/07/owl#> . "
@@ -17,23 +18,8 @@ RDF_XML = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmln
 ABOUT = RDF_XML.format('<rdf:Description rdf:about="http://e/{}"/>')
 
 
-def entities(count: int, copies: int) -> str:
-    made = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * copies}">' for n in range(1, count + 1))
-    return f'<!DOCTYPE r [<!ENTITY e0 "lol">{made}]>'
-
-
 XML = {
-    "billion laughs": (entities(9, 10) + ABOUT.format("&e9;"), "XML entity"),
-    "deep laughs": (entities(60, 2) + ABOUT.format("&e60;"), "XML entity"),
-    "quadratic blow-up": (f'<!DOCTYPE r [<!ENTITY a "{"x" * 900}">]>' + ABOUT.format("&a;" * 300_000), "XML entity"),
-    "entity of itself": ('<!DOCTYPE r [<!ENTITY a "&b;"><!ENTITY b "&a;">]>' + ABOUT.format("&a;"), "XML entity"),
-    "outside file": ('<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]>' + ABOUT.format("x"), "XML entity"),
-    "outside device": ('<!DOCTYPE r [<!ENTITY a SYSTEM "/dev/zero">]>' + ABOUT.format("x"), "XML entity"),
-    "outside server": ('<!DOCTYPE r [<!ENTITY a SYSTEM "http://127.0.0.1:1/">]>' + ABOUT.format("x"), "XML entity"),
-    "public entity": ('<!DOCTYPE r [<!ENTITY a PUBLIC "-//X" "file:///x">]>' + ABOUT.format("x"), "XML entity"),
-    "parameter entity": ("<!DOCTYPE r [<!ENTITY % a \"<!ENTITY b 'c'>\">%a;]>" + ABOUT.format("x"), "XML entity"),
-    "outside parameter": ('<!DOCTYPE r [<!ENTITY % a SYSTEM "file:///x">%a;]>' + ABOUT.format("x"), "XML entity"),
-    "single quotes": (entities(9, 10).replace('"', "'") + ABOUT.format("&e9;"), "XML entity"),
+    **{name: (text, "XML entity") for name, text in attacks(ABOUT).items()},
     "deep nesting": (RDF_XML.format("<e:A><e:p>" * 50_000 + "</e:p></e:A>" * 50_000), "nested more than"),
     "undefined entity": (ABOUT.format("&none;"), "not well-formed XML"),
     "not closed": (ABOUT.format("x").replace("</rdf:RDF>", ""), "line 1, column .*: not well-formed XML"),

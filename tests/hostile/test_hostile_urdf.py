@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from xml_attacks import attacks
 
 LINK = (
     '<link name="{}"><inertial><mass value="1"/>'
@@ -20,12 +21,6 @@ JOINT = (
 GOOD = f'<robot name="r">{LINK.format("a")}{LINK.format("b")}{JOINT}</robot>'
 
 
-def entities(count: int, copies: int) -> str:
-    """Return a document type whose last entity is the first one, copied `copies` ** `count` times."""
-    made = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * copies}">' for n in range(1, count + 1))
-    return f'<!DOCTYPE robot [<!ENTITY e0 "lol">{made}]>'
-
-
 def chain(length: int) -> str:
     links = "".join(f'<link name="l{n}"/>' for n in range(length + 1))
     joints = "".join(
@@ -36,16 +31,9 @@ def chain(length: int) -> str:
 
 DTD = "a DTD or an entity"
 DOCUMENT_TYPES = {
-    "billion laughs": f'{entities(9, 10)}<robot name="&e9;"/>',
-    "deep laughs": f'{entities(60, 2)}<robot name="&e60;"/>',
-    "quadratic blow-up": f'<!DOCTYPE robot [<!ENTITY a "{"a" * 100_000}">]><robot name="{"&a;" * 10_000}"/>',
-    "entity of itself": '<!DOCTYPE robot [<!ENTITY a "&b;"><!ENTITY b "&a;">]><robot name="&a;"/>',
-    "outside file": '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="r">&a;</robot>',
-    "outside device": '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///dev/zero">]><robot name="r">&a;</robot>',
-    "outside server": '<!DOCTYPE robot [<!ENTITY a SYSTEM "http://127.0.0.1:1/">]><robot name="r">&a;</robot>',
+    **attacks('<robot name="{}"/>'),
     "outside DTD": '<!DOCTYPE robot SYSTEM "http://127.0.0.1:1/robot.dtd"><robot name="r"/>',
     "public DTD": '<!DOCTYPE robot PUBLIC "-//X//Y" "file:///etc/passwd"><robot name="r"/>',
-    "parameter entity": '<!DOCTYPE robot [<!ENTITY % a SYSTEM "file:///etc/passwd">%a;]><robot name="r"/>',
     "empty document type": f"<!DOCTYPE robot []>{GOOD}",
     "default attributes": f'<!DOCTYPE robot [<!ATTLIST robot name CDATA "x">]>{GOOD}',
 }
