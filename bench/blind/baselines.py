@@ -234,14 +234,14 @@ def causes_of(choices: Sequence[Choice]) -> list[dict[str, Any]]:
 def answers(case: Case, names: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return what each baseline says of a case that has torque; power is judged on the torque that it explained."""
     started = time.perf_counter()
-    torque, predicted = torque_library(case)
+    torque, left_out = torque_library(case)
     shared = time.perf_counter() - started
     found = {}
     for name in names:
         started = time.perf_counter()
         choices = BASELINES[name](torque)
         if case.with_power:
-            explained = Explained(case, torque, predicted, [choice.variant for choice in choices])
+            explained = Explained(case, torque, left_out, [choice.variant for choice in choices])
             choices = choices + BASELINES[name](power_library(case, explained))
         found[name] = document(case.robot.name, causes_of(choices), shared + time.perf_counter() - started)
     return found

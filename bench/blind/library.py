@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Predicted, catalogue
+from irtwin.effects.effect import Effect, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.gap.case import Case
 from irtwin.gap.channels import Torque, power_system, torque_system
-from irtwin.gap.explained import left_out_torque, twin_power
+from irtwin.gap.explained import LeftOut, twin_power
 from irtwin.gap.finding import noise_before, twin_values
 from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
 from irtwin.gap.system import System
@@ -51,12 +51,12 @@ class Library:
         return swept(products, range(self.system.base))
 
 
-def torque_library(case: Case) -> tuple[Library, Torque]:
-    """Return the library of torque, and the torque that its columns are built on: the twin's, without the run."""
+def torque_library(case: Case) -> tuple[Library, LeftOut]:
+    """Return the library of torque, and what its columns are built on: what the twin says without the run."""
     stack = Stack(case.robot, case.effects)
-    predicted = left_out_torque(stack, torque_system(stack, case.with_torque, case.grouping, (), None))
-    system = torque_system(stack, case.with_torque, case.grouping, _shapes(case, "torque"), predicted)
-    return Library("torque", system, _hypotheses(system, case, whole=False)), predicted
+    left_out = LeftOut(stack, torque_system(stack, case.with_torque, case.grouping, (), None))
+    system = torque_system(stack, case.with_torque, case.grouping, _shapes(case, "torque"), left_out.below)
+    return Library("torque", system, _hypotheses(system, case, whole=False)), left_out
 
 
 def power_library(case: Case, torque: Torque) -> Library:
@@ -71,10 +71,10 @@ def power_library(case: Case, torque: Torque) -> Library:
 class Explained:
     """The joint torque of the twin refitted with the variants chosen."""
 
-    def __init__(self, case: Case, library: Library, predicted: Torque, chosen: Sequence[Variant]):
-        """Take what was chosen of a library of torque, and the torque that its columns were built on."""
+    def __init__(self, case: Case, library: Library, left_out: LeftOut, chosen: Sequence[Variant]):
+        """Take what was chosen of a library of torque, and what its columns were built on."""
         self._stack, self._system = Stack(case.robot, case.effects), library.system
-        self._predicted, self._chosen, self._observed = predicted, chosen, case.observed
+        self._below, self._chosen, self._observed = left_out.below, chosen, case.observed
         vector = self._system.solution([k for variant in chosen for k in variant.columns], library.total)
         self._twin, self._values = twin_values(self._system, vector), vector * self._system.scale
         self._held: tuple[str, np.ndarray] | None = None
@@ -91,7 +91,7 @@ class Explained:
         for variant in self._chosen:
             if variant.effect.channel != "torque":
                 continue
-            columns = variant.effect.columns(self._stack.robot, whole, Predicted(self._predicted(whole)))
+            columns = variant.effect.columns(self._stack.robot, whole, self._below(whole))
             for k in variant.columns:
                 if k < system.changed or whole.run in self._observed:
                     source = k - system.base - (len(system.columns) if k >= system.changed else 0)

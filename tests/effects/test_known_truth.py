@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from irtwin.effects import drive, friction, load, sensing, supply, transmission
+from irtwin.effects import compliance, drive, friction, load, sensing, supply, transmission
 from irtwin.effects.effect import BASELINE, Effect, Predicted, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.robot.urdf import parse_urdf
@@ -30,6 +31,7 @@ ROBOT = replace(
 )
 J2 = ("joint_2",)
 KT = 8.0
+SOFT = float((2 * np.pi * 10) ** 2 * pin.crba(ROBOT.model, ROBOT.model.createData(), np.zeros(3))[1, 1])  # 10 Hz
 
 
 @dataclass
@@ -97,15 +99,22 @@ def dahl(state, d=0.05, fc=TRUE["Fc"][1]):
     return only(fc * (np.array(found) - sign(state)))
 
 
-def gap(state, b=3e-3):
-    """The load's torque while a motor crosses a gap, as a machine of two states."""
-    lost, crossed, side = np.zeros(len(state.motion.time)), np.inf, np.sign(state.rigid[0, 1])
-    for row, (q, torque) in enumerate(zip(state.motion.q[:, 1], state.rigid[:, 1], strict=True)):
-        if np.sign(torque) != side:
-            side, crossed = np.sign(torque), q
-        if abs(q - crossed) < b:
-            lost[row] = torque
-    return only(-lost)
+def behind_a_spring(state, stiffness, damping, play=0.0):
+    """The torque that passes a spring with play between motor and link, less what a stiff gear passes (Radau)."""
+    time, load = state.motion.time, state.rigid[:, 1]
+    inertia = np.array([pin.crba(ROBOT.model, ROBOT.model.createData(), q)[1, 1] for q in state.motion.q])
+    pushed, moved = make_interp_spline(time, load, k=1), make_interp_spline(time, inertia, k=1)
+
+    def passed(lead, speed):
+        give = np.sign(lead) * max(abs(lead) - play / 2, 0.0)
+        return stiffness * give + damping * speed * (give != 0)
+
+    def motion(now, lead_and_speed):
+        return lead_and_speed[1], (pushed(now) - passed(*lead_and_speed)) / moved(now)
+
+    start = (load[0] / stiffness + np.sign(load[0]) * play / 2, 0.0)
+    done = solve_ivp(motion, time[[0, -1]], start, t_eval=time, method="Radau", max_step=2e-3, rtol=1e-5, atol=1e-8)
+    return only(np.array([passed(*each) for each in done.y.T]) - load)
 
 
 def tilted(state, x=0.05, y=-0.03):
@@ -201,21 +210,28 @@ CASES = [
     ),
     Case(friction.PreslidingHysteresis(d=0.05, joints=J2), {("d", "joint_2"): 0.05}, dahl),
     Case(
-        transmission.Backlash(b=3e-3, joints=J2),
-        {("b", "joint_2"): 3e-3},
-        gap,
-        rate=1000.0,
+        compliance.Backlash(b=1e-3, joints=J2),
+        {("b", "joint_2"): 1e-3},
+        lambda s: behind_a_spring(s, 4e4, 150.0, 1e-3),
+        rate=250.0,
         seconds=8.0,
-        off=0.1,
-        noise=1e-3,
+        off=0.2,
     ),
     Case(
-        transmission.JointElasticity(joints=J2),
+        compliance.JointElasticity(joints=J2),
         {("K", "joint_2"): 1500.0},
         lambda s: only(TRUE["Ia"][1] / 1500 * np.gradient(np.gradient(s.rigid[:, 1], 0.005), 0.005)),
         rate=200.0,
         off=0.1,
         noise=1e-3,
+    ),
+    Case(
+        compliance.JointElasticity(frequency=10.0, joints=J2),
+        {("K", "joint_2"): SOFT},
+        lambda s: behind_a_spring(s, SOFT, 11.5),
+        seconds=8.0,
+        off=0.1,
+        noise=2e-3,
     ),
     Case(
         transmission.TorqueRipple(N=50.0, joints=J2),

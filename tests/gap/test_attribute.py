@@ -79,11 +79,20 @@ def test_the_canonical_correlation_of_two_columns_is_their_correlation(correlati
 
 def test_uneven_gains_in_every_group_are_sure_and_mixed_ones_are_not():
     uneven = np.array([2.75, 0.27, 0.05, 0.08, 0.08, 0.12, 0.44, 1.04, 0.13])
-    assert between_groups(uneven) > 3
-    assert between_groups(uneven * np.array([1, -1, 1, -1, 1, -1, -1, -1, 1])) < 1
-    assert between_groups(np.array([1.0])) == 0
+    everywhere = np.ones(9)
+    assert between_groups(uneven, everywhere) > 3
+    assert between_groups(uneven * np.array([1, -1, 1, -1, 1, -1, -1, -1, 1]), everywhere) < 1
+    assert between_groups(np.array([1.0]), np.array([1.0])) == 0
+
+
+def test_groups_that_an_effect_says_nothing_of_do_not_count():
+    gain = np.array([0.9, -0.01, 0.8, 0.0, -0.02, 1.1, -0.01])
+    assert between_groups(gain, np.ones(7)) < 2.3
+    assert between_groups(gain, np.abs(gain)) > 10
+    assert between_groups(gain[[0, 1, 3]], np.abs(gain[[0, 1, 3]])) < 2.3  # of one that speaks nothing can be said
 
 
 @given(arrays(float, 6, elements=st.integers(-50, 50), unique=True), st.floats(0.1, 10))
 def test_the_unit_of_gain_does_not_matter(gain, unit):
-    assert between_groups(unit * gain) == pytest.approx(between_groups(gain), rel=1e-6, abs=1e-6)
+    said = np.arange(1.0, 7.0)
+    assert between_groups(unit * gain, said) == pytest.approx(between_groups(gain, unit * said), rel=1e-6, abs=1e-6)

@@ -54,7 +54,7 @@ def ground_of(motions, tried, cause=None, rivals=()):
         return stack.real_torque(motion, values)
 
     grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
-    system = torque_system(stack, motions, grouping, effects, predicted)
+    system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     found = tuple(hypotheses(system.columns, system.base, MISSING))
     noise = np.full(2, NOISE)
     causes = ()

@@ -39,7 +39,7 @@ def of(motions, tried=("stribeck_friction",)):
 
     effects = [shape for effect in tried for shape in catalogue()[effect].candidates(ROBOT)]
     grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
-    system = torque_system(stack, motions, grouping, effects, predicted)
+    system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     case = SimpleNamespace(effects=BASELINE, robot=ROBOT, observed=grouping.observed)
     finding = find("torque", case, system, np.full(2, NOISE), 0)
     ground = TrialGround(finding, stack, lambda motion: Predicted(predicted(motion)))

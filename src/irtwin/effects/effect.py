@@ -44,8 +44,9 @@ class Predicted:
 
     torque: (N, n) N m, real joint torque (for an effect of measurement: what is shown); power: (N,) W, all of it;
     axes: (N,) W, the part that the joints' drives take from their bus; bodies: (10 n,) inertial parameters with
-    payload, None for those of the URDF; load: (N, n) N m, what the links of these bodies take beyond the gears, None
-    where nobody has computed it. A part knows the `whole` that it was cut from.
+    payload, None for those of the URDF; load: (N, n) N m, what the links of these bodies take beyond the gears, and
+    inertia: (N, n) kg m^2, what each joint moves there, None where nobody has computed it. A part knows the `whole`
+    that it was cut from.
     """
 
     torque: np.ndarray
@@ -53,6 +54,7 @@ class Predicted:
     axes: np.ndarray | None = None
     bodies: np.ndarray | None = None
     load: np.ndarray | None = None
+    inertia: np.ndarray | None = None
     whole: Predicted | None = field(default=None, repr=False, compare=False)
 
     def part(self, start: int, stop: int) -> Predicted:
@@ -64,6 +66,7 @@ class Predicted:
             None if self.axes is None else self.axes[cut],
             self.bodies,
             None if self.load is None else self.load[cut],
+            None if self.inertia is None else self.inertia[cut],
             self.whole or self,
         )
 
@@ -89,7 +92,7 @@ class Effect(ABC):
     add to. Columns of an effect that `needs` "torque" or "power" are built from what other effects predict, never
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
-    so many samples on either side.
+    so many seconds on either side.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -103,7 +106,7 @@ class Effect(ABC):
     needs: ClassVar[str | None] = None
     stage: ClassVar[int] = 0
     memory: ClassVar[bool] = False
-    reach: ClassVar[int | None] = None
+    reach: ClassVar[float | None] = None
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)
@@ -269,7 +272,7 @@ BASELINE = (
 
 def catalogue() -> dict[str, Effect]:
     """Return every effect that the twin knows, by id, in its default shape."""
-    from irtwin.effects import drive, friction, load, rigid_body, sensing, supply, transmission
+    from irtwin.effects import compliance, drive, friction, load, rigid_body, sensing, supply, transmission
 
     effects: tuple[Effect, ...] = (
         rigid_body.RigidBody(),
@@ -285,8 +288,8 @@ def catalogue() -> dict[str, Effect]:
         friction.LoadDependentFriction(),
         friction.TemperatureDependentFriction(),
         friction.PreslidingHysteresis(),
-        transmission.Backlash(),
-        transmission.JointElasticity(),
+        compliance.Backlash(),
+        compliance.JointElasticity(),
         transmission.TorqueRipple(),
         friction.PositionDependentFriction(),
         transmission.JointCoupling(),

@@ -172,7 +172,7 @@ class Stack:
         columns = self.predicted_power_columns(whole, torque_values, values)
         axes = np.array([_on_the_bus(effect, term) for effect, term in self.power_terms], dtype=bool)
         power = columns @ values
-        return Predicted(torque, power, columns[:, axes] @ values[axes], self._bodies(whole, torque_values))
+        return Predicted(torque, power, columns[:, axes] @ values[axes], self.bodies(whole, torque_values))
 
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""
@@ -210,7 +210,8 @@ class Stack:
         stop = motion.start + len(motion.time)
         return effect.contribution(self.robot, motion, values, below and below.part(motion.start, stop))
 
-    def _bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
+    def bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
+        """Return the (10 n,) inertial parameters with payload by (K,) torque coefficients; None: those of the URDF."""
         total = values + self.shift(motion)
         for effect, own in self._torque_places:
             if effect.id == "rigid_body":
@@ -227,7 +228,7 @@ class Stack:
         return last
 
     def _predict_torques(self, whole: Motion, values: np.ndarray) -> _Torques:
-        total, bodies = values + self.shift(whole), self._bodies(whole, values)
+        total, bodies = values + self.shift(whole), self.bodies(whole, values)
         real, shown = np.zeros(whole.dq.shape), np.zeros(whole.dq.shape)
         below: dict[int, Predicted] = {}
         owned = self._torque_places

@@ -113,9 +113,10 @@ def _columns(found: Sequence[Find]) -> list[int]:
 def _judged(system: System, trial: Trial, candidates: Sequence[Hypothesis]) -> tuple[np.ndarray, np.ndarray]:
     """Return each hypothesis' gain per row and its t between groups, (H,), on the groups that count for it."""
     gain, weights = gains(system, trial), rows(system)
+    said = trial.said / weights
     own = [judged(system, hypothesis.scope) for hypothesis in candidates]
     mean = [np.average(one[mine], weights=weights[mine]) for one, mine in zip(gain, own, strict=True)]
-    t = [between_groups(one[mine]) for one, mine in zip(gain, own, strict=True)]
+    t = [between_groups(one[mine], adds[mine]) for one, adds, mine in zip(gain, said, own, strict=True)]
     return np.array(mean), np.array(t)
 
 

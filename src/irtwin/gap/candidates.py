@@ -12,7 +12,7 @@ from irtwin.gap.hypotheses import Column
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
-Below = Callable[[Motion], Predicted | None]
+Below = Callable[[Motion], Predicted]
 Parts = list[list[np.ndarray]]
 """For each equation the columns that act in it, (N, some) each."""
 
@@ -52,13 +52,14 @@ class Candidates:
         reach = self._effects[place].reach
         if reach is None:
             return self._columns(place, motion, self._predicted and self._predicted.part(start, stop))
-        first, last = max(0, start - reach), min(stop + reach, len(whole.time))
+        around = int(np.ceil(reach * whole.rate))
+        first, last = max(0, start - around), min(stop + around, len(whole.time))
         wider = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
         return _cut(wider, start - first, stop - first)
 
     def _hold(self, whole: Motion) -> None:
         self._held = {}  # let go of the run before
-        self._run, self._predicted = whole, self._below(whole)
+        self._run, self._predicted = whole, self._below(whole) if self._effects else None
         for place, effect in enumerate(self._effects):
             if effect.memory and effect.reach is None:
                 self._held[place] = self._columns(place, whole, self._predicted)

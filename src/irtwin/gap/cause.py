@@ -9,6 +9,9 @@ import numpy as np
 from irtwin.gap.hypotheses import CHANGED, Hypothesis, Variant
 from irtwin.gap.system import System, Trial
 
+_SPEAKS = 0.05  # of what a hypothesis adds in the group where it adds most: it is about this group too
+_FEWEST = 3  # groups
+
 
 @dataclass(frozen=True)
 class Find:
@@ -61,11 +64,15 @@ def judged(system: System, scope: str) -> np.ndarray:
     return np.asarray(system.group_observed if scope == CHANGED else np.ones(system.groups, dtype=bool))
 
 
-def between_groups(gain: np.ndarray) -> float:
+def between_groups(gain: np.ndarray, said: np.ndarray) -> float:
     """Return the t of the gain between groups, (G,): mean over standard error of its signed root; 0 of one group.
 
-    The root, since a group in which much happens gains more than others: that speaks not against an effect.
+    The root, since a group in which much happens gains more than others: that speaks not against an effect. Nor does
+    a group in which it has nothing to say: of what it adds, `said` (G,), there is next to nothing.
     """
+    speaks = said >= _SPEAKS * said.max(initial=0.0)
+    if speaks.sum() >= _FEWEST:
+        gain = gain[speaks]
     if len(gain) < 2:
         return 0.0
     root = np.sign(gain) * np.sqrt(np.abs(gain))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.effects.compliance import load_inertia, load_torque
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
-from irtwin.effects.transmission import load_torque
-from irtwin.gap.candidates import Candidates, candidate_pattern
+from irtwin.gap.candidates import Below, Candidates, candidate_pattern
 from irtwin.gap.headway import Tell, watched
 from irtwin.gap.hypotheses import candidate_columns
 from irtwin.gap.system import System
@@ -58,10 +58,10 @@ def torque_system(
     motions: Sequence[Motion],
     grouping: Grouping,
     effects: Sequence[Effect],
-    predicted: Torque | None,
+    below: Below | None,
     tell: Tell | None = None,
 ) -> System:
-    """Reduce the equations of measured torque; `predicted` gives the joint torque that candidates may need.
+    """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
 
     `tell` is told how far that has come, where it takes long.
     """
@@ -70,13 +70,13 @@ def torque_system(
     tried = candidate_pattern(robot, effects, columns)
     pattern = np.concatenate([stack.pattern, tried], axis=1)
 
-    def below(whole: Motion) -> Predicted | None:
-        if predicted is None:
-            return None
-        torque = predicted(whole)
-        return Predicted(torque, load=load_torque(robot, whole, Predicted(torque)))
+    def loaded(whole: Motion) -> Predicted:
+        assert below is not None, "candidates are built on what the twin predicts"
+        before = below(whole)
+        load, inertia = load_torque(robot, whole, before), load_inertia(robot, whole, before)
+        return replace(before, load=load, inertia=inertia)
 
-    candidates = Candidates(robot, effects, tried, below)
+    candidates = Candidates(robot, effects, tried, loaded)
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None

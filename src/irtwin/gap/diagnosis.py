@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, catalogue
+from irtwin.effects.effect import Effect, Predicted, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.gap import document
 from irtwin.gap.balance import filtered, refuted
+from irtwin.gap.candidates import Below
 from irtwin.gap.case import Case, case_of
 from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Torque, power_system, torque_system
@@ -19,7 +20,7 @@ from irtwin.gap.closure import closed_twin
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.evidence import drawn
 from irtwin.gap.experiment import next_experiment
-from irtwin.gap.explained import Explained, ExplainedTorque, explained_power, left_out_torque, twin_power
+from irtwin.gap.explained import Explained, ExplainedTorque, LeftOut, explained_power, twin_power
 from irtwin.gap.finding import Finding, find
 from irtwin.gap.floor import Floor, noise_floor
 from irtwin.gap.locate import Location
@@ -107,15 +108,15 @@ def diagnose(
     stack = Stack(case.robot, case.effects)
     tell("Fitting the twin")
     plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
-    power_stack, predicted = _torque_source(case, stack, plain)
+    power_stack, predicted, below = _torque_source(case, stack, plain)
     explained: list[Explained] = []
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found = _torque(case, stack, plain, floor, predicted, frozenset(unknown), seed, tell)
-        torque = ExplainedTorque(stack, found, predicted)
+        found = _torque(case, stack, plain, floor, below, frozenset(unknown), seed, tell)
+        torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
-            torque = _balanced(case, power_stack, torque, predicted, frozenset(unknown), seed)
+            torque = _balanced(case, power_stack, torque, below, frozenset(unknown), seed)
         explained.append(torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
@@ -132,7 +133,7 @@ def diagnose(
     left = [left_over(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
     located = places(left, seed)
     tell("Designing the next experiment")
-    grounds = trial_grounds(case, (stack, power_stack), findings, (predicted, torque))
+    grounds = trial_grounds(case, (stack, power_stack), findings, below, torque)
     measures = {ground.finding.name: yardstick(ground, case.seen, seed) for ground in grounds}
     proposal = next_experiment(case.robot, grounds, [catalogue()[one.effect] for one in lacking], case.seen)
     return Diagnosis(
@@ -153,18 +154,19 @@ def diagnose(
     )
 
 
-def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stack, Torque]:
-    """Return the effects that explain power, and the joint torque that they are given.
+def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stack, Torque, Below]:
+    """Return the effects that explain power, the joint torque that they are given, and what those of torque stand on.
 
     It is that of a fit to torque (`plain`: the twin's equations) without the run's group; where no run shows torque,
     that of a fit to power.
     """
     if plain is None:
         through_power = ThroughPower(stack, case.with_power)
-        return through_power, through_power.torque
+        return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
     if case.shows("torque"):
         check_same_robot(case.runs, stack, plain)
-    return stack, left_out_torque(stack, plain)
+    left_out = LeftOut(stack, plain)
+    return stack, left_out.torque, left_out.below
 
 
 def _torque(
@@ -172,30 +174,30 @@ def _torque(
     stack: Stack,
     plain: System,
     floor: Floor,
-    predicted: Torque,
+    below: Below,
     unknown: Set[str],
     seed: int,
     tell: Progress,
 ) -> Finding:
     found = occasional(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
-    system = torque_system(stack, case.with_torque, case.grouping, tried, predicted, tell)
+    system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
     system = replace(system, episode=found.contact)
     return find("torque", case, system, floor.torque, seed, without=unknown)
 
 
 def _balanced(
-    case: Case, stack: Stack, explained: ExplainedTorque, predicted: Torque, unknown: Set[str], seed: int
+    case: Case, stack: Stack, explained: ExplainedTorque, below: Below, unknown: Set[str], seed: int
 ) -> ExplainedTorque:
     """Let power speak: drop the rivals that it refutes, and try without causes that it does."""
     known, finding = catalogue(), explained.finding
     weighed = balances(case, stack, explained)
     if wrong := refuted(finding.causes, weighed, known):
         finding = find("torque", case, finding.system, finding.floor, seed, without=wrong | unknown)
-        weighed = balances(case, stack, ExplainedTorque(explained.stack, finding, predicted))
+        weighed = balances(case, stack, ExplainedTorque(explained.stack, finding, below))
     causes = tuple(filtered(one, said, known) for one, said in zip(finding.causes, weighed, strict=True))
     finding = replace(finding, attribution=replace(finding.attribution, causes=causes), balances=weighed)
-    return ExplainedTorque(explained.stack, finding, predicted)
+    return ExplainedTorque(explained.stack, finding, below)
 
 
 def _power(

@@ -8,6 +8,7 @@ import numpy as np
 
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
+from irtwin.gap.candidates import Below
 from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Grouping, Torque, power_system
 from irtwin.gap.finding import Finding, noise_before, twin_values
@@ -17,28 +18,35 @@ from irtwin.signals.motion import Motion
 PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def left_out_torque(stack: Stack, system: System) -> Torque:
-    """Return the twin's joint torque for a run, fitted without that run's group."""
-    moments = system.moments(noise_before(system))
-    total = np.sum(moments, axis=0)
-    by_run: dict[str, np.ndarray] = {}
-    for run in {block.run for block in system.blocks}:
-        groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
-        rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
-        by_run[run] = twin_values(system, system.solution((), rest))
-    whole = twin_values(system, system.solution((), total))
+class LeftOut:
+    """What the twin says of a run, fitted without that run's group; of a run it was not fitted to, by all groups."""
 
-    held: dict[str, tuple[Motion, np.ndarray]] = {}  # each of these runs': every pass over them asks for it
+    def __init__(self, stack: Stack, system: System):
+        """Fit the twin's terms to the equations of torque without each group in turn."""
+        moments = system.moments(noise_before(system))
+        total = np.sum(moments, axis=0)
+        self._stack = stack
+        self._all = twin_values(system, system.solution((), total))
+        self._without: dict[str, np.ndarray] = {}
+        for run in {block.run for block in system.blocks}:
+            groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
+            rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
+            self._without[run] = twin_values(system, system.solution((), rest))
+        self._held: dict[str, tuple[Motion, np.ndarray]] = {}  # each run's: every pass over them asks for it
 
-    def predicted(motion: Motion) -> np.ndarray:
-        if motion.run not in by_run:
-            return stack.real_torque(motion, whole)
+    def torque(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, of a run or a part of one."""
+        if motion.run not in self._without:
+            return self._stack.real_torque(motion, self._all)
         run = motion.whole or motion
-        if run.run not in held or held[run.run][0] is not run:
-            held[run.run] = run, stack.real_torque(run, by_run[run.run])
-        return held[run.run][1][motion.start : motion.start + len(motion.time)]
+        if run.run not in self._held or self._held[run.run][0] is not run:
+            self._held[run.run] = run, self._stack.real_torque(run, self._without[run.run])
+        return self._held[run.run][1][motion.start : motion.start + len(motion.time)]
 
-    return predicted
+    def below(self, whole: Motion) -> Predicted:
+        """Return what further effects on torque are built on: the torque, and the bodies that were identified."""
+        bodies = self._stack.bodies(whole, self._without.get(whole.run, self._all))
+        return Predicted(self.torque(whole), bodies=bodies)
 
 
 def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: Torque) -> PowerOf:
@@ -63,7 +71,7 @@ def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torq
 class Explained:
     """What the causes found in a channel add to its signal, and what the twin is beside them."""
 
-    def __init__(self, stack: Stack, finding: Finding, below: Callable[[Motion], Predicted]):
+    def __init__(self, stack: Stack, finding: Finding, below: Below):
         """Take what a channel showed, and what candidates were built on: what the twin predicts `below` them."""
         self.stack, self.finding, self._below = stack, finding, below
         self._places = {k: place for place, k in enumerate(finding.used)}
@@ -98,9 +106,9 @@ class Explained:
 class ExplainedTorque(Explained):
     """The joint torque of the twin refitted with the causes, and what each cause adds to the torque."""
 
-    def __init__(self, stack: Stack, finding: Finding, predicted: Torque):
-        """Take what torque showed, and the torque `predicted` that candidates were built on."""
-        super().__init__(stack, finding, lambda whole: Predicted(predicted(whole)))
+    def __init__(self, stack: Stack, finding: Finding, below: Below):
+        """Take what torque showed, and what candidates were built on."""
+        super().__init__(stack, finding, below)
         self._held: tuple[str, np.ndarray] | None = None
 
     def __call__(self, motion: Motion) -> np.ndarray:

@@ -46,7 +46,8 @@ def _cause(
     competing = _competing(system, moments, candidates, members, others)
     sides = [mine, *(parts for _, parts in competing)]
     own = judged(system, scope)
-    gain = gains(system, attempt(system, moments, others, [[_joined(parts)] for parts in sides]))[:, own]
+    trial = attempt(system, moments, others, [[_joined(parts)] for parts in sides])
+    gain, said = gains(system, trial)[:, own], (trial.said[0] / rows(system))[own]
     mean = np.average(gain, axis=1, weights=rows(system)[own])
     alike = canonical_correlation(
         reduce(np.add, moments), system.base, others, [_joined(parts).columns for parts in sides]
@@ -67,7 +68,7 @@ def _cause(
         joints=tuple(one.hypothesis.joint for one in members if one.hypothesis.joint),
         variants=mine,
         gain=float(mean[0]),
-        t=members[0].t if brief(mine[0].effect) else between_groups(gain[0]),  # an episode's is between joints
+        t=members[0].t if brief(mine[0].effect) else between_groups(gain[0], said),  # an episode's is between joints
         p=max(one.p for one in members),
         rivals=tuple(dict.fromkeys(sorted(equal, key=lambda name: -known[name]))),
         rival_gains=known,

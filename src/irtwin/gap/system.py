@@ -172,6 +172,7 @@ class System:
 class Trial:
     """What H hypotheses do on groups left out: weighted squares (H, G) each, `start` (G,) without any.
 
+    `said` (H, G): the weighted squares of what each adds there, however well that fits.
     `best` (H,): the index of the variant that the whole data choose; `values`: its coefficients, in units of the prior;
     `visible` (H,): mean square that the variant adds beyond what the rest imitates, with coefficients as large as
     expected; `share_visible` (H,): the part of its columns that the rest cannot imitate.
@@ -179,6 +180,7 @@ class Trial:
 
     start: np.ndarray
     loss: np.ndarray
+    said: np.ndarray
     best: np.ndarray
     values: tuple[np.ndarray, ...]
     visible: np.ndarray
@@ -207,25 +209,25 @@ def attempt(
     batches = _batches(system, variants)
     total = reduce(np.add, moments)
     whole, _ = _project(total, total, system.base, chosen)
-    objective, _, values = _fit(whole, whole, batches, len(variants))
+    objective, _, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
-    loss = np.empty((len(candidates), len(moments)))
+    loss, said = np.empty((2, len(candidates), len(moments)))
     for group, part in enumerate(moments):
         train, test = _project(total - part, part, system.base, chosen)
         start[group] = test.squares
-        inner, left_out, _ = _fit(train, test, batches, len(variants))
+        inner, left_out, added, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
             if brief(variant.effect):
                 left_out[place] = _left(test, variant.columns, values[place])
         best = _best(inner, owner, len(candidates))
-        loss[:, group] = left_out[best]
+        loss[:, group], said[:, group] = left_out[best], added[best]
     best = _best(objective, owner, len(candidates))
     diagonal = whole.diagonal
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
     visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
     before = np.diag(total)
     share = np.array([_ratio(diagonal[list(variants[k].columns)], before[list(variants[k].columns)]) for k in best])
-    return Trial(start, loss, best, tuple(values[k] for k in best), visible, share)
+    return Trial(start, loss, said, best, tuple(values[k] for k in best), visible, share)
 
 
 def scores(
@@ -349,9 +351,9 @@ def _project(train: np.ndarray, test: np.ndarray, base: int, chosen: Sequence[in
 
 def _fit(
     train: _Products, test: _Products, batches: Sequence[_Batch], count: int
-) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Fit each variant on train; return the objective there, the squares on test, and the coefficients."""
-    objective, left_out = np.empty(count), np.empty(count)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Fit each variant on train; return the objective there, the squares left and added on test, the coefficients."""
+    objective, left_out, added = np.empty((3, count))
     values: list[np.ndarray] = [np.zeros(0)] * count
     for batch in batches:
         target = np.full((len(batch.columns), 1), len(train.whole) - 1)
@@ -361,9 +363,10 @@ def _fit(
         solved = _bounded(normal + np.eye(normal.shape[1]), right, batch.lowest)
         objective[batch.place] = _squares(on_train, solved) + (solved**2).sum(axis=1)
         left_out[batch.place] = _squares(on_test, solved)
+        added[batch.place] = np.einsum("vi,vij,vj->v", solved, on_test[:, :-1, :-1], solved)
         for place, value in zip(batch.place, solved, strict=True):
             values[place] = value
-    return objective, left_out, values
+    return objective, left_out, added, values
 
 
 def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
+from irtwin.gap.candidates import Below
 from irtwin.gap.case import Case
 from irtwin.gap.channels import Torque
 from irtwin.gap.explained import PowerOf, twin_power
@@ -194,22 +195,21 @@ def trial_grounds(
     case: Case,
     stacks: tuple[Stack, Stack],
     findings: Sequence[Finding],
-    torques: tuple[Torque, Torque],
+    below: Below,
+    torque: Torque,
 ) -> tuple[TrialGround, ...]:
     """Return each channel's trial ground.
 
-    stacks: the effects that explain torque and power; torques: the joint torque that candidates of either are built on.
+    stacks: the effects that explain torque and power; `below` is what candidates for torque are built on, `torque` the
+    joint torque for those of power.
     """
 
     @cache
     def power() -> PowerOf:
-        return twin_power(stacks[1], case.with_power, case.grouping, torques[1])
-
-    def below(whole: Motion) -> Predicted:
-        return Predicted(torques[0](whole))
+        return twin_power(stacks[1], case.with_power, case.grouping, torque)
 
     def below_power(whole: Motion) -> Predicted:
-        real = torques[1](whole)
+        real = torque(whole)
         return Predicted(real, *power()(whole, real))
 
     return tuple(

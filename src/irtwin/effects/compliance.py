@@ -1,0 +1,188 @@
+"""What gives way between motor and link: play and elasticity, through the swing of one mass behind a spring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity, ratio
+from irtwin.effects.rigid_body import inverse_dynamics, model_of
+from irtwin.robot.description import Joint, Robot
+from irtwin.signals.conditioning import differentiate
+from irtwin.signals.motion import Motion
+
+_WINDOW, _WARM_UP = 1.0, 0.8  # s: swings are over after the second; windows are computed side by side
+_STEPS = 500.0  # a second, about
+_INERTIA_EVERY = 0.016  # s
+_LIGHTEST = 1e-6  # kg m^2: a link without inertia is no link
+_CONTACT, _CONTACT_DAMPING = 30.0, 0.5  # Hz: of gears that touch again, well above what moves a robot
+_DAMPING = 0.1  # of an elastic joint's swing
+
+
+def load_torque(robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
+    """Return (N, n) the torque that the links take beyond the gears."""
+    if predicted is not None and predicted.load is not None:
+        return predicted.load
+    return inverse_dynamics(model_of(robot, None if predicted is None else predicted.bodies), motion)
+
+
+def load_inertia(robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
+    """Return (N, n) the inertia that each joint moves beyond its gear while the others hold, kg m^2, by the URDF."""
+    if predicted is not None and predicted.inertia is not None:
+        return predicted.inertia
+    model = robot.model
+    data = model.createData()
+    every = max(1, round(_INERTIA_EVERY * motion.rate))
+    rows = np.arange(-motion.start % every, len(motion.time), every)  # the same ones in any part of a run
+    known = np.array([np.diag(pin.crba(model, data, q)) for q in motion.q[rows]])
+    known = np.maximum(known, _LIGHTEST)
+    return np.column_stack([np.interp(np.arange(len(motion.time)), rows, each) for each in known.T])
+
+
+def transmitted(
+    load: np.ndarray,
+    inertia: np.ndarray,
+    rate: float,
+    speed: np.ndarray,
+    damping: float,
+    play: float = 0.0,
+    start: int = 0,
+) -> np.ndarray:
+    """Return (N, n) the torque that passes a spring with `play` (rad) between a motor and a link that swings behind it.
+
+    load: (N, n) N m, what a link stiffly joined to the measured motor would take; inertia: (N, n) kg m^2; rate: Hz;
+    speed: (N, n) rad/s, of the link's swing while the motor holds. With x the motor's lead over the link,
+    `start`: where the first sample lies in its run, so that parts of a run are computed alike.
+    x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the two-mass
+    model (Spong 1987, eqs. 6 and 7), link by link.
+    """
+    ahead, length = round(_WARM_UP * rate), max(1, round(_WINDOW * rate))
+    starts = np.arange(-(start % length), len(load), length)
+    pushed = np.concatenate([load / inertia, load[-1:] / inertia[-1:]])
+    substeps = max(1, round(_STEPS / rate))
+    step, last = 1 / (rate * substeps), len(load) - 1
+    first = np.clip(starts - ahead, 0, last)
+    x = pushed[first] / speed[first] ** 2 + np.sign(pushed[first]) * play / 2
+    v = np.zeros_like(x)
+    passed = np.empty((ahead + length, *x.shape))
+    for at in range(-ahead, length):
+        rows = np.clip(starts + at, 0, last)
+        push, rise = pushed[rows], (pushed[rows + 1] - pushed[rows]) / substeps
+        square, rubs = speed[rows] ** 2, 2 * damping * speed[rows]
+        for substep in range(substeps):
+            give = x - np.clip(x, -play / 2, play / 2)
+            back = square * give + rubs * v * (give != 0)
+            if substep == 0:
+                passed[at + ahead] = back * inertia[rows]
+            v = v + step * (push - back)
+            x = x + step * v
+            push = push + rise
+    kept = passed[ahead:].transpose(1, 0, 2).reshape(-1, load.shape[1])
+    return np.asarray(kept[-starts[0] :][: len(load)])
+
+
+@dataclass(frozen=True)
+class Backlash(JointEffect):
+    """The load's torque is lost while the link is free within a gap of b, after that torque changed its sign.
+
+    How long depends on how fast the torque grows and on the link's inertia, not on the motor's way: both move on
+    together. The coefficient is the share of what a gap of b makes.
+    """
+
+    id: ClassVar[str] = "backlash"
+    channel: ClassVar[str] = "torque"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 1
+    memory: ClassVar[bool] = True
+    reach: ClassVar[float | None] = 2.0
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"b": (3e-4, 3e-3)}
+
+    b: float = 1e-3  # rad
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return gaps over the range."""
+        return self.variants(b=(3e-4, 5.3e-4, 1e-3, 1.7e-3, 3e-3))
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return the share."""
+        return (Term("lost", "1", joint.name, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return what passes the gap beyond what passes a stiff gear."""
+        load, inertia = load_torque(robot, motion, predicted), load_inertia(robot, motion, predicted)
+        speed = np.full_like(load, 2 * np.pi * _CONTACT)
+        return (transmitted(load, inertia, motion.rate, speed, _CONTACT_DAMPING, self.b, motion.start) - load,)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return b: what is lost grows with its cube root's square, torque times time."""
+        return tuple(
+            quantity("b", joint.name, value, joint.unit, deviation, lambda lost: self.b * max(lost, 0.0) ** 1.5)
+            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class JointElasticity(JointEffect):
+    """A link that swings behind its motor; or a motor that turns beyond its link, Ia d2/dt2 (tau_load/K).
+
+    Which of the two depends on where the position is measured: on the motor, or (`frequency` 0) on the link. The
+    frequency (Hz) is that of the link in the robot's middle pose while the motor holds; it follows the pose. The
+    coefficient is a share of about one, or Ia/K (s^2).
+    """
+
+    id: ClassVar[str] = "joint_elasticity"
+    channel: ClassVar[str] = "torque"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 1
+    memory: ClassVar[bool] = True
+    reach: ClassVar[float | None] = 2.0
+
+    frequency: float = 0.0
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return the link's encoder, and swings of 5 to 40 Hz."""
+        return self.variants(frequency=(0.0, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 20.0, 40.0))
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return Ia/K, or the share."""
+        if self.frequency == 0:
+            return (Term("Ia/K", "s^2", joint.name, spread=5e-3, lowest=0.0),)
+        return (Term("share", "1", joint.name, lowest=0.0),)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return what a unit of the coefficient adds."""
+        load = load_torque(robot, motion, predicted)
+        if self.frequency == 0:
+            return (differentiate(differentiate(load, motion.rate), motion.rate),)
+        inertia = load_inertia(robot, motion, predicted)
+        speed = 2 * np.pi * self.frequency * np.sqrt(_middle_inertia(robot) / inertia)
+        return (transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start) - load,)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return K; nothing where the rotor's inertia is needed and not known."""
+        found = []
+        stiffness = (2 * np.pi * self.frequency) ** 2 * _middle_inertia(robot)
+        for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True):
+            rotor = (known or {}).get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
+            top = rotor if self.frequency == 0 else float(stiffness[robot.index(joint.name)])
+            if top and value > 0:
+                sure = value - 1.96 * deviation > 0  # else K has no upper end
+                unit = f"{force_unit(joint)}/{joint.unit}"
+                convert = lambda give, top=top: ratio(top, give)  # noqa: E731
+                found.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))
+        return tuple(found)
+
+
+def _middle_inertia(robot: Robot) -> np.ndarray:
+    """Return (n,) the inertia that each joint moves in the middle of all joints' ranges, by the URDF."""
+    model = robot.model
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    middle = np.where(np.isfinite(lower + upper), (lower + upper) / 2, 0.0)
+    return np.maximum(np.diag(pin.crba(model, model.createData(), middle)), _LIGHTEST)

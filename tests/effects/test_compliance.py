@@ -1,0 +1,61 @@
+"""Play and elasticity between motor and link: what passes, against what mechanics says must."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from irtwin.effects.compliance import Backlash, JointElasticity, load_inertia, load_torque, transmitted
+from irtwin.effects.effect import Predicted
+from synthetic import arm, swing
+
+RATE = 250.0
+TIME = np.arange(0, 6, 1 / RATE)
+LOAD = (8 * np.sin(2 * np.pi * 0.4 * TIME) + 3 * np.sin(2 * np.pi * 0.9 * TIME + 1))[:, None]
+
+
+def speed(hertz: float) -> np.ndarray:
+    return np.full_like(LOAD, 2 * np.pi * hertz)
+
+
+def test_a_stiff_gear_without_play_passes_the_load():
+    passed = transmitted(LOAD, np.ones_like(LOAD), RATE, speed(40), 0.5)
+    np.testing.assert_allclose(passed, LOAD, atol=0.02 * np.abs(LOAD).max())
+
+
+def test_a_link_swings_at_its_own_frequency_after_a_jerk():
+    jerk = np.where(TIME[:, None] < 2, 0.0, 5.0)
+    passed = transmitted(jerk, np.ones_like(jerk), RATE, speed(6), 0.1)[TIME > 2, 0]
+    crossings = np.flatnonzero(np.diff(np.sign(passed[: int(RATE)] - 5)) != 0)
+    assert RATE / np.diff(crossings).mean() / 2 == pytest.approx(6, rel=0.05)
+    assert passed[-1] == pytest.approx(5, rel=1e-3)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(3e-4, 3e-3), st.floats(0.2, 5.0))
+def test_play_delays_an_impulse_and_keeps_it(play, inertia):
+    passed = transmitted(LOAD, np.full_like(LOAD, inertia), RATE, speed(30), 0.5, play)
+    lost = np.abs(passed - LOAD).sum() / RATE
+    assert lost > 0.02
+    assert abs((passed - LOAD).sum() / RATE) < 0.35 * lost
+
+
+def test_more_play_loses_more():
+    lost = [
+        np.abs(transmitted(LOAD, np.ones_like(LOAD), RATE, speed(30), 0.5, b) - LOAD).sum() for b in (3e-4, 1e-3, 3e-3)
+    ]
+    assert lost == sorted(lost)
+
+
+@pytest.mark.parametrize("effect", [Backlash(), JointElasticity(frequency=8.0)], ids=["backlash", "elasticity"])
+def test_a_part_with_its_reach_gives_what_the_whole_gives(effect):
+    robot = arm(3)
+    motion = swing(robot, 3, seconds=20, rate=200)
+    load = load_torque(robot, motion, None)
+    before = Predicted(load, load=load, inertia=load_inertia(robot, motion, None))
+    whole = effect.columns(robot, motion, before)
+    part = motion.part(1100, 2900)  # two seconds more on either side
+    cut = effect.columns(robot, part, before.part(1100, 2900))
+    np.testing.assert_allclose(cut[400:1400], whole[1500:2500], atol=1e-9)
