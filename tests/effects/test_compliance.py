@@ -25,6 +25,12 @@ def test_a_stiff_gear_without_play_passes_the_load():
     np.testing.assert_allclose(passed, LOAD, atol=0.02 * np.abs(LOAD).max())
 
 
+def test_a_link_that_grows_light_does_not_run_away():
+    light = np.where(TIME[:, None] < 3, 5.0, 1e-4)
+    passed = transmitted(LOAD, light, RATE, 2 * np.pi * 40 * np.sqrt(5 / light), 0.1)
+    assert np.abs(passed).max() < 2 * np.abs(LOAD).max()
+
+
 def test_a_link_swings_at_its_own_frequency_after_a_jerk():
     jerk = np.where(TIME[:, None] < 2, 0.0, 5.0)
     passed = transmitted(jerk, np.ones_like(jerk), RATE, speed(6), 0.1)[TIME > 2, 0]

@@ -54,8 +54,8 @@ def transmitted(
     """Return (N, n) the torque that passes a spring with `play` (rad) between a motor and a link that swings behind it.
 
     load: (N, n) N m, what a link stiffly joined to the measured motor would take; inertia: (N, n) kg m^2; rate: Hz;
-    speed: (N, n) rad/s, of the link's swing while the motor holds. With x the motor's lead over the link,
-    `start`: where the first sample lies in its run, so that parts of a run are computed alike.
+    speed: (N, n) rad/s, of the link's swing while the motor holds; `start`: where the first sample lies in its run, so
+    that parts of a run are computed alike. With x the motor's lead over the link,
     x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the two-mass
     model (Spong 1987, eqs. 6 and 7), link by link.
     """
@@ -64,6 +64,7 @@ def transmitted(
     pushed = np.concatenate([load / inertia, load[-1:] / inertia[-1:]])
     substeps = max(1, round(_STEPS / rate))
     step, last = 1 / (rate * substeps), len(load) - 1
+    speed = np.minimum(speed, 1 / step)  # what is stiffer swings above any band of motion, and would need finer steps
     first = np.clip(starts - ahead, 0, last)
     x = pushed[first] / speed[first] ** 2 + np.sign(pushed[first]) * play / 2
     v = np.zeros_like(x)
