@@ -12,6 +12,8 @@ from irtwin.gap.hypotheses import Column
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+_SHORT = 16384  # samples: such a run's columns fit in memory, and a part of it would be computed with most of the rest
+
 Below = Callable[[Motion], Predicted]
 Parts = list[list[np.ndarray]]
 """For each equation the columns that act in it, (N, some) each."""
@@ -20,7 +22,8 @@ Parts = list[list[np.ndarray]]
 class Candidates:
     """M candidate columns in g equations, each column held only where it acts.
 
-    Effects with memory are computed over a whole run, if their memory has no end; one run is held at a time.
+    Effects with memory are computed over a whole run, if their memory has no end or the run is short; one run is held
+    at a time.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[Effect], pattern: np.ndarray, below: Below):
@@ -61,7 +64,7 @@ class Candidates:
         self._held = {}  # let go of the run before
         self._run, self._predicted = whole, self._below(whole) if self._effects else None
         for place, effect in enumerate(self._effects):
-            if effect.memory and effect.reach is None:
+            if effect.memory and (effect.reach is None or len(whole.time) <= _SHORT):
                 self._held[place] = self._columns(place, whole, self._predicted)
 
     def _columns(self, place: int, motion: Motion, predicted: Predicted | None) -> Parts:
