@@ -61,26 +61,25 @@ def transmitted(
     """
     ahead, length = round(_WARM_UP * rate), max(1, round(_WINDOW * rate))
     starts = np.arange(-(start % length), len(load), length)
-    pushed = np.concatenate([load / inertia, load[-1:] / inertia[-1:]])
     substeps = max(1, round(_STEPS / rate))
     step, last = 1 / (rate * substeps), len(load) - 1
+    rows = np.clip(starts + np.arange(-ahead, length + 1)[:, None], 0, last)
+    pushed = (load / inertia)[rows]
+    rises = np.diff(pushed, axis=0) / substeps
     speed = np.minimum(speed, 1 / step)  # what is stiffer swings above any band of motion, and would need finer steps
-    first = np.clip(starts - ahead, 0, last)
-    x = pushed[first] / speed[first] ** 2 + np.sign(pushed[first]) * play / 2
+    squares, rubs = (speed**2)[rows], (2 * damping * speed)[rows]
+    x = pushed[0] / squares[0] + np.sign(pushed[0]) * play / 2
     v = np.zeros_like(x)
-    passed = np.empty((ahead + length, *x.shape))
-    for at in range(-ahead, length):
-        rows = np.clip(starts + at, 0, last)
-        push, rise = pushed[rows], (pushed[rows + 1] - pushed[rows]) / substeps
-        square, rubs = speed[rows] ** 2, 2 * damping * speed[rows]
+    passed = np.empty_like(rises)
+    for push, rise, square, rub, back in zip(pushed[:-1], rises, squares, rubs, passed, strict=False):
         for substep in range(substeps):
-            back = square * x + rubs * v if play == 0 else _beyond(play, x, square, rubs * v)
+            force = square * x + rub * v if play == 0 else _beyond(play, x, square, rub * v)
             if substep == 0:
-                passed[at + ahead] = back * inertia[rows]
-            v += step * (push - back)
+                back[:] = force
+            v += step * (push - force)
             x += step * v
             push += rise
-    kept = passed[ahead:].transpose(1, 0, 2).reshape(-1, load.shape[1])
+    kept = (passed * inertia[rows[:-1]])[ahead:].transpose(1, 0, 2).reshape(-1, load.shape[1])
     return np.asarray(kept[-starts[0] :][: len(load)])
 
 
