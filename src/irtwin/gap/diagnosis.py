@@ -34,6 +34,7 @@ from irtwin.gap.visibility import Untestable, can_show, untestable
 from irtwin.gap.weighing import balances
 from irtwin.gap.where import left_over, places
 from irtwin.gap.yardstick import yardstick
+from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
@@ -87,6 +88,7 @@ class Diagnosis:
         }
 
 
+@one_blas_thread()
 def diagnose(
     data_set: DataSet,
     *,

@@ -13,6 +13,7 @@ from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
 from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
 from irtwin.identification.estimators import Estimate, combine, estimate
+from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
 from irtwin.identification.uncertainty import half_widths
 from irtwin.robot.description import Robot
@@ -28,6 +29,7 @@ _REPEATS = 8  # of fit and prediction, at most
 _TORQUE_STEP = 1e-2  # N m, exact for what is quadratic in torque
 
 
+@one_blas_thread()
 def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect] = BASELINE) -> Twin:
     """Return the twin of a robot that fits the motions.
 
