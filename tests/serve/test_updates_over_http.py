@@ -70,13 +70,33 @@ def test_an_update_that_fails_changes_nothing(writable, text: str, status: int, 
     assert writable.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
 
 
-def test_the_dataset_of_an_update_is_written_into_it(writable) -> None:
-    response = httpx.post(
-        writable.sparql,
-        data={"update": "DELETE WHERE { ?s ?p ?o }", "using-graph-uri": "http://e/g"},
-        headers={"Authorization": "Bearer a-token-for-tests"},
+def update_of(server, text: str, **dataset: str) -> httpx.Response:
+    return httpx.post(
+        server.sparql, data={"update": text} | dataset, headers={"Authorization": "Bearer a-token-for-tests"}
     )
-    assert (response.status_code, "write USING into the update" in response.text) == (400, True)
+
+
+def test_the_dataset_of_an_update_is_what_its_patterns_are_asked_of(writable) -> None:
+    facts = "".join(f"GRAPH <http://e/g{k}> {{ <http://e/of> <http://e/p> {k} }} " for k in range(3))
+    assert writable.update(f"INSERT DATA {{ {facts} }}").status_code == 204
+    copied = "INSERT { <http://e/copy> <http://e/p> ?o } WHERE { <http://e/of> <http://e/p> ?o }"
+    assert update_of(writable, copied, **{"using-graph-uri": "http://e/g1"}).status_code == 204
+    named = "INSERT { <http://e/copy> ?g ?o } WHERE { GRAPH ?g { <http://e/of> <http://e/p> ?o } }"
+    assert update_of(writable, named, **{"using-named-graph-uri": "http://e/g2"}).status_code == 204
+    found = writable.ask("SELECT ?p ?o { <http://e/copy> ?p ?o } ORDER BY ?o").json()["results"]["bindings"]
+    assert [(row["p"]["value"], row["o"]["value"]) for row in found] == [("http://e/p", "1"), ("http://e/g2", "2")]
+
+
+@pytest.mark.parametrize(
+    ("text", "graph", "message"),
+    [
+        ("WITH <http://e/g> DELETE { ?s ?p ?o } WHERE { ?s ?p ?o }", "http://e/g", "say it once"),
+        ("DELETE WHERE { ?s ?p ?o }", "no IRI", "a graph's name is no IRI"),
+    ],
+)
+def test_a_dataset_that_cannot_be_is_refused(writable, text: str, graph: str, message: str) -> None:
+    response = update_of(writable, text, **{"using-graph-uri": graph})
+    assert (response.status_code, message in response.text) == (400, True), response.text
 
 
 def test_an_update_that_takes_too_long_changes_nothing(new_graph: Callable[[], Path], start) -> None:

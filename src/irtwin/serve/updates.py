@@ -11,6 +11,7 @@ from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.sparql_text import using
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.snapshot import OLDEST
@@ -43,10 +44,14 @@ class Updates:
             raise Refusal(403, "this endpoint is read-only")
         if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
             raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
+        text = operation.text
         if operation.default_graphs or operation.named_graphs:
-            raise Refusal(400, "using-graph-uri is not supported: write USING into the update")
+            try:
+                text = using(text, operation.default_graphs, operation.named_graphs)
+            except InputError as error:
+                raise Refusal(400, str(error)) from error
         async with self._turn:
-            await self._run(operation.text)
+            await self._run(text)
             self._last = time.monotonic()
 
     async def _run(self, text: str) -> None:
