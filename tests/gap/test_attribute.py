@@ -19,12 +19,16 @@ ROWS, RUNS = 300, 12
 EFFECT = catalogue()["cable_drag"]
 
 
-def system_of(mix, coefficients, size=10.0):
-    """Columns that are mixtures (rows of `mix`) of independent ones, and what `coefficients` of these add up to."""
+def system_of(mix, coefficients, size=10.0, silent=()):
+    """Columns that are mixtures (rows of `mix`) of independent ones, and what `coefficients` of these add up to.
+
+    In `silent` runs the first of the independent ones is zero.
+    """
     generator = np.random.default_rng(1)
     blocks = []
     for run in range(RUNS):
         independent = np.linalg.qr(generator.standard_normal((ROWS, len(coefficients))))[0] * np.sqrt(ROWS)
+        independent[:, 0] *= run not in silent
         columns = size * independent @ np.array(mix).T
         measured = size * independent @ coefficients + generator.standard_normal(ROWS)
         factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
@@ -47,6 +51,16 @@ def found(mix, coefficients):
 def test_what_is_there_is_found_and_nothing_else():
     assert found(np.eye(4), [0.0, 0.3, 0.0, 0.1]) == ["effect_1", "effect_3"]
     assert found(np.eye(4), np.zeros(4)) == []
+
+
+def test_what_two_runs_alone_show_is_found_where_it_leads_by_far():
+    def causes(coefficient, speaking):
+        system = system_of(np.eye(4), [coefficient, 0.0, 0.0, 0.0], silent=range(RUNS - speaking))
+        return [cause.effect for cause in attribute(*system, seed=0).causes]
+
+    assert causes(1.0, speaking=2) == ["effect_0"]
+    assert causes(0.1, speaking=2) == []
+    assert causes(1.0, speaking=1) == []  # no other run tells its coefficient
 
 
 def test_a_mixture_that_comes_first_gives_way_to_the_two_that_it_stands_for():

@@ -69,8 +69,8 @@ class BusCapacitor(Effect):
     E: float = 50.0  # J
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return stores over the range."""
-        return self.variants(E=(5.0, 15.0, 50.0, 150.0, 500.0))
+        """Return stores over the range, and below it: what is small beside a stop is full at once."""
+        return self.variants(E=(1.0, 2.0, 5.0, 12.0, 30.0, 75.0, 190.0, 500.0))
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return E."""

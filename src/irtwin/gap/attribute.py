@@ -16,10 +16,12 @@ from irtwin.gap.significance import p_values
 from irtwin.gap.system import System, Trial, attempt, scores
 
 _ROUNDS = 12
-_MATTERS = 0.08  # of the mean square of one equation's residual: less than this a cause has to explain
+_MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
 _ALPHA = 0.02  # of the whole catalogue
 _MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
 _LEAST_T = 2.3  # mean gain over its standard error between groups
+_FEW = 3.0  # groups, effectively: what speaks in no more cannot be sure by the scatter between groups
+_AHEAD = 3.0  # times what any effect gains that speaks everywhere: so far must it be ahead instead
 _NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
 _PLAIN = 0.5  # of the best gain: a form of the default twin that is missing goes before what refines it
 _AT_MOST = 0.05  # of the gain: a larger difference is one, whatever its error
@@ -36,22 +38,24 @@ class Attribution:
     share_visible: np.ndarray
 
 
-def attribute(system: System, candidates: Sequence[Hypothesis], seed: int) -> Attribution:
+def attribute(
+    system: System, candidates: Sequence[Hypothesis], seed: int, least: np.ndarray | None = None
+) -> Attribution:
     """Find the effects that the data show beyond the twin's.
 
     Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out; an
-    episode by what its joints say of each other.
+    episode by what its joints say of each other. A cause explains at least `least` (g,) of the equations' mean squares.
     """
     candidates = in_scope(candidates, both=system.both)
     noise = np.maximum(system.residual_rms((), np.ones(len(system.pattern))), 1e-9)
     noise = np.maximum(system.residual_rms((), noise), 1e-9)
     moments = system.moments(noise)
     first = attempt(system, moments, (), [h.variants for h in candidates])
-    search = _Search(system, candidates, seed)
+    search = _Search(system, candidates, seed, np.zeros(len(noise)) if least is None else least)
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
     moments = system.moments(noise)
-    found = _backward(system, moments, found)
+    found = _backward(system, moments, found, search.matters(noise) / 2)
     named = causes(system, moments, candidates, found)
     noise = np.maximum(system.residual_rms([k for cause in named for k in cause.columns], noise), 1e-9)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
@@ -64,6 +68,11 @@ class _Search:
     system: System
     candidates: Sequence[Hypothesis]
     seed: int
+    least: np.ndarray
+
+    def matters(self, noise: np.ndarray) -> float:
+        """Return what a cause has to gain where equations are weighed by `noise` (g,)."""
+        return max(_MATTERS, float((self.least / noise**2).max()))
 
     def noise(self, found: Sequence[Find], before: np.ndarray) -> np.ndarray:
         """Return what finds leave of each equation, (g,) RMS; `before` weighs the equations."""
@@ -76,11 +85,38 @@ class _Search:
             if all_found:
                 noise = self.noise(all_found, noise)
             moments = self.system.moments(noise)
-            new = _round(self.system, moments, noise, self.candidates, _columns(all_found), all_found, self.seed)
+            new = self._round(moments, noise, all_found)
             if not new:
                 break
             all_found.extend(new)
         return all_found
+
+    def _round(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
+        chosen = _columns(found)
+        left = [h for h in self.candidates if not any(set(v.columns) & set(chosen) for v in h.variants)]
+        left = [h for h in left if not any(_same_place(h, one.hypothesis) for one in found)]
+        if not left:
+            return []
+        trial = attempt(self.system, moments, chosen, [h.variants for h in left])
+        gain, t, speaks = _judged(self.system, trial, left)
+        episode = self.system.episode
+        short = [k for k, one in enumerate(left) if episode and any(brief(v.effect) for v in one.variants)]
+        t[short] = episode.t if episode else 0.0
+        alone = _far_ahead(gain, speaks <= _FEW, left)
+        plausible = (gain >= self.matters(noise)) & (t >= _LEAST_T) | alone
+        if not plausible.any():
+            return []
+        block_scores, products = scores(self.system, moments, noise, chosen)
+        p = p_values(block_scores, products, left, self.seed)
+        p[short] = episode.p if episode else 1.0
+        sure = np.flatnonzero(plausible & (_sure(p, gain, left) | alone))
+        if not len(sure):
+            return []
+        best = _leader(sure, gain, gains(self.system, trial), left, found)
+        return [
+            Find(left[k], left[k].variants[_variant(trial, left, k)], float(gain[k]), float(t[k]), float(p[k]))
+            for k in [best, *_elsewhere(best, sure, gain, left)]
+        ]
 
     def loss(self, found: Sequence[Find], moments: Sequence[np.ndarray]) -> float:
         """Return the weighted squares that finds leave on groups left out."""
@@ -110,62 +146,56 @@ def _columns(found: Sequence[Find]) -> list[int]:
     return [k for one in found for k in one.variant.columns]
 
 
-def _judged(system: System, trial: Trial, candidates: Sequence[Hypothesis]) -> tuple[np.ndarray, np.ndarray]:
-    """Return each hypothesis' gain per row and its t between groups, (H,), on the groups that count for it."""
+def _judged(
+    system: System, trial: Trial, candidates: Sequence[Hypothesis]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return each hypothesis' gain per row, its t between groups, and in how many it speaks; (H,), on those that count.
+
+    In how many, effectively: (sum a)^2 / sum a^2 of what it adds to each.
+    """
     gain, weights = gains(system, trial), rows(system)
     said = trial.said / weights
     own = [judged(system, hypothesis.scope) for hypothesis in candidates]
     mean = [np.average(one[mine], weights=weights[mine]) for one, mine in zip(gain, own, strict=True)]
     t = [between_groups(one[mine], adds[mine]) for one, adds, mine in zip(gain, said, own, strict=True)]
-    return np.array(mean), np.array(t)
+    speaks = [adds[mine].sum() ** 2 / max((adds[mine] ** 2).sum(), 1e-12) for adds, mine in zip(said, own, strict=True)]
+    return np.array(mean), np.array(t), np.array(speaks)
 
 
-def _round(
-    system: System,
-    moments: Sequence[np.ndarray],
-    noise: np.ndarray,
-    candidates: Sequence[Hypothesis],
-    chosen: Sequence[int],
-    found: Sequence[Find],
-    seed: int,
-) -> list[Find]:
-    taken = set(chosen)
-    left = [h for h in candidates if not any(set(v.columns) & taken for v in h.variants)]
-    left = [h for h in left if not any(_same_place(h, one.hypothesis) for one in found)]
-    if not left:
-        return []
-    trial = attempt(system, moments, chosen, [h.variants for h in left])
-    gain, t = _judged(system, trial, left)
-    episodes = [k for k, one in enumerate(left) if system.episode and any(brief(v.effect) for v in one.variants)]
-    t[episodes] = system.episode.t if system.episode else 0.0
-    plausible = np.flatnonzero((gain >= _MATTERS) & (t >= _LEAST_T))
-    if not len(plausible):
-        return []
-    block_scores, products = scores(system, moments, noise, chosen)
-    p = p_values(block_scores, products, left, seed)
-    p[episodes] = system.episode.p if system.episode else 1.0
-    bodies = np.array([left[k].effect == "rigid_body" for k in plausible])  # too many for a score by column
-    sure = p[plausible] <= np.where(gain[plausible] >= _MUCH, _ALPHA_OF_MUCH, _ALPHA)
-    plausible = plausible[sure | bodies]
-    if not len(plausible):
-        return []
-    best = _leader(plausible, gain, gains(system, trial), left, found)
+def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
+    """Return (H,) whether a hypothesis speaks in a `few` groups alone, gains most, and that by far.
+
+    A swing or a full bus may be excited in one run or two. What the effects that speak everywhere gain at most is what
+    chance and forms that differ make.
+    """
+    best = int(np.argmax(gain))
+    far = gain[best] >= max(_MUCH, _AHEAD * gain[~few].max(initial=0.0))
+    found = np.zeros(len(gain), dtype=bool)
+    found[best] = far and few[best] and not any(brief(v.effect) for v in left[best].variants)
+    return found
+
+
+def _sure(p: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
+    """Return (H,) whether a hypothesis is beyond chance."""
+    bodies = np.array([one.effect == "rigid_body" for one in left])  # too many for a score by column
+    return np.asarray((p <= np.where(gain >= _MUCH, _ALPHA_OF_MUCH, _ALPHA)) | bodies)
+
+
+def _elsewhere(best: int, plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> list[int]:
+    """Return the other joints' places where the leader's effect leads too, or nearly."""
     leader = left[best]
-    taken_now = [int(best)]
-    if leader.joint is not None:
-        for k in plausible:
-            other = left[k]
-            if k == best or other.effect != leader.effect or other.scope != leader.scope or other.joint is None:
-                continue
-            rivals = [gain[j] for j in plausible if left[j].joint == other.joint]
-            robot = [gain[j] for j in plausible if left[j].joint is None]
-            near = _PLAIN if other.effect in BASELINE and other.scope == MISSING else _NEAR
-            if gain[k] >= near * max(rivals) and (not robot or max(robot) < gain[best]):
-                taken_now.append(int(k))
-    return [
-        Find(left[k], left[k].variants[_variant(trial, left, k)], float(gain[k]), float(t[k]), float(p[k]))
-        for k in taken_now
-    ]
+    robot = [gain[j] for j in plausible if left[j].joint is None]
+    if leader.joint is None or (robot and max(robot) >= gain[best]):
+        return []
+    found = []
+    for k in plausible:
+        other = left[k]
+        if k == best or other.effect != leader.effect or other.scope != leader.scope or other.joint is None:
+            continue
+        near = _PLAIN if other.effect in BASELINE and other.scope == MISSING else _NEAR
+        if gain[k] >= near * max(gain[j] for j in plausible if left[j].joint == other.joint):
+            found.append(int(k))
+    return found
 
 
 def _leader(
@@ -216,12 +246,12 @@ def _variant(trial: Trial, candidates: Sequence[Hypothesis], place: int) -> int:
     return int(trial.best[place]) - before
 
 
-def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find]) -> list[Find]:
-    """Drop what the later ones made idle."""
+def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find], least: float) -> list[Find]:
+    """Drop what gains less than `least` beside the others: the later ones made it idle."""
     while len(found) > 1:
         gains = [_alone(system, moments, found, k) for k in range(len(found))]
         worst = int(np.argmin(gains))
-        if gains[worst] >= _MATTERS / 2:
+        if gains[worst] >= least:
             break
         found = [one for k, one in enumerate(found) if k != worst]
     return found
