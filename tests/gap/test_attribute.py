@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -59,8 +61,16 @@ def test_what_two_runs_alone_show_is_found_where_it_leads_by_far():
         return [cause.effect for cause in attribute(*system, seed=0).causes]
 
     assert causes(1.0, speaking=2) == ["effect_0"]
-    assert causes(0.1, speaking=2) == []
+    assert causes(0.05, speaking=2) == []
     assert causes(1.0, speaking=1) == []  # no other run tells its coefficient
+
+
+def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
+    system, candidates = system_of(np.eye(3), [0.3, 0.025, 0.0])
+    assert [cause.effect for cause in attribute(system, candidates, seed=0).causes] == ["effect_0"]
+    alike = [replace(one, effect="effect", joint=f"joint_{k}") for k, one in enumerate(candidates)]
+    (cause,) = attribute(system, alike, seed=0).causes
+    assert cause.joints == ("joint_0", "joint_1")
 
 
 def test_a_mixture_that_comes_first_gives_way_to_the_two_that_it_stands_for():

@@ -20,8 +20,9 @@ _MATTERS = 0.08  # of the mean square of one equation's residual: what explains 
 _ALPHA = 0.02  # of the whole catalogue
 _MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
 _LEAST_T = 2.3  # mean gain over its standard error between groups
+_LESS, _LESS_T = 0.5, 2.0  # of what a cause has to gain, and its t, for an effect that another joint has shown
 _FEW = 3.0  # groups, effectively: what speaks in no more cannot be sure by the scatter between groups
-_AHEAD = 3.0  # times what any effect gains that speaks everywhere: so far must it be ahead instead
+_ALONE, _AHEAD = 0.12, 3.0  # what it gains instead, and how far it is ahead of all that speak everywhere
 _NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
 _PLAIN = 0.5  # of the best gain: a form of the default twin that is missing goes before what refines it
 _AT_MOST = 0.05  # of the gain: a larger difference is one, whatever its error
@@ -85,7 +86,7 @@ class _Search:
             if all_found:
                 noise = self.noise(all_found, noise)
             moments = self.system.moments(noise)
-            new = self._round(moments, noise, all_found)
+            new = self._round(moments, noise, all_found) or self._elsewhere(moments, noise, all_found)
             if not new:
                 break
             all_found.extend(new)
@@ -93,8 +94,7 @@ class _Search:
 
     def _round(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
         chosen = _columns(found)
-        left = [h for h in self.candidates if not any(set(v.columns) & set(chosen) for v in h.variants)]
-        left = [h for h in left if not any(_same_place(h, one.hypothesis) for one in found)]
+        left = self._left(found)
         if not left:
             return []
         trial = attempt(self.system, moments, chosen, [h.variants for h in left])
@@ -113,10 +113,25 @@ class _Search:
         if not len(sure):
             return []
         best = _leader(sure, gain, gains(self.system, trial), left, found)
-        return [
-            Find(left[k], left[k].variants[_variant(trial, left, k)], float(gain[k]), float(t[k]), float(p[k]))
-            for k in [best, *_elsewhere(best, sure, gain, left)]
-        ]
+        return [_find(trial, left, k, gain, t, p) for k in [best, *_leads_too(best, sure, gain, left)]]
+
+    def _elsewhere(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
+        """Return what the effects that were found add at other joints, which show it less."""
+        known = {_key(one) for one in found if one.hypothesis.joint}
+        left = [one for one in self._left(found) if one.joint and (one.effect, one.scope) in known]
+        if not left:
+            return []
+        chosen = _columns(found)
+        trial = attempt(self.system, moments, chosen, [h.variants for h in left])
+        gain, t, _ = _judged(self.system, trial, left)
+        p = p_values(*scores(self.system, moments, noise, chosen), left, self.seed)
+        sure = (gain >= _LESS * self.matters(noise)) & (t >= _LESS_T) & (p <= _ALPHA)
+        return [_find(trial, left, int(k), gain, t, p) for k in np.flatnonzero(sure)]
+
+    def _left(self, found: Sequence[Find]) -> list[Hypothesis]:
+        taken = set(_columns(found))
+        left = [h for h in self.candidates if not any(set(v.columns) & taken for v in h.variants)]
+        return [h for h in left if not any(_same_place(h, one.hypothesis) for one in found)]
 
     def loss(self, found: Sequence[Find], moments: Sequence[np.ndarray]) -> float:
         """Return the weighted squares that finds leave on groups left out."""
@@ -169,7 +184,7 @@ def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) ->
     chance and forms that differ make.
     """
     best = int(np.argmax(gain))
-    far = gain[best] >= max(_MUCH, _AHEAD * gain[~few].max(initial=0.0))
+    far = gain[best] >= max(_ALONE, _AHEAD * gain[~few].max(initial=0.0))
     found = np.zeros(len(gain), dtype=bool)
     found[best] = far and few[best] and not any(brief(v.effect) for v in left[best].variants)
     return found
@@ -181,7 +196,7 @@ def _sure(p: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> np.nda
     return np.asarray((p <= np.where(gain >= _MUCH, _ALPHA_OF_MUCH, _ALPHA)) | bodies)
 
 
-def _elsewhere(best: int, plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> list[int]:
+def _leads_too(best: int, plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> list[int]:
     """Return the other joints' places where the leader's effect leads too, or nearly."""
     leader = left[best]
     robot = [gain[j] for j in plausible if left[j].joint is None]
@@ -244,6 +259,11 @@ def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
 def _variant(trial: Trial, candidates: Sequence[Hypothesis], place: int) -> int:
     before = sum(len(h.variants) for h in candidates[:place])
     return int(trial.best[place]) - before
+
+
+def _find(trial: Trial, left: Sequence[Hypothesis], place: int, gain: np.ndarray, t: np.ndarray, p: np.ndarray) -> Find:
+    variant = left[place].variants[_variant(trial, left, place)]
+    return Find(left[place], variant, float(gain[place]), float(t[place]), float(p[place]))
 
 
 def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find], least: float) -> list[Find]:
