@@ -30,7 +30,8 @@ def effects(signal):
 
 
 @pytest.mark.parametrize("effect", effects("torque"), ids=lambda effect: f"{effect.id}{list(effect.shape.values())}")
-def test_parts_join_to_the_whole_where_the_effect_acts(effect):
+def test_parts_join_to_the_whole_where_the_effect_acts(effect, monkeypatch):
+    monkeypatch.setattr("irtwin.gap.candidates._PIECE", 250)  # so that it does not reach from one end to the other
     columns = candidate_columns(ROBOT, [effect])
     pattern = candidate_pattern(ROBOT, [effect], columns)
     candidates = Candidates(ROBOT, [effect], pattern, lambda whole: BELOW)

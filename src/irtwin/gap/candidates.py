@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,18 +13,34 @@ from irtwin.gap.hypotheses import Column
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
-_SHORT = 16384  # samples: such a run's columns fit in memory, and a part of it would be computed with most of the rest
+_PIECE = 65536  # samples: computed at once, where a part alone would be computed with much of what is around it
 
 Below = Callable[[Motion], Predicted]
 Parts = list[list[np.ndarray]]
 """For each equation the columns that act in it, (N, some) each."""
 
 
+@dataclass(frozen=True)
+class _Held:
+    """An effect's columns from sample `first` of a run on; right from `start` to `stop`, exclusive."""
+
+    parts: Parts
+    first: int
+    start: int
+    stop: int
+
+    def covers(self, start: int, stop: int) -> bool:
+        return self.start <= start and stop <= self.stop
+
+    def cut(self, start: int, stop: int) -> Parts:
+        return [[columns[start - self.first : stop - self.first] for columns in equation] for equation in self.parts]
+
+
 class Candidates:
     """M candidate columns in g equations, each column held only where it acts.
 
-    Effects with memory are computed over a whole run, if their memory has no end or the run is short; one run is held
-    at a time.
+    Effects with memory are computed over a whole run, or over a long piece of it if their memory has an end; one run is
+    held at a time.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[Effect], pattern: np.ndarray, below: Below):
@@ -34,7 +51,7 @@ class Candidates:
         self._patterns = [pattern[:, start:stop] for start, stop in pairwise(ends)]
         self._run: Motion | None = None
         self._predicted: Predicted | None = None
-        self._held: dict[int, Parts] = {}
+        self._held: dict[int, _Held] = {}
 
     def part(self, motion: Motion) -> list[np.ndarray]:
         """Return the columns (N, k_e) of each equation over a part of a run."""
@@ -50,22 +67,27 @@ class Candidates:
     def _own(self, place: int, whole: Motion, motion: Motion) -> Parts:
         """Return an effect's columns over a part of the run that is held."""
         start, stop = motion.start, motion.start + len(motion.time)
-        if place in self._held:
-            return _cut(self._held[place], start, stop)
         reach = self._effects[place].reach
-        if reach is None:
+        if place not in self._held and reach is None:
             return self._columns(place, motion, self._predicted and self._predicted.part(start, stop))
-        around = int(np.ceil(reach * whole.rate))
+        if place not in self._held or not self._held[place].covers(start, stop):
+            assert reach is not None, "what has no reach is held over the whole run"
+            self._held[place] = self._piece(place, whole, start, max(stop, start + _PIECE), round(reach * whole.rate))
+        return self._held[place].cut(start, stop)
+
+    def _piece(self, place: int, whole: Motion, start: int, stop: int, around: int) -> _Held:
+        """Compute an effect's columns over a piece of a run, with `around` samples before and after."""
         first, last = max(0, start - around), min(stop + around, len(whole.time))
-        wider = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
-        return _cut(wider, start - first, stop - first)
+        parts = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
+        return _Held(parts, first, start if first else 0, stop if last < len(whole.time) else last)
 
     def _hold(self, whole: Motion) -> None:
         self._held = {}  # let go of the run before
         self._run, self._predicted = whole, self._below(whole) if self._effects else None
         for place, effect in enumerate(self._effects):
-            if effect.memory and (effect.reach is None or len(whole.time) <= _SHORT):
-                self._held[place] = self._columns(place, whole, self._predicted)
+            if effect.memory and effect.reach is None:
+                every = len(whole.time)
+                self._held[place] = _Held(self._columns(place, whole, self._predicted), 0, 0, every)
 
     def _columns(self, place: int, motion: Motion, predicted: Predicted | None) -> Parts:
         effect, robot = self._effects[place], self._robot
@@ -81,10 +103,6 @@ class Candidates:
         columns = free_columns(effect, robot, motion, predicted)
         by_equation = columns[:, None] if columns.ndim == 2 else columns
         return [[by_equation[:, equation, used]] for equation, used in enumerate(self._patterns[place])]
-
-
-def _cut(parts: Parts, start: int, stop: int) -> Parts:
-    return [[columns[start:stop] for columns in equation] for equation in parts]
 
 
 def free_columns(effect: Effect, robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
