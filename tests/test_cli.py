@@ -1,6 +1,7 @@
 """The command line as a newcomer meets it: help, answers, and what bad input gets."""
 
 import json
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -173,6 +174,19 @@ def test_the_map_command_writes_quads(workspace, tmp_path):
     done = irtwin("map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
     assert done.returncode == 0, done.stderr
     assert "https://w3id.org/irtwin#IR_Name" in out.read_text()
+
+
+def test_the_map_command_ends_what_has_no_end(tmp_path):
+    sqlite3.connect(tmp_path / "x.db").close()
+    (tmp_path / "x.ttl").write_text(
+        """@prefix rr: <http://www.w3.org/ns/r2rml#> . @prefix : <http://e/> .
+        :M rr:subjectMap [ rr:template "http://e/{n}"; rr:class :Number ]; rr:logicalTable [ rr:sqlQuery
+        "WITH RECURSIVE t(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM t) SELECT n FROM t WHERE n < 0" ] ."""
+    )
+    known = ["--database", "sqlite:///x.db", "--out", "x.nq", "--timeout", "0.5"]
+    done = irtwin("map", "x.ttl", *known, folder=tmp_path)
+    assert (done.returncode, "its SQL has not ended after 0.5 s" in done.stderr) == (2, True), done.stderr
+    assert not (tmp_path / "x.nq").exists()
 
 
 @pytest.mark.system
