@@ -17,6 +17,7 @@ from irtwin.gap.system import System, Trial, attempt, scores
 
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
+_OF_FLOOR = 0.25  # of a floor's square, besides; of the residual's where that is below it
 _ALPHA = 0.02  # of the whole catalogue
 _MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
 _LEAST_T = 2.3  # mean gain over its standard error between groups
@@ -40,19 +41,19 @@ class Attribution:
 
 
 def attribute(
-    system: System, candidates: Sequence[Hypothesis], seed: int, least: np.ndarray | None = None
+    system: System, candidates: Sequence[Hypothesis], seed: int, floor: np.ndarray | None = None
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's.
 
     Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out; an
-    episode by what its joints say of each other. A cause explains at least `least` (g,) of the equations' mean squares.
+    episode by what its joints say of each other. With a `floor` (g,), RMS, a cause has to explain a part of that too.
     """
     candidates = in_scope(candidates, both=system.both)
     noise = np.maximum(system.residual_rms((), np.ones(len(system.pattern))), 1e-9)
     noise = np.maximum(system.residual_rms((), noise), 1e-9)
     moments = system.moments(noise)
     first = attempt(system, moments, (), [h.variants for h in candidates])
-    search = _Search(system, candidates, seed, np.zeros(len(noise)) if least is None else least)
+    search = _Search(system, candidates, seed, floor)
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
     moments = system.moments(noise)
@@ -69,11 +70,13 @@ class _Search:
     system: System
     candidates: Sequence[Hypothesis]
     seed: int
-    least: np.ndarray
+    floor: np.ndarray | None
 
     def matters(self, noise: np.ndarray) -> float:
         """Return what a cause has to gain where equations are weighed by `noise` (g,)."""
-        return max(_MATTERS, float((self.least / noise**2).max()))
+        if self.floor is None:
+            return _MATTERS
+        return max(_MATTERS, _OF_FLOOR * float(np.minimum(self.floor / noise, 1.0).max() ** 2))
 
     def noise(self, found: Sequence[Find], before: np.ndarray) -> np.ndarray:
         """Return what finds leave of each equation, (g,) RMS; `before` weighs the equations."""

@@ -21,7 +21,6 @@ from irtwin.gap.visibility import can_show
 from irtwin.identification.estimators import Estimate, estimate
 
 _NO_NOISE = 1e-9
-_LEAST_IN_POWER = 0.25  # floors squared: losses of other forms than the twin's make as much in healthy robots
 
 
 @dataclass(frozen=True)
@@ -120,8 +119,8 @@ def find(
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
     candidates = [one for one in candidates if one.effect not in without]
-    least = _LEAST_IN_POWER * floor**2 if power and floor is not None else None
-    found = attribute(system, candidates, seed, least)
+    # losses of other forms than the twin's make a part of the floor in healthy robots, beyond chance
+    found = attribute(system, candidates, seed, floor if power else None)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     parts = shares(system, found, seed)
