@@ -86,6 +86,19 @@ def test_a_gap_in_one_run_of_many_is_not_sure():
     assert located([*mostly, *once]) == []
 
 
+def test_a_cause_of_which_no_place_is_sure_has_those_to_which_it_adds():
+    observed = traces(noise=0.3)
+    inertia = on(1, lambda m, t: 0.1 * m.ddq[:, 1])
+    added = [replace(trace, residual=inertia(trace.motion, trace.torque)) for trace in observed]
+    seen, acts = joint_maps((observed, added), labels(observed, added))
+    acting = np.array([False, True, False])
+    level = level_of(FLOOR, seen, None)
+    places = locate("torque", JOINTS, [None] * 3, seen, level, acting=acting, acts=acts)
+    assert {place.joint for place in places} == {"joint_2"}
+    assert places[0].regime in {"accelerating", "braking", "reversal"}
+    assert all(place.q > 0.05 for place in places)
+
+
 def test_what_the_reference_runs_show_too_is_no_place():
     both = on(0, lambda m, t: 1.5 * np.sin(7 * m.q[:, 0]))
     assert located(traces(both), traces(both, first=20, role="reference")) == []

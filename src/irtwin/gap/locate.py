@@ -87,6 +87,7 @@ def locate(
     reference: Map | None = None,
     explained: Map | None = None,
     acting: np.ndarray | None = None,
+    acts: Map | None = None,
     seed: int = 0,
 ) -> list[Location]:
     """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first; `runs` are empty.
@@ -95,7 +96,8 @@ def locate(
     rate over places is held at 5 % (Benjamini and Hochberg); p-values are Student's over units, of the logarithm of
     the mean square over the level, against that of the `reference` where there is one; where causes are `acting` (g,),
     also of that over what they leave, `explained`. Joints come in the order of their excess; a joint's regimes in
-    that of their share of it, its concentration there, and whether they suit the variable.
+    that of their share of it, its concentration there, and whether they suit the variable. A joint on which causes are
+    acting, but none of whose places is sure, has those to which they add (`acts`) more than on average.
     """
     share, excess = _shares(seen, level, np.ones((1, len(seen.squares))))
     rng = np.random.default_rng(seed)
@@ -104,11 +106,12 @@ def locate(
     of_joint = share[0][:, : seen.regimes.parts].sum(axis=1)
     concentration = _concentration(seen, share[0], of_joint)
     q = _false_discovery(_p_values(seen, level, reference, explained, acting))
-    found = [
-        Location(
+
+    def location(place: int, r: int, rank: float) -> Location:
+        return Location(
             channel,
-            joint,
-            regime,
+            joints[place],
+            seen.regimes.names[r],
             follows[place],
             (),
             share=float(min(share[0, place, r], 1.0)),
@@ -117,17 +120,36 @@ def locate(
             excess_interval=_interval(drawn_excess[:, place, r]),
             concentration=float(concentration[place, r]),
             q=float(q[place, r]),
-            rank=float(share[0, place, r] * np.sqrt(concentration[place, r]))
-            * (1.0 if regime in _SUITS.get(follows[place] or "", seen.regimes.names) else _UNSUITED),
+            rank=rank,
         )
-        for place, joint in enumerate(joints)
+
+    found = [
+        location(
+            place, r, float(share[0, place, r] * np.sqrt(concentration[place, r])) * _suits(follows[place], regime)
+        )
+        for place in range(len(joints))
         for r, regime in enumerate(seen.regimes.names)
-        if share[0, place, r] >= _LEAST_SHARE
-        and q[place, r] <= _DISCOVERIES
-        and (regime != LOADED or follows[place] in _LOADS)
+        if share[0, place, r] >= _LEAST_SHARE and q[place, r] <= _DISCOVERIES
     ]
+    if acting is not None and acts is not None:
+        sure = {one.joint for one in found}
+        unsure = [place for place in range(len(joints)) if acting[place] and joints[place] not in sure]
+        found += [location(place, r, rank) for place in unsure for r, rank in _where_added(acts, place)]
+    found = [one for one in found if one.regime != LOADED or one.follows in _LOADS]
     order = {joint: -of_joint[place] for place, joint in enumerate(joints)}
     return sorted(found, key=lambda location: (order[location.joint], -location.rank))[:_PLACES]
+
+
+def _suits(follows: str | None, regime: str) -> float:
+    return 1.0 if regime in _SUITS.get(follows or "", (regime,)) else _UNSUITED
+
+
+def _where_added(acts: Map, place: int) -> list[tuple[int, float]]:
+    """Return the regimes to which causes add more than on average, with their rank."""
+    squares = acts.squares.sum(axis=0)
+    share = squares / max(float(squares[place, : acts.regimes.parts].sum()), np.finfo(float).tiny)
+    concentration = _concentration(acts, share, np.ones(len(share)))[place]
+    return [(int(r), float(share[place, r] * np.sqrt(concentration[r]))) for r in np.flatnonzero(concentration > 1)]
 
 
 def _concentration(seen: Map, share: np.ndarray, of_joint: np.ndarray) -> np.ndarray:

@@ -23,9 +23,10 @@ from irtwin.gap.residuals import Trace, Values, as_filtered, fitted_values, powe
 class Left:
     """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
-    `before`, `after`: traces and maps of them without and with the causes, `after` None where there is none; `added`:
-    what each cause adds to each trace, (N, g). `reference`: the map of the other runs, where the twin is the one that
-    fits these. `level` (g, R): the mean square beyond which a gap lies.
+    `before`, `after`: traces without and with the causes, `after` None where there is none, and `seen`, `explained` the
+    maps of them; `added`: what each cause adds to each trace, (N, g), and `acts` the map of all of it. `reference`: the
+    map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean square beyond which a gap
+    lies.
     """
 
     finding: Finding
@@ -34,6 +35,7 @@ class Left:
     added: list[list[np.ndarray]]
     seen: Map
     explained: Map | None
+    acts: Map | None
     reference: Map | None
     level: np.ndarray
 
@@ -49,14 +51,15 @@ def left_over(case: Case, explained: Explained, torque: Torque) -> Left:
 
     before = traces(case.seen, fitted_values(finding, reference=reference))
     others = traces(case.others, fitted_values(finding, reference=True)) if reference else []
-    after, added = None, [_added(explained, k, before) for k in range(len(finding.causes))]
+    after, acting, added = None, [], [_added(explained, k, before) for k in range(len(finding.causes))]
     if added:
+        acting = [_of(trace, sum(parts)) for trace, *parts in zip(before, *added, strict=True)]
         plain = traces(case.seen, lambda run: explained.values)
         after = [replace(t, residual=t.residual - sum(parts)) for t, *parts in zip(plain, *added, strict=True)]
-    maps = (robot_maps if power else joint_maps)((before, after or [], others), case.grouping.label)
-    seen, closed, known = maps
+    maps = (robot_maps if power else joint_maps)((before, after or [], acting, others), case.grouping.label)
+    seen, closed, acts, known = maps
     assert seen is not None
-    return Left(finding, before, after, added, seen, closed, known, level_of(finding.floor, seen, known))
+    return Left(finding, before, after, added, seen, closed, acts, known, level_of(finding.floor, seen, known))
 
 
 def against_reference(finding: Finding) -> bool:
@@ -81,10 +84,7 @@ def cause_curves(left: Sequence[Left]) -> list[dict[str, Any]]:
     for one in left:
         for cause, added in zip(one.finding.causes, one.added, strict=True):
             assert one.after is not None
-            alone = [
-                replace(trace, residual=np.where(np.isfinite(trace.residual), part, np.nan))
-                for trace, part in zip(one.after, added, strict=True)
-            ]
+            alone = [_of(trace, part) for trace, part in zip(one.after, added, strict=True)]
             partial = [
                 replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
             ]
@@ -112,6 +112,10 @@ def _line(left: Left, joint: str | None) -> dict[str, Any]:
     return {"channel": left.finding.name, "joint": joint}
 
 
+def _of(trace: Trace, added: np.ndarray) -> Trace:
+    return replace(trace, residual=np.where(np.isfinite(trace.residual), added, np.nan))
+
+
 def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.ndarray]:
     """Return what a cause adds to each trace, (N, g), as a measurement would show it."""
     cause, found = explained.finding.causes[k], []
@@ -136,6 +140,7 @@ def _places(left: Left, seed: int) -> list[Location]:
         reference=left.reference,
         explained=left.explained,
         acting=acting,
+        acts=left.acts,
         seed=seed,
     )
     return [replace(place, runs=_standing_out(left, place)) for place in located]
