@@ -55,12 +55,15 @@ def test_what_is_there_is_found_and_nothing_else():
     assert found(np.eye(4), np.zeros(4)) == []
 
 
-def test_what_two_runs_alone_show_is_found_where_it_leads_by_far():
-    def causes(coefficient, speaking):
-        system = system_of(np.eye(4), [coefficient, 0.0, 0.0, 0.0], silent=range(RUNS - speaking))
-        return [cause.effect for cause in attribute(*system, seed=0).causes]
+def test_what_two_runs_alone_show_is_found_where_it_leads_by_far_and_is_rare():
+    def causes(coefficient, speaking, effect="joint_elasticity"):
+        system, candidates = system_of(np.eye(4), [coefficient, 0.0, 0.0, 0.0], silent=range(RUNS - speaking))
+        first = replace(candidates[0].variants[0], effect=catalogue()[effect])
+        candidates[0] = replace(candidates[0], variants=(first,))
+        return [cause.effect for cause in attribute(system, candidates, seed=0).causes]
 
     assert causes(1.0, speaking=2) == ["effect_0"]
+    assert causes(1.0, speaking=2, effect="stribeck_friction") == []  # a joint that sticks shows as much
     assert causes(0.05, speaking=2) == []
     assert causes(1.0, speaking=1) == []  # no other run tells its coefficient
 

@@ -102,6 +102,7 @@ class Backlash(JointEffect):
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
+    rare: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"b": (3e-4, 3e-3)}
 
     b: float = 1e-3  # rad
@@ -145,6 +146,7 @@ class JointElasticity(JointEffect):
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
+    rare: ClassVar[bool] = True
 
     frequency: float = 0.0
 

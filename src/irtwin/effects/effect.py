@@ -92,7 +92,7 @@ class Effect(ABC):
     add to. Columns of an effect that `needs` "torque" or "power" are built from what other effects predict, never
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
-    so many seconds on either side.
+    so many seconds on either side. What is `rare` shows in some motions alone, and in these strongly.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -107,6 +107,7 @@ class Effect(ABC):
     stage: ClassVar[int] = 0
     memory: ClassVar[bool] = False
     reach: ClassVar[float | None] = None
+    rare: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)

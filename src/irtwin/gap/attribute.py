@@ -181,15 +181,15 @@ def _judged(
 
 
 def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
-    """Return (H,) whether a hypothesis speaks in a `few` groups alone, gains most, and that by far.
+    """Return (H,) whether an effect that is rare speaks in a `few` groups alone, gains most, and that by far.
 
-    A swing or a full bus may be excited in one run or two. What the effects that speak everywhere gain at most is what
-    chance and forms that differ make.
+    A swing or a full bus may be excited in one run or two; friction that shows in one alone is a joint that sticks.
+    What the effects that speak everywhere gain at most is what chance and forms that differ make.
     """
     best = int(np.argmax(gain))
     far = gain[best] >= max(_ALONE, _AHEAD * gain[~few].max(initial=0.0))
     found = np.zeros(len(gain), dtype=bool)
-    found[best] = far and few[best] and not any(brief(v.effect) for v in left[best].variants)
+    found[best] = far and few[best] and all(v.effect.rare for v in left[best].variants)
     return found
 
 
