@@ -147,9 +147,12 @@ def _suits(follows: str | None, regime: str) -> float:
 def _where_added(acts: Map, place: int) -> list[tuple[int, float]]:
     """Return the regimes to which causes add more than on average, with their rank."""
     squares = acts.squares.sum(axis=0)
-    share = squares / max(float(squares[place, : acts.regimes.parts].sum()), np.finfo(float).tiny)
-    concentration = _concentration(acts, share, np.ones(len(share)))[place]
-    return [(int(r), float(share[place, r] * np.sqrt(concentration[r]))) for r in np.flatnonzero(concentration > 1)]
+    of_place = squares[:, : acts.regimes.parts].sum(axis=1)
+    if not of_place[place]:
+        return []
+    concentration = _concentration(acts, squares, of_place)[place]
+    share = squares[place] / of_place[place]
+    return [(int(r), float(share[r] * np.sqrt(concentration[r]))) for r in np.flatnonzero(concentration > 1)]
 
 
 def _concentration(seen: Map, share: np.ndarray, of_joint: np.ndarray) -> np.ndarray:
