@@ -106,7 +106,7 @@ class _Search:
         short = [k for k, one in enumerate(left) if episode and any(brief(v.effect) for v in one.variants)]
         t[short] = episode.t if episode else 0.0
         alone = _far_ahead(gain, speaks <= _FEW, left)
-        plausible = (gain >= self.matters(noise)) & (t >= _LEAST_T) | alone
+        plausible = (gain >= self.matters(noise)) & ((t >= _LEAST_T) | alone)
         if not plausible.any():
             return []
         block_scores, products = scores(self.system, moments, noise, chosen)
