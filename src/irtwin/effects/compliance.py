@@ -57,7 +57,7 @@ def transmitted(
     speed: (N, n) rad/s, of the link's swing while the motor holds; `start`: where the first sample lies in its run, so
     that parts of a run are computed alike. With x the motor's lead over the link,
     x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the two-mass
-    model (Spong 1987, eqs. 6 and 7), link by link.
+    model (Spong 1987), link by link.
     """
     ahead, length = round(_WARM_UP * rate), max(1, round(_WINDOW * rate))
     starts = np.arange(-(start % length), len(load), length)
@@ -88,8 +88,19 @@ def _beyond(play: float, x: np.ndarray, square: np.ndarray, friction: np.ndarray
     return np.asarray(square * give + friction * (give != 0))
 
 
+class _Compliance(JointEffect):
+    """What both have in common: a swing that the predicted load drives, and that is over after two seconds."""
+
+    channel: ClassVar[str] = "torque"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 1
+    memory: ClassVar[bool] = True
+    reach: ClassVar[float | None] = 2.0
+    rare: ClassVar[bool] = True
+
+
 @dataclass(frozen=True)
-class Backlash(JointEffect):
+class Backlash(_Compliance):
     """The load's torque is lost while the link is free within a gap of b, after that torque changed its sign.
 
     How long depends on how fast the torque grows and on the link's inertia, not on the motor's way: both move on
@@ -97,12 +108,6 @@ class Backlash(JointEffect):
     """
 
     id: ClassVar[str] = "backlash"
-    channel: ClassVar[str] = "torque"
-    needs: ClassVar[str | None] = "torque"
-    stage: ClassVar[int] = 1
-    memory: ClassVar[bool] = True
-    reach: ClassVar[float | None] = 2.0
-    rare: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"b": (3e-4, 3e-3)}
 
     b: float = 1e-3  # rad
@@ -132,7 +137,7 @@ class Backlash(JointEffect):
 
 
 @dataclass(frozen=True)
-class JointElasticity(JointEffect):
+class JointElasticity(_Compliance):
     """A link that swings behind its motor; or a motor that turns beyond its link, Ia d2/dt2 (tau_load/K).
 
     Which of the two depends on where the position is measured: on the motor, or (`frequency` 0) on the link. The
@@ -141,12 +146,6 @@ class JointElasticity(JointEffect):
     """
 
     id: ClassVar[str] = "joint_elasticity"
-    channel: ClassVar[str] = "torque"
-    needs: ClassVar[str | None] = "torque"
-    stage: ClassVar[int] = 1
-    memory: ClassVar[bool] = True
-    reach: ClassVar[float | None] = 2.0
-    rare: ClassVar[bool] = True
 
     frequency: float = 0.0
 
