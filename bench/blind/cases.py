@@ -36,7 +36,8 @@ SEEDS = {
     "development": 1_000_000,
     "development_2": 7_000_000,  # a test once, as the next
     "development_3": 13_000_000,
-    "test": 19_000_000,
+    "development_4": 19_000_000,
+    "test": 25_000_000,
 }
 LEVELS = (0.1, 0.3, 1.0, 3.0)
 SECONDS = 8.0

@@ -55,6 +55,16 @@ def test_more_play_loses_more():
     assert lost == sorted(lost)
 
 
+def test_what_the_rotor_has_of_the_inertia_does_not_pass_the_gap():
+    robot = arm(2)
+    motion = swing(robot, 5, seconds=4)
+    said = Predicted(np.zeros_like(motion.dq), load=20 * np.sin(motion.q * 9), inertia=np.full_like(motion.dq, 2.0))
+    link = Predicted(said.torque, load=said.load - 0.5 * motion.ddq, inertia=0.75 * said.inertia)
+    (passed,) = Backlash(b=6e-4, rotor_share=0.25).samples(robot, motion, said)
+    (expected,) = Backlash(b=6e-4).samples(robot, motion, link)
+    np.testing.assert_allclose(passed, expected)
+
+
 @pytest.mark.parametrize("effect", [Backlash(), JointElasticity(frequency=8.0)], ids=["backlash", "elasticity"])
 def test_a_part_with_its_reach_gives_what_the_whole_gives(effect):
     robot = arm(3)

@@ -68,6 +68,19 @@ def test_what_two_runs_alone_show_is_found_where_it_leads_by_far_and_is_rare():
     assert causes(1.0, speaking=1) == []  # no other run tells its coefficient
 
 
+def test_what_friction_of_another_form_imitates_has_to_explain_a_part_of_the_floor():
+    def causes(effect, floor):
+        system, candidates = system_of(np.eye(2), [0.05, 0.0])
+        first = replace(candidates[0].variants[0], effect=catalogue()[effect])
+        candidates[0] = replace(candidates[0], variants=(first,))
+        return [cause.effect for cause in attribute(system, candidates, seed=0, floor=floor).causes]
+
+    assert causes("time_delay", floor=np.array([1.0])) == []
+    assert causes("time_delay", floor=np.array([0.5])) == ["effect_0"]
+    assert causes("time_delay", floor=None) == ["effect_0"]
+    assert causes("cable_drag", floor=np.array([1.0])) == ["effect_0"]
+
+
 def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
     system, candidates = system_of(np.eye(3), [0.3, 0.025, 0.0])
     assert [cause.effect for cause in attribute(system, candidates, seed=0).causes] == ["effect_0"]

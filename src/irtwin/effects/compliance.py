@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -104,17 +104,20 @@ class Backlash(_Compliance):
     """The load's torque is lost while the link is free within a gap of b, after that torque changed its sign.
 
     How long depends on how fast the torque grows and on the link's inertia, not on the motor's way: both move on
-    together. The coefficient is the share of what a gap of b makes.
+    together. The coefficient is the share of what a gap of b makes. `rotor_share` is how much of the inertia that the
+    link is said to have lies before the gap: torque hardly tells rotor from link, and small gaps close at another time.
     """
 
     id: ClassVar[str] = "backlash"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"b": (3e-4, 3e-3)}
 
     b: float = 1e-3  # rad
+    rotor_share: float = 0.0
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return gaps over the range."""
-        return self.variants(b=(3e-4, 5.3e-4, 1e-3, 1.7e-3, 3e-3))
+        """Return gaps over the range and of worn gears beyond it."""
+        small = replace(self, rotor_share=0.25).variants(b=(3e-4, 6e-4))
+        return (*self.variants(b=(3e-4, 6e-4, 1.2e-3, 2.4e-3, 5e-3, 1e-2, 2e-2)), *small)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the share."""
@@ -123,6 +126,7 @@ class Backlash(_Compliance):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return what passes the gap beyond what passes a stiff gear."""
         load, inertia = load_torque(robot, motion, predicted), load_inertia(robot, motion, predicted)
+        load, inertia = load - self.rotor_share * inertia * motion.ddq, (1 - self.rotor_share) * inertia
         speed = np.full_like(load, 2 * np.pi * _CONTACT)
         return (transmitted(load, inertia, motion.rate, speed, _CONTACT_DAMPING, self.b, motion.start) - load,)
 
@@ -146,6 +150,7 @@ class JointElasticity(_Compliance):
     """
 
     id: ClassVar[str] = "joint_elasticity"
+    imitated: ClassVar[bool] = True
 
     frequency: float = 0.0
 

@@ -93,6 +93,7 @@ class Effect(ABC):
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
     so many seconds on either side. What is `rare` shows in some motions alone, and in these strongly.
+    What is `imitated` looks like what friction leaves, where joints turn back, if its form is not the twin's.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -108,6 +109,7 @@ class Effect(ABC):
     memory: ClassVar[bool] = False
     reach: ClassVar[float | None] = None
     rare: ClassVar[bool] = False
+    imitated: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)

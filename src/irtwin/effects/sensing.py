@@ -106,6 +106,7 @@ class TimeDelay(JointEffect):
 
     id: ClassVar[str] = "time_delay"
     channel: ClassVar[str] = "measurement"
+    imitated: ClassVar[bool] = True
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 3
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (5e-4, 0.6)}

@@ -131,11 +131,19 @@ class Stack:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients."""
         if self.coupled:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
+        return self._sum(motion, values, [place for place in self._torque_places if place[0].channel == "torque"])
+
+    def shown_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
+        """Return what a log shows by the (K,) torque coefficients, (N, n) N m; what others are built on as expected."""
+        if self.coupled:
+            return np.asarray(self.torque_columns(motion) @ (values + self.shift(motion)))
+        return self._sum(motion, values, self._torque_places)
+
+    def _sum(self, motion: Motion, values: np.ndarray, places: Sequence[tuple[Effect, slice]]) -> np.ndarray:
         total = values + self.shift(motion)
         torque = np.zeros(motion.dq.shape)
-        for effect, own in self._torque_places:
-            if effect.channel == "torque":
-                torque += self._contribution(effect, motion, total[own], None)
+        for effect, own in places:
+            torque += self._contribution(effect, motion, total[own], None)
         return torque
 
     def predicted_power_columns(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.effect import BASELINE, Effect
 from irtwin.gap.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.episodes import brief, in_scope
 from irtwin.gap.hypotheses import MISSING, Hypothesis
@@ -17,7 +17,10 @@ from irtwin.gap.system import System, Trial, attempt, scores
 
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
-_OF_FLOOR = 0.25  # of a floor's square, besides; of the residual's where that is below it
+_OF_FLOOR, _IMITATED = (
+    0.25,
+    0.4,
+)  # of a floor's square, besides: of power, and of what friction of another form imitates
 _ALPHA = 0.02  # of the whole catalogue
 _MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
 _LEAST_T = 2.3  # mean gain over its standard error between groups
@@ -46,7 +49,7 @@ def attribute(
     """Find the effects that the data show beyond the twin's.
 
     Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out; an
-    episode by what its joints say of each other. With a `floor` (g,), RMS, a cause has to explain a part of that too.
+    episode by what its joints say of each other. With a `floor` (g,), RMS, some causes have to explain a part of it.
     """
     candidates = in_scope(candidates, both=system.both)
     noise = np.maximum(system.residual_rms((), np.ones(len(system.pattern))), 1e-9)
@@ -57,7 +60,7 @@ def attribute(
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
     moments = system.moments(noise)
-    found = _backward(system, moments, found, search.matters(noise) / 2)
+    found = _backward(system, moments, found, search.matters(noise, [one.hypothesis for one in found]) / 2)
     named = causes(system, moments, candidates, found)
     noise = np.maximum(system.residual_rms([k for cause in named for k in cause.columns], noise), 1e-9)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
@@ -72,11 +75,17 @@ class _Search:
     seed: int
     floor: np.ndarray | None
 
-    def matters(self, noise: np.ndarray) -> float:
-        """Return what a cause has to gain where equations are weighed by `noise` (g,)."""
+    def matters(self, noise: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
+        """Return what each has to gain, (H,), where equations are weighed by `noise` (g,)."""
+        least = np.full(len(left), _MATTERS)
         if self.floor is None:
-            return _MATTERS
-        return max(_MATTERS, _OF_FLOOR * float(np.minimum(self.floor / noise, 1.0).max() ** 2))
+            return least
+        floor = np.minimum(self.floor / noise, 1.0) ** 2  # of the residual's square where that is below it
+        for k, one in enumerate(left):
+            share = _share_of_floor(one.variants[0].effect)
+            if share:
+                least[k] = max(_MATTERS, share * float(floor[self.system.equations(one.variants[0].columns)].max()))
+        return least
 
     def noise(self, found: Sequence[Find], before: np.ndarray) -> np.ndarray:
         """Return what finds leave of each equation, (g,) RMS; `before` weighs the equations."""
@@ -106,7 +115,7 @@ class _Search:
         short = [k for k, one in enumerate(left) if episode and any(brief(v.effect) for v in one.variants)]
         t[short] = episode.t if episode else 0.0
         alone = _far_ahead(gain, speaks <= _FEW, left)
-        plausible = (gain >= self.matters(noise)) & ((t >= _LEAST_T) | alone)
+        plausible = (gain >= self.matters(noise, left)) & ((t >= _LEAST_T) | alone)
         if not plausible.any():
             return []
         block_scores, products = scores(self.system, moments, noise, chosen)
@@ -128,7 +137,7 @@ class _Search:
         trial = attempt(self.system, moments, chosen, [h.variants for h in left])
         gain, t, _ = _judged(self.system, trial, left)
         p = p_values(*scores(self.system, moments, noise, chosen), left, self.seed)
-        sure = (gain >= _LESS * self.matters(noise)) & (t >= _LESS_T) & (p <= _ALPHA)
+        sure = (gain >= _LESS * self.matters(noise, left)) & (t >= _LESS_T) & (p <= _ALPHA)
         return [_find(trial, left, int(k), gain, t, p) for k in np.flatnonzero(sure)]
 
     def _left(self, found: Sequence[Find]) -> list[Hypothesis]:
@@ -154,6 +163,13 @@ def _swapped(search: _Search, found: list[Find], noise: np.ndarray) -> list[Find
         if search.loss(other, moments) < search.loss(found, moments):
             found = other
     return found
+
+
+def _share_of_floor(effect: Effect) -> float:
+    """Return which part of a floor's square a cause explains at least: what forms that differ leave is no cause."""
+    if effect.signal == "power":
+        return _OF_FLOOR
+    return _IMITATED if effect.imitated else 0.0
 
 
 def _key(one: Find) -> tuple[str, str]:
@@ -269,14 +285,15 @@ def _find(trial: Trial, left: Sequence[Hypothesis], place: int, gain: np.ndarray
     return Find(left[place], variant, float(gain[place]), float(t[place]), float(p[place]))
 
 
-def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find], least: float) -> list[Find]:
-    """Drop what gains less than `least` beside the others: the later ones made it idle."""
+def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find], least: np.ndarray) -> list[Find]:
+    """Drop what gains less than `least` (F,) beside the others: the later ones made it idle."""
     while len(found) > 1:
-        gains = [_alone(system, moments, found, k) for k in range(len(found))]
-        worst = int(np.argmin(gains))
-        if gains[worst] >= least:
+        short = np.array([_alone(system, moments, found, k) for k in range(len(found))]) / least
+        worst = int(np.argmin(short))
+        if short[worst] >= 1:
             break
         found = [one for k, one in enumerate(found) if k != worst]
+        least = np.delete(least, worst)
     return found
 
 

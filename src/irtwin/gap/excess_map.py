@@ -113,9 +113,10 @@ def _sums(
     for k, (trace, unit) in enumerate(zip(traces, units, strict=True)):
         for place, mask in enumerate(masks):
             kept = np.isfinite(trace.residual[:, place])
-            inside = mask[k][kept].astype(float)
-            np.add.at(squares[:, place], unit[kept], inside * trace.residual[kept, place, None] ** 2)
-            np.add.at(counts[:, place], unit[kept], inside)
+            square = trace.residual[kept, place] ** 2
+            for regime, inside in enumerate(mask[k][kept].T):
+                squares[:, place, regime] += np.bincount(unit[kept][inside], square[inside], count)
+                counts[:, place, regime] += np.bincount(unit[kept][inside], minlength=count)
     return Map(regimes, squares, counts)
 
 

@@ -119,8 +119,7 @@ def find(
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
     candidates = [one for one in candidates if one.effect not in without]
-    # losses of other forms than the twin's make a part of the floor in healthy robots, beyond chance
-    found = attribute(system, candidates, seed, floor if power else None)
+    found = attribute(system, candidates, seed, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     parts = shares(system, found, seed)

@@ -56,8 +56,7 @@ def power_traces(stack: Stack, motions: Sequence[Motion], values: Values, torque
 def torque_residual(stack: Stack, motion: Motion, values: np.ndarray) -> np.ndarray:
     """Return measured torque less the twin's with these coefficients (K,): (N, n) N m, NaN where undecided."""
     assert motion.torque is not None
-    shift = stack.shift(motion)
-    parts = [stack.torque_columns(piece) @ (values + shift) for piece in motion.pieces(_PIECE)]
+    parts = [stack.shown_torque(piece, values) for piece in motion.pieces(_PIECE)]
     left = motion.torque - as_filtered(motion, np.concatenate(parts))
     undecided = as_filtered(motion, stack.undecided(motion).astype(float)) > _UNDECIDED
     return without_ends(motion, np.where(undecided, np.nan, left))

@@ -54,6 +54,11 @@ class System:
         """The index of the first candidate column that is zero outside observed runs."""
         return self.base + len(self.columns)
 
+    def equations(self, columns: Sequence[int]) -> np.ndarray:
+        """Return (g,) whether an equation has any of some candidate columns."""
+        own = [k - len(self.columns) if k >= self.changed else k for k in columns]
+        return np.asarray(self.pattern[:, own].any(axis=1))
+
     @property
     def groups(self) -> int:
         """How many groups there are."""

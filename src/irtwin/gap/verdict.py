@@ -11,11 +11,11 @@ from irtwin.gap.floor import REPEATS, Floor
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
 _EXCESS = 3.5  # over the floor, mean square: a gap, though nothing explains it; below lies what differs between runs
-_CLOSED = 0.7  # of the largest excess: causes that close less of it do not explain the gap
+_CLOSED = 0.7  # of the largest excess: causes that leave more than the rest of it, anywhere, do not explain the gap
 
 
 def verdict_of(findings: Sequence[Finding], floor: Floor) -> str:
-    """Return the verdict on all channels: `unexplained` where most of the largest excess is left, named or not."""
+    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not."""
     causes = [cause for finding in findings for cause in finding.causes]
     if floor.source == REPEATS:
         before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
@@ -27,9 +27,9 @@ def verdict_of(findings: Sequence[Finding], floor: Floor) -> str:
 
 
 def _largest(finding: Finding) -> tuple[float, float]:
-    """Return the largest excess of a channel's equations without causes, and what they leave of it.
+    """Return the largest excess of a channel's equations without causes, and the largest that these leave.
 
-    Over the floor, and over what the reference runs show, if there are any.
+    Over the floor, and over what the reference runs show, if there are any. The two may lie at different joints.
     """
     if finding.floor is None:
         return 0.0, 0.0
@@ -37,5 +37,4 @@ def _largest(finding: Finding) -> tuple[float, float]:
     if finding.system.both:
         level = np.maximum(level, reference_rms(finding.system, noise_before(finding.system)))
     before, after = ((rms / level) ** 2 - 1 for rms in finding.fitted)
-    worst = int(np.argmax(before))
-    return float(before[worst]), float(after[worst])
+    return float(before.max()), float(after.max())
