@@ -81,7 +81,7 @@ class Diagnosis:
             ],
             "not_testable": [{"effect": one.effect, "why": one.why} for one in self.untestable],
             "shrink": {
-                **document.shrink(self.runs, self.channels, self.floor, self.energies, self.seed),
+                **document.shrink(robot, self.runs, self.channels, self.floor, self.energies, self.seed),
                 "yardstick": self.yardstick,
             },
             "next_experiment": self.experiment,

@@ -113,7 +113,12 @@ def parameters(robot: Robot, finding: Finding, one: Cause) -> list[Json]:
 
 
 def shrink(
-    runs: Sequence[str], findings: Sequence[Finding], floor: Floor, energies: EnergyErrors | None, seed: int
+    robot: Robot,
+    runs: Sequence[str],
+    findings: Sequence[Finding],
+    floor: Floor,
+    energies: EnergyErrors | None,
+    seed: int,
 ) -> Json:
     """Return how far the gap shrinks on runs that took no part in the fit."""
     document: Json = {
@@ -137,7 +142,7 @@ def shrink(
         }
         if finding.floor is not None and finding.causes:
             parts.append((judged, finding.floor))
-        document["by_cause"] += [_by_cause(finding, one) for one in finding.causes]
+        document["by_cause"] += [_by_cause(robot, finding, one) for one in finding.causes]
     if energies:
         document["energy_error_percent"] = energies.to_json(seed)
     closed = closed_fraction(parts, seed) if parts else None
@@ -146,7 +151,7 @@ def shrink(
     return document
 
 
-def _by_cause(finding: Finding, one: Cause) -> Json:
+def _by_cause(robot: Robot, finding: Finding, one: Cause) -> Json:
     """Return what a cause closes alone, and what is lost without it."""
     system, noise = finding.system, noise_before(finding.system)
     alone = held_out(system, noise, noise, one.columns)
@@ -154,7 +159,7 @@ def _by_cause(finding: Finding, one: Cause) -> Json:
     without = held_out(system, noise, finding.attribution.noise, others)
     return {
         "effect": one.effect,
-        "joints": list(one.joints),
+        "joints": acted_on(robot, one),
         "scope": one.scope,
         "channel": finding.name,
         "share": finding.share(one),
