@@ -23,7 +23,7 @@ from irtwin.effects.friction import direction
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
-_GEARS = (50.0, 80.0, 100.0, 101.0, 120.0, 121.0, 160.0)  # common ratios of strain-wave and cycloidal gears
+SLOW_ORDERS = tuple(map(float, range(1, 25)))  # a turn of the joint
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,9 @@ class TorqueRipple(JointEffect):
     N: float = 1.0  # per turn of the joint
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return low orders, and once and twice per turn of a motor: of the robot's gears, or of common ones."""
+        """Return slow orders, and once and twice per turn of a motor where the robot's gears are known."""
         gears = {joint.gear_ratio for joint in robot.joints if joint.gear_ratio} if robot else set()
-        fast = [order * gear for gear in sorted(gears or _GEARS) for order in (1, 2)]
-        orders = sorted({*map(float, range(1, 25)), *fast})
+        orders = sorted({*SLOW_ORDERS, *(order * gear for gear in gears for order in (1, 2))})
         return self.variants(N=tuple(order for order in orders if order <= self.ranges["N"][1]))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -1,4 +1,4 @@
-"""What acts in some runs only, or for a while: found before any effect is tried, so that it is tried there."""
+"""What acts in some runs only, for a while, or at one order of many: found before any effect is tried."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
+from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.case import Case
 from irtwin.gap.episodes import Episode, Remainder, brief, contact
 from irtwin.gap.finding import noise_before, twin_values
 from irtwin.gap.hypotheses import Variant
 from irtwin.gap.payloads import Carried, carried
 from irtwin.gap.residuals import torque_residual
+from irtwin.gap.ripples import fast_ripples
 from irtwin.gap.system import System
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
@@ -23,15 +25,16 @@ from irtwin.signals.motion import Motion
 
 @dataclass(frozen=True)
 class Occasional:
-    """A contact, and a payload in some of the runs; None where none stands out."""
+    """A contact, and a payload in some of the runs (None where none stands out); joints' fast ripples."""
 
     contact: Episode | None = None
     payload: Carried | None = None
+    ripples: tuple[TorqueRipple, ...] = ()
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects to try with those found: a contact in its place only, a payload there too."""
+        """Return the effects to try with those found: a contact in its place only, the others there too."""
         found: list[Effect] = [effect for effect in effects if not (self.contact and effect.id == "external_contact")]
-        return found + [one.effect for one in (self.contact, self.payload) if one]
+        return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples]
 
 
 def occasional(case: Case, stack: Stack, system: System, seed: int) -> Occasional:
@@ -44,7 +47,8 @@ def occasional(case: Case, stack: Stack, system: System, seed: int) -> Occasiona
         residual = torque_residual(stack, motion, values)
         observed = motion.run in case.observed
         left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
-    return Occasional(contact(case.robot, left, noise), carried(case.robot, system, noise, seed))
+    ripples = fast_ripples(case.robot, left)
+    return Occasional(contact(case.robot, left, noise), carried(case.robot, system, noise, seed), tuple(ripples))
 
 
 def acting(variants: Sequence[Variant]) -> dict[str, Any]:
