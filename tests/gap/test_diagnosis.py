@@ -70,6 +70,15 @@ def test_no_gap_is_found_where_there_is_none(seed):
     assert diagnosis.floor.source == "repeats"
 
 
+def test_what_two_runs_differ_by_in_the_mean_is_not_blamed_on_an_effect():
+    apart = []
+    for seed, pose, offset in ((0, -0.8, 2.0), (1, 0.8, -2.0)):  # a tilted base would differ by pose too
+        swung = swing(ROBOT, seed, seconds=20.0)
+        shown = measure(ROBOT, replace(swung, q=swung.q + pose, run=f"run_{seed}"), noise=0.3, seed=seed)
+        apart.append(as_run(replace(shown, torque=shown.torque + offset, power=None, current=None)))
+    assert diagnose(data_set(apart)).causes == ()
+
+
 def test_a_missing_friction_is_named_with_its_joint():
     stribeck = on_joint(1, lambda m: 4 * np.sign(m.dq[:, 1]) * np.exp(-np.abs(m.dq[:, 1]) / 0.1))
     diagnosis = diagnose(data_set(runs(change=stribeck), effects=WITH_LOSS))

@@ -54,7 +54,7 @@ class Stack:
                     )
         seen = set()
         for effect, term in (*self.torque_terms, *self.power_terms):
-            key = (effect.id, term.joint, term.link, term.name)
+            key = (effect.id, term.joint, term.link, term.name, effect.runs)
             if key in seen:
                 raise InputError(f'effect "{effect.id}" stands there twice; name it once')
             seen.add(key)

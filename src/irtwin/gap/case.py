@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from irtwin.effects.effect import BASELINE, catalogue
+from irtwin.effects.effect import BASELINE, Effect, catalogue
+from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.admission import admit
@@ -66,6 +67,15 @@ class Case:
     def with_power(self) -> list[Motion]:
         """The motions whose power was measured."""
         return [motion for motion in self.motions.values() if motion.power is not None]
+
+    @property
+    def run_offsets(self) -> list[Effect]:
+        """What the torque of each run but the first is off by, where the runs are few.
+
+        Two runs differ in the mean of many things; no other run tells which of these is an effect.
+        """
+        runs = [motion.run for motion in self.with_torque]
+        return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
 
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""

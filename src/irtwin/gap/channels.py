@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,11 +28,15 @@ class Grouping:
     label: dict[str, str]
     observed: frozenset[str]
 
+    def few(self, runs: Iterable[str]) -> bool:
+        """Return whether the programmed motions of these runs are too few to leave each out in turn."""
+        return len({self.label[run] for run in runs if run in self.observed}) < _FEWEST_GROUPS
+
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
         """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""
         observed = np.array([block.run in self.observed for block in blocks])
         labels = [(block.run in self.observed, self.label[block.run]) for block in blocks]
-        if len({label for label in labels if label[0]}) < _FEWEST_GROUPS:
+        if self.few(block.run for block in blocks):
             labels = [(*label, k) for label, k in zip(labels, _stretches(blocks), strict=True)]  # type: ignore[misc]
         order = {label: k for k, label in enumerate(dict.fromkeys(labels))}
         return np.array([order[label] for label in labels]), observed

@@ -107,7 +107,7 @@ def diagnose(
     tell(f"Filtering {len(data_set.runs)} runs")
     case = case_of(data_set, withhold)
     floor = noise_floor(case.runs, case.motions)
-    stack = Stack(case.robot, case.effects)
+    stack = Stack(case.robot, [*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
     power_stack, predicted, below = _torque_source(case, stack, plain)
