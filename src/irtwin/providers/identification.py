@@ -25,7 +25,10 @@ from irtwin.twin.validate import validate
 
 
 def provide(workspace: Workspace, robot_id: str) -> Made:
-    """Make a robot's Twin with its effects, parameters, runs and torque fits."""
+    """Make a robot's Twin with its effects, parameters, runs and torque fits.
+
+    A simulator's runs stay apart where the robot's own are there: they say what the simulator does.
+    """
     robot = load_robot(workspace, robot_id)
     with workspace.reading() as session:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
@@ -33,8 +36,9 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
         taken_in = (schema.Run.robot_id == robot_id, schema.Run.role != LIVE)
         run_ids = session.scalars(in_order.where(*taken_in)).all()
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
-    cutoff = choose_cutoff(runs.values())
-    motions = [condition(run, robot, cutoff) for run in runs.values()]
+    own = [run for run in runs.values() if run.role != "simulated"] or list(runs.values())
+    cutoff = choose_cutoff(own)
+    motions = [condition(run, robot, cutoff) for run in own]
     parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
     twin = identify(robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
     keys = {run.name: run_id for run_id, run in runs.items()}

@@ -1,0 +1,32 @@
+"""The provider of twins: which runs a robot's twin is fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from irtwin.providers import identification
+from irtwin.providers.records import ingest
+from irtwin.signals.log import DataSet
+from irtwin.storage import schema
+from irtwin.storage.database import Workspace
+from synthetic import arm, as_run, measure, swing, with_constants
+
+
+def parts(folder: Path, roles: list[str]) -> dict[str, str]:
+    """The part that each run takes in the twin of a robot whose runs have these roles."""
+    robot = with_constants(arm(2))
+    runs = [as_run(measure(robot, swing(robot, seed, seconds=6.0), noise=0.05)) for seed in range(len(roles))]
+    told = tuple(replace(run, role=role) for run, role in zip(runs, roles, strict=True))
+    with Workspace(folder) as workspace:
+        ingest(workspace, DataSet(Path(), robot, told, None, None, "mains", True, {}))
+        made = identification.provide(workspace, "arm_2")
+    return {row.run_id[-1]: row.part for row in made.rows if isinstance(row, schema.TwinRun)}
+
+
+def test_a_simulators_runs_stay_apart_from_the_robots_twin(tmp_path: Path) -> None:
+    assert parts(tmp_path, ["observed", "observed", "simulated"]) == {"0": "both", "1": "both", "2": "apart"}
+
+
+def test_a_robot_known_by_its_simulator_alone_has_a_twin_of_that(tmp_path: Path) -> None:
+    assert set(parts(tmp_path, ["simulated", "simulated"]).values()) == {"both"}
