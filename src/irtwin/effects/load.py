@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +20,7 @@ from irtwin.effects.effect import (
     ratio,
     size,
 )
-from irtwin.effects.rigid_body import flange_frame, last_body_columns, model_of, to_body
+from irtwin.effects.rigid_body import flange_frame, inverse_dynamics, last_body_columns, model_of, to_body
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -136,11 +136,11 @@ class BaseTilt(Effect):
         """Return (N, n, 2): the torque of gravity's change, turned by a unit."""
         model = model_of(robot, None if predicted is None else predicted.bodies)
         down = model.gravity.linear.copy()
+        still = replace(motion, dq=np.zeros_like(motion.dq), ddq=np.zeros_like(motion.ddq))
         columns = np.empty((*motion.q.shape, 2))
         for axis in range(2):
             model.gravity.linear = np.cross(np.eye(3)[axis], down)
-            data = model.createData()
-            columns[:, :, axis] = [pin.computeGeneralizedGravity(model, data, q) for q in motion.q]
+            columns[:, :, axis] = inverse_dynamics(model, still)
         return columns
 
     def parameters(
