@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from irtwin.effects.compliance import Backlash, JointElasticity, load_inertia, load_torque, transmitted
 from irtwin.effects.effect import Predicted
+from irtwin.signals.motion import Motion
 from synthetic import arm, swing
 
 RATE = 250.0
@@ -65,7 +66,21 @@ def test_what_the_rotor_has_of_the_inertia_does_not_pass_the_gap():
     np.testing.assert_allclose(passed, expected)
 
 
-@pytest.mark.parametrize("effect", [Backlash(), JointElasticity(frequency=8.0)], ids=["backlash", "elasticity"])
+def test_by_way_all_of_the_load_is_lost_until_the_motor_has_crossed_the_gap():
+    time = np.arange(0, 1, 1 / 1000)[:, None]
+    motion = Motion("slow", time[:, 0], 0.1 * time, np.full_like(time, 0.1), np.zeros_like(time))
+    load = 4 * (time - 0.3)
+    (lost,) = Backlash(b=0.02, by_way=True).samples(arm(1), motion, Predicted(load, load=load))
+    free, bound = (time > 0.302) & (time < 0.498), (time < 0.298) | (time > 0.502)  # 0.02 rad at 0.1 rad/s
+    np.testing.assert_allclose(lost[free], -load[free])
+    assert not lost[bound].any()
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [Backlash(), Backlash(b=0.01, by_way=True), JointElasticity(frequency=8.0)],
+    ids=["backlash", "by_way", "elasticity"],
+)
 def test_a_part_with_its_reach_gives_what_the_whole_gives(effect):
     robot = arm(3)
     motion = swing(robot, 3, seconds=20, rate=200)

@@ -21,16 +21,16 @@ ROWS, RUNS = 300, 12
 EFFECT = catalogue()["cable_drag"]
 
 
-def system_of(mix, coefficients, size=10.0, silent=()):
+def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
     """Columns that are mixtures (rows of `mix`) of independent ones, and what `coefficients` of these add up to.
 
-    In `silent` runs the first of the independent ones is zero.
+    In `silent` runs the first `sparse` of the independent ones are zero.
     """
     generator = np.random.default_rng(1)
     blocks = []
     for run in range(RUNS):
         independent = np.linalg.qr(generator.standard_normal((ROWS, len(coefficients))))[0] * np.sqrt(ROWS)
-        independent[:, 0] *= run not in silent
+        independent[:, :sparse] *= run not in silent
         columns = size * independent @ np.array(mix).T
         measured = size * independent @ coefficients + generator.standard_normal(ROWS)
         factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
@@ -66,6 +66,16 @@ def test_what_two_runs_alone_show_is_found_where_it_leads_by_far_and_is_rare():
     assert causes(1.0, speaking=2, effect="stribeck_friction") == []  # a joint that sticks shows as much
     assert causes(0.05, speaking=2) == []
     assert causes(1.0, speaking=1) == []  # no other run tells its coefficient
+
+
+def test_what_sticks_at_one_joint_does_not_hide_what_is_rare_at_another():
+    system, candidates = system_of(np.eye(4), [0.6, 1.0, 0.0, 0.0], silent=range(RUNS - 2), sparse=2)
+    for k, effect in enumerate(("backlash", "stribeck_friction")):
+        variant = replace(candidates[k].variants[0], effect=catalogue()[effect])
+        candidates[k] = replace(candidates[k], effect=effect, joint=f"joint_{k}", variants=(variant,))
+    assert [cause.effect for cause in attribute(system, candidates[:2], seed=0).causes] == ["backlash"]
+    candidates[1] = replace(candidates[1], joint="joint_0")
+    assert [cause.effect for cause in attribute(system, candidates[:2], seed=0).causes] == []
 
 
 def test_what_friction_of_another_form_imitates_has_to_explain_a_part_of_the_floor():

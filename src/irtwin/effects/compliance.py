@@ -88,6 +88,17 @@ def _beyond(play: float, x: np.ndarray, square: np.ndarray, friction: np.ndarray
     return np.asarray(square * give + friction * (give != 0))
 
 
+def _free(load: np.ndarray, motion: Motion, gap: float) -> np.ndarray:
+    """Return (N, n) the share of each sample in which a motor has not crossed the gap since its load changed sign."""
+    rows = np.arange(len(load))[:, None]
+    crossed = np.diff(np.sign(load), axis=0, prepend=np.sign(load[:1])) != 0
+    last = np.maximum.accumulate(np.where(crossed, rows, -1), axis=0)
+    way = np.abs(motion.q - np.take_along_axis(motion.q, np.maximum(last, 0), axis=0))
+    step = np.maximum(np.abs(motion.dq) / motion.rate, 1e-9)
+    inside = np.clip((gap - way) / step + 0.5, 0.0, 1.0)
+    return np.where((last >= 0) & (rows - last <= _WINDOW * motion.rate), inside, 0.0)
+
+
 class _Compliance(JointEffect):
     """What both have in common: a swing that the predicted load drives, and that is over after two seconds."""
 
@@ -103,9 +114,10 @@ class _Compliance(JointEffect):
 class Backlash(_Compliance):
     """The load's torque is lost while the link is free within a gap of b, after that torque changed its sign.
 
-    How long depends on how fast the torque grows and on the link's inertia, not on the motor's way: both move on
-    together. The coefficient is the share of what a gap of b makes. `rotor_share` is how much of the inertia that the
-    link is said to have lies before the gap: torque hardly tells rotor from link, and small gaps close at another time.
+    How long depends on how fast the torque grows and on the link's inertia if both move on together, or, `by_way`, on
+    how soon the motor has crossed the gap where the link stays behind. The coefficient is the share of what a gap of b
+    makes. `rotor_share` is how much of the inertia that the link is said to have lies before the gap: torque hardly
+    tells rotor from link, and small gaps close at another time.
     """
 
     id: ClassVar[str] = "backlash"
@@ -113,11 +125,13 @@ class Backlash(_Compliance):
 
     b: float = 1e-3  # rad
     rotor_share: float = 0.0
+    by_way: bool = False
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return gaps over the range and of worn gears beyond it."""
         small = replace(self, rotor_share=0.25).variants(b=(3e-4, 6e-4))
-        return (*self.variants(b=(3e-4, 6e-4, 1.2e-3, 2.4e-3, 5e-3, 1e-2, 2e-2)), *small)
+        crossed = replace(self, by_way=True).variants(b=(3e-3, 1e-2, 3e-2))
+        return (*self.variants(b=(3e-4, 6e-4, 1.2e-3, 2.4e-3, 5e-3, 1e-2, 2e-2)), *small, *crossed)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the share."""
@@ -125,7 +139,10 @@ class Backlash(_Compliance):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return what passes the gap beyond what passes a stiff gear."""
-        load, inertia = load_torque(robot, motion, predicted), load_inertia(robot, motion, predicted)
+        load = load_torque(robot, motion, predicted)
+        if self.by_way:
+            return (-load * _free(load, motion, self.b),)
+        inertia = load_inertia(robot, motion, predicted)
         load, inertia = load - self.rotor_share * inertia * motion.ddq, (1 - self.rotor_share) * inertia
         speed = np.full_like(load, 2 * np.pi * _CONTACT)
         return (transmitted(load, inertia, motion.rate, speed, _CONTACT_DAMPING, self.b, motion.start) - load,)
@@ -133,9 +150,10 @@ class Backlash(_Compliance):
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
     ) -> tuple[Quantity, ...]:
-        """Return b: what is lost grows with its cube root's square, torque times time."""
+        """Return b: what is lost grows with its cube root's square, torque times time; by way, with its square."""
+        power = 0.5 if self.by_way else 1.5
         return tuple(
-            quantity("b", joint.name, value, joint.unit, deviation, lambda lost: self.b * max(lost, 0.0) ** 1.5)
+            quantity("b", joint.name, value, joint.unit, deviation, lambda lost: self.b * max(lost, 0.0) ** power)
             for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
         )
 

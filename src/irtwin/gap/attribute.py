@@ -135,7 +135,8 @@ class _Search:
         trial = attempt(self.system, moments, chosen, [h.variants for h in left])
         gain, t, _ = _judged(self.system, trial, left)
         p = p_values(*scores(self.system, moments, noise, chosen), left, self.seed)
-        sure = (gain >= _LESS * self.matters(noise, left)) & (t >= _LESS_T) & (p <= _ALPHA)
+        enough = np.where([_share_of_floor(one.variants[0].effect) > 0 for one in left], 1.0, _LESS)
+        sure = (gain >= enough * self.matters(noise, left)) & (t >= _LESS_T) & (p <= _ALPHA)
         return [_find(trial, left, int(k), gain, t, p) for k in np.flatnonzero(sure)]
 
     def _left(self, found: Sequence[Find]) -> list[Hypothesis]:
@@ -195,15 +196,18 @@ def _judged(
 
 
 def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
-    """Return (H,) whether an effect that is rare speaks in a `few` groups alone, gains most, and that by far.
+    """Return (H,) whether an effect that is rare speaks in a `few` groups alone, gains most at its joint, and by far.
 
     A swing or a full bus may be excited in one run or two; friction that shows in one alone is a joint that sticks.
     What the effects that speak everywhere gain at most is what chance and forms that differ make.
     """
-    best = int(np.argmax(gain))
-    far = gain[best] >= max(_ALONE, _AHEAD * gain[~few].max(initial=0.0))
     found = np.zeros(len(gain), dtype=bool)
-    found[best] = far and few[best] and all(v.effect.rare for v in left[best].variants)
+    rare = np.flatnonzero(few & [all(v.effect.rare for v in one.variants) for one in left])
+    if len(rare):
+        best = int(rare[np.argmax(gain[rare])])
+        beside = max(gain[k] for k, one in enumerate(left) if _overlap(one, left[best]))
+        common = [gain[k] for k in np.flatnonzero(~few) if not _same_place(left[k], left[best])]
+        found[best] = gain[best] >= max(_ALONE, _AHEAD * max(common, default=0.0), beside)
     return found
 
 
