@@ -168,7 +168,6 @@ class JointElasticity(_Compliance):
     """
 
     id: ClassVar[str] = "joint_elasticity"
-    imitated: ClassVar[bool] = True
 
     frequency: float = 0.0
 
