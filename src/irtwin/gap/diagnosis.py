@@ -69,16 +69,13 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """Return the diagnosis in the form of its schema."""
-        robot = self.description
+        robot, gains = self.description, [cause.gain for _, cause in self.causes]
         return {
             "verdict": self.verdict,
             "robot": robot.name,
             "gap": document.gap(robot.joint_names, self.channels, self.energies),
             "locations": [location.to_json() for location in self.locations],
-            "causes": [
-                document.cause(robot, finding, cause, self.causes[0][1].gain, self.verdict)
-                for finding, cause in self.causes
-            ],
+            "causes": [document.cause(robot, finding, cause, gains, self.verdict) for finding, cause in self.causes],
             "not_testable": [{"effect": one.effect, "why": one.why} for one in self.untestable],
             "shrink": {
                 **document.shrink(robot, self.runs, self.channels, self.floor, self.energies, self.seed),

@@ -39,14 +39,14 @@ def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErro
     return document
 
 
-def cause(robot: Robot, finding: Finding, one: Cause, largest: float, verdict: str) -> Json:
-    """Return a cause with its parameters and evidence; `largest` is the gain of the largest one."""
-    closed = finding.closed(one)
+def cause(robot: Robot, finding: Finding, one: Cause, gains: Sequence[float], verdict: str) -> Json:
+    """Return a cause with its parameters and evidence; `gains` are those of all causes."""
+    closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
     return {
         "effect": one.effect,
         "joints": acted_on(robot, one),
         "scope": one.scope,
-        "confidence": confidence(one.t, closed, min(one.gain / largest, 1.0), unexplained=verdict == UNEXPLAINED),
+        "confidence": confidence(one.t, one.gain, closed, share, len(gains), unexplained=unexplained),
         "parameters": parameters(robot, finding, one),
         "indistinguishable_from": list(one.rivals),
         "evidence": {
