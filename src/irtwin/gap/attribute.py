@@ -17,7 +17,7 @@ from irtwin.gap.system import System, Trial, attempt, scores
 
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
-_OF_FLOOR = 0.2  # of a floor's square, besides, in power: other forms of losses make 0.15 of it in healthy robots
+_OF_FLOOR = 0.25  # of a floor's square, besides, in power: other forms of losses make 0.23 of it in healthy robots
 _IMITATED = 0.5  # of a floor's square, besides, of what friction of another form imitates
 _ALPHA = 0.02  # of the whole catalogue
 _MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
