@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-# Logistic regression on the causes named in the development cases of bench/blind
-_CONSTANT = 2.343
-_PER_T = 0.088
+# Logistic regression on the causes named in 836 development cases of bench/blind: 607 causes, 80 % of them right
+_CONSTANT = 2.780
+_PER_T = 0.023
 _MOST_T = 10.0
-_PER_CLOSED = 1.288
-_PER_GAIN = 1.076  # natural logarithm, up to the mean square of what was left
+_PER_CLOSED = 1.513
+_PER_GAIN = 0.982  # natural logarithm, up to the mean square of what was left
 _LEAST_GAIN = 1e-3
-_PER_SHARE = 0.397  # natural logarithm of the gain over the largest cause's
-_PER_COUNT = -2.255  # natural logarithm: where many causes are named, forms that differ are among them
-_UNEXPLAINED = -2.633  # what leaves most of the gap is seldom its cause
+_PER_SHARE = 0.356  # natural logarithm of the gain over the largest cause's
+_PER_COUNT = -2.416  # natural logarithm: where many causes are named, forms that differ are among them
+_UNEXPLAINED = -2.640  # what leaves most of the gap is seldom its cause
 
 
 def confidence(t: float, gain: float, closed: float, share: float, count: int, *, unexplained: bool) -> float:
