@@ -206,7 +206,7 @@ def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) ->
     if len(rare):
         best = int(rare[np.argmax(gain[rare])])
         beside = max(gain[k] for k, one in enumerate(left) if _overlap(one, left[best]))
-        common = [gain[k] for k in np.flatnonzero(~few) if not _same_place(left[k], left[best])]
+        common = [gain[k] for k in np.flatnonzero(~few).tolist() if not _same_place(left[k], left[best])]
         found[best] = gain[best] >= max(_ALONE, _AHEAD * max(common, default=0.0), beside)
     return found
 
