@@ -47,14 +47,24 @@ def labels(*kinds):
     return {trace.motion.run: trace.motion.run for kind in kinds for trace in kind}
 
 
-def located(observed, others=()):
+def located(observed, others=(), acting=None):
     seen, known = joint_maps((observed, others), labels(observed, others))
     follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
-    return locate("torque", JOINTS, follows, seen, level_of(FLOOR, seen, known), reference=known)
+    level = level_of(FLOOR, seen, known)
+    return locate("torque", JOINTS, follows, seen, level, reference=known, acting=acting)
 
 
 def test_noise_has_no_place():
     assert located(traces()) == []
+
+
+def test_where_a_cause_acts_comes_before_what_stays_larger_elsewhere():
+    def both(motion, torque):
+        return np.column_stack([0.8 * motion.dq[:, 0], np.zeros(len(motion.dq)), 3 * motion.dq[:, 2]])
+
+    assert located(traces(both))[0].joint == JOINTS[2]
+    places = located(traces(both), acting=np.array([True, False, False]))
+    assert [places[0].joint, places[-1].joint] == [JOINTS[0], JOINTS[2]]
 
 
 def test_false_places_are_rare():

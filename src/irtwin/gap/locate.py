@@ -95,9 +95,10 @@ def locate(
     joints, follows: of each of the g places its joint and the variable that its residual follows. The false discovery
     rate over places is held at 5 % (Benjamini and Hochberg); p-values are Student's over units, of the logarithm of
     the mean square over the level, against that of the `reference` where there is one; where causes are `acting` (g,),
-    also of that over what they leave, `explained`. Joints come in the order of their excess; a joint's regimes in
-    that of their share of it, its concentration there, and whether they suit the variable. A joint on which causes are
-    acting, but none of whose places is sure, has those to which they add (`acts`) more than on average.
+    also of that over what they leave, `explained`. Joints on which causes are acting come before the others, all in
+    the order of their excess; a joint's regimes in that of their share of it, its concentration there, and whether they
+    suit the variable. A joint on which causes are acting, but none of whose places is sure, has those to which they add
+    (`acts`) more than on average.
     """
     share, excess = _shares(seen, level, np.ones((1, len(seen.squares))))
     rng = np.random.default_rng(seed)
@@ -136,7 +137,8 @@ def locate(
         unsure = [place for place in range(len(joints)) if acting[place] and joints[place] not in sure]
         found += [location(place, r, rank) for place in unsure for r, rank in _where_added(acts, place)]
     found = [one for one in found if one.regime != LOADED or one.follows in _LOADS]
-    order = {joint: -of_joint[place] for place, joint in enumerate(joints)}
+    last = np.zeros(len(joints), dtype=bool) if acting is None else ~acting
+    order = {joint: (bool(last[place]), -of_joint[place]) for place, joint in enumerate(joints)}
     return sorted(found, key=lambda location: (order[location.joint], -location.rank))[:_PLACES]
 
 
