@@ -103,11 +103,14 @@ def query(
     Without a QUESTION: list those that have names, theme by theme.
     """
     from irtwin import workflow
+    from irtwin.knowledge.no_network import leave_network
     from irtwin.knowledge.queries import to_csv, to_json
 
     if question is None:
         answer = workflow.questions()
     else:
+        if graph_url is None:
+            leave_network()
         answer = workflow.ask(question, workspace, robot=robot, database=database, graph_url=graph_url)
     for fault in answer.faults:
         _say(f"irtwin: {fault}")

@@ -56,6 +56,11 @@ def values(graph: KnowledgeGraph) -> dict[str, list[int]]:
         ),
         ("INSERT DATA { <x> <p> 3 . GRAPH <a> { <x> <p> 3 } }", {"": [1, 2, 3], A: [1, 3], B: [1, 2]}),
         ("# nothing", {"": [1, 2], A: [1], B: [1, 2]}),
+        ("#x\rINSERT#\rDATA#\r{ <x> <p> 3 } #;", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]}),
+        ("INSERT DATA { <x> <p> 3 } #\r; DELETE DATA { <x> <p> 1 } ;\r", {"": [2, 3], B: [2], GRAPH_UPDATE: [3]}),
+        ("INSERT DATA { <x> <p> 3 } ; DELETE WHERE { <x> <p> 1 }", {"": [2, 3], B: [2], GRAPH_UPDATE: [3]}),
+        ("INSERT { <x> <p> 3 } WHERE { FILTER(1<2)#>\r } ;", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]}),
+        ("DELETE DATA { <x> <p> 1 . GRAPH <b> { <x> <p> 2 } } ; #}", {"": []}),
     ],
 )
 def test_the_default_graph_stays_the_union(graph: KnowledgeGraph, text: str, expected: dict[str, list[int]]) -> None:
@@ -103,6 +108,20 @@ def test_a_refused_update_changes_nothing(graph: KnowledgeGraph, text: str, mess
     with pytest.raises(InputError, match=message):
         graph.update(text)
     assert values(graph) == before
+
+
+@pytest.mark.parametrize("end", ["", ";", " ; # and nothing more", "\r#;", "#\n;"])
+def test_strings_are_kept_as_they_are(graph: KnowledgeGraph, end: str) -> None:
+    said = '"""a\\\\""", """; DELETE WHERE { ?s ?p ?o } #"""'
+    graph.update(f"INSERT DATA {{ <http://e/x> <http://e/says> {said} }}{end}")
+    graph.update(f"INSERT {{ <http://e/y> <http://e/says> {said} }} WHERE {{ }}{end}")
+    rows = graph.query("SELECT ?said { [] <http://e/says> ?said }")
+    assert sorted(row["said"] for row in rows) == ["; DELETE WHERE { ?s ?p ?o } #"] * 2 + ["a\\"] * 2
+
+
+def test_relative_names_are_below_the_base(graph: KnowledgeGraph) -> None:
+    graph.update("INSERT DATA { <x> <p> 3 }", base="http://e/")
+    assert values(graph)[GRAPH_UPDATE] == [3]
 
 
 def test_payload_is_a_word_like_any_other(graph: KnowledgeGraph) -> None:

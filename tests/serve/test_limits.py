@@ -20,7 +20,7 @@ from irtwin.serve.protocol import Refusal
 
 PRODUCT = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
 ALL_PAIRS = "SELECT DISTINCT * { ?a ?b ?c . ?d ?e ?f }"
-REQUEST = {"default_graphs": (), "named_graphs": (), "accept": "text/csv", "at_once": False}
+REQUEST = {"default_graphs": (), "named_graphs": (), "base": "http://e/sparql", "accept": "text/csv", "at_once": False}
 
 
 @pytest.fixture(scope="module")

@@ -21,13 +21,15 @@ from pyoxigraph import (
 
 from irtwin.errors import InputError
 from irtwin.knowledge.blank_nodes import has_blank_node, same
+from irtwin.knowledge.keywords import refuse_service
 from irtwin.knowledge.rdf_input import read_rdf, refuse
 from irtwin.knowledge.series_functions import Functions, series_functions
 from irtwin.knowledge.server import SparqlServer, is_url
-from irtwin.knowledge.sparql_text import asks_another_server, bound
+from irtwin.knowledge.sparql_text import bound
 from irtwin.knowledge.table import Table, to_python
-from irtwin.knowledge.updates import as_change, keeping_union
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES
+from irtwin.knowledge.update_dataset import using
+from irtwin.knowledge.updates import as_change, check, keeping_union
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, ID, PREFIXES
 from irtwin.resources import folder
 
 if TYPE_CHECKING:
@@ -182,18 +184,19 @@ class KnowledgeGraph:
         default_graphs: Sequence[str] = (),
         named_graphs: Sequence[str] = (),
         faults: dict[str, None] | None = None,
+        base: str = ID,
     ) -> QuerySolutions | QueryBoolean | QueryTriples:
         """Answer a query row by row as they are found; InputError where it is none or asks another server.
 
         Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
-        `faults` is told why functions had no answer, while the rows are found.
+        `faults` is told why functions had no answer, while the rows are found. Relative IRIs are below `base`.
         """
-        if asks_another_server(text):
-            raise InputError("SERVICE asks another server, which is not allowed here: ask this graph alone")
+        refuse_service(text, base, isinstance(self._store, SparqlServer))
         whole = not (default_graphs or named_graphs)
         try:
             return self._store.query(
                 text,
+                base_iri=base,
                 prefixes=PREFIXES,
                 default_graph=None if whole else [_graph_name(iri) for iri in default_graphs],
                 named_graphs=None if whole else [_graph_name(iri) for iri in named_graphs],
@@ -206,15 +209,20 @@ class KnowledgeGraph:
                 raise InputError(f"{error}: see the functions of ontology/providers.ttl and of SPARQL 1.1") from None
             raise
 
-    def update(self, text: str) -> None:
+    def update(
+        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str = ID
+    ) -> None:
         """Do a SPARQL update in one transaction that keeps the default graph the union: see `updates`.
 
-        InputError where the text is no update, reads from elsewhere, or fails.
+        Graphs and base are those of `answer`. InputError where the text is no update, reads from elsewhere, or fails.
         """
+        check(text, base, isinstance(self._store, SparqlServer))
+        if default_graphs or named_graphs:
+            text = using(text, default_graphs, named_graphs, base)
         try:
-            change = as_change(text, self._holding)
+            change = as_change(text, self._holding, base)
             if change is None:
-                self._store.update(keeping_union(text), prefixes=PREFIXES)
+                self._store.update(keeping_union(text, base), base_iri=base, prefixes=PREFIXES)
             else:
                 self.change(*change)
             self._store.flush()

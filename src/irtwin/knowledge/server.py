@@ -58,6 +58,7 @@ class SparqlServer:
         self,
         text: str,
         *,
+        base_iri: str | None = None,
         prefixes: Mapping[str, str] | None = None,
         default_graph: Sequence[NamedNode | DefaultGraph] | None = None,
         named_graphs: Sequence[NamedNode] | None = None,
@@ -67,15 +68,15 @@ class SparqlServer:
         graphs = [("default-graph-uri", name.value) for name in default_graph or () if isinstance(name, NamedNode)]
         graphs += [("named-graph-uri", name.value) for name in named_graphs or ()]
         url = f"{self.query_url}?{urlencode(graphs)}" if graphs else self.query_url
-        response = self._post(url, "query", _with_prefixes(text, prefixes), _ACCEPT)
+        response = self._post(url, "query", _with_prologue(text, base_iri, prefixes), _ACCEPT)
         if response.headers.get_content_type() == "application/sparql-results+json":
             return parse_query_results(response, QueryResultsFormat.JSON)
         triples = (quad.triple for quad in parse(response, RdfFormat.N_TRIPLES))
         return cast(QueryTriples, triples)  # an iterator, which is all that one makes of those
 
-    def update(self, text: str, *, prefixes: Mapping[str, str] | None = None) -> None:
+    def update(self, text: str, *, base_iri: str | None = None, prefixes: Mapping[str, str] | None = None) -> None:
         """Change the server's graphs, in the one transaction that it makes of a request."""
-        self._post(self.update_url, "update", _with_prefixes(text, prefixes), "*/*").read()
+        self._post(self.update_url, "update", _with_prologue(text, base_iri, prefixes), "*/*").read()
 
     def named_graphs(self) -> Iterator[NamedNode]:
         """Yield the names of graphs that hold something."""
@@ -152,5 +153,6 @@ def _credentials(address: SplitResult) -> dict[str, str]:
     return {"Authorization": f"Bearer {quote(token, safe='~+/=')}"} if token else {}
 
 
-def _with_prefixes(text: str, prefixes: Mapping[str, str] | None) -> str:
-    return "".join(f"PREFIX {name}: <{iri}> " for name, iri in (prefixes or {}).items()) + text
+def _with_prologue(text: str, base: str | None, prefixes: Mapping[str, str] | None) -> str:
+    said = [f"BASE <{base}> "] if base else []
+    return "".join([*said, *(f"PREFIX {name}: <{iri}> " for name, iri in (prefixes or {}).items()), text])

@@ -13,50 +13,65 @@ from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.blank_nodes import has_blank_node
-from irtwin.knowledge.sparql_text import asks_another_server, loads_a_document, masked, prologue_and_operations
+from irtwin.knowledge.keywords import parse_update, refuse_service_and_load
+from irtwin.knowledge.sparql_text import SPACE, after_prologue
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE, PREFIXES
 
 _BEFORE = f"{GRAPH}before"  # there only while an update lasts
-_OPERATION = re.compile(
-    r"\b(?:insert|delete|data|where|with|using|load|clear|create|drop|add|move|copy)\b", re.IGNORECASE
-)
+_DATA = re.compile(rf"(INSERT|DELETE){SPACE}DATA", re.IGNORECASE | re.ASCII)
 
 
-def as_change(text: str, holding: Callable[[Iterable[Triple]], Iterable[Quad]]) -> tuple[set[Quad], set[Quad]] | None:
+def check(text: str, base: str | None, on_server: bool = False) -> None:
+    """Raise InputError where a text is no update, by the writer's own lines and columns, or reads from elsewhere."""
+    refuse_service_and_load(text, base, on_server)
+    try:
+        parse_update(text, base)
+    except SyntaxError as error:
+        raise InputError(f"not a SPARQL update: {_in_place(text, base) or error}") from error
+
+
+def as_change(
+    text: str, holding: Callable[[Iterable[Triple]], Iterable[Quad]], base: str | None = None
+) -> tuple[set[Quad], set[Quad]] | None:
     """Return the quads of named graphs that an update takes out and puts in, where its text alone tells: or None.
 
     It does where it is one INSERT DATA or DELETE DATA without blank nodes. `holding` finds the quads of named graphs
-    that say one of some triples. InputError as `keeping_union`.
+    that say one of some triples. The text has passed `check`.
     """
-    _check(text)
-    words = list(_OPERATION.finditer(masked(text)))
-    match [word[0].lower() for word in words]:
-        case ["insert", "data"]:
-            named, union = _inserted(text)
-            if has_blank_node(named) or has_blank_node(union):
-                return None
-            new = union - {quad.triple for quad in (*named, *holding(union))}
-            graph = NamedNode(GRAPH_UPDATE)
-            return set(), named | {Quad(triple.subject, triple.predicate, triple.object, graph) for triple in new}
-        case ["delete", "data"]:
-            named, union = _inserted(f"{text[: words[0].start()]}INSERT{text[words[0].end() :]}")
-            return named | set(holding(union)), set()
-    return None
+    start = after_prologue(text)
+    head = _DATA.match(text, start)
+    if head is None:
+        return None
+    prologue, data = text[:start], text[head.end() :].rstrip(" \t\r\n;")
+    # A group is one INSERT's template as well: what follows it would not be let through here.
+    if not _parses(f"{prologue}INSERT {data}\nWHERE {{ }}", base):
+        return None
+    named, union = _inserted(f"{prologue}INSERT DATA {data}", base)
+    if has_blank_node(named) or has_blank_node(union):
+        return None
+    if head[1].lower() == "delete":
+        return named | set(holding(union)), set()
+    new = union - {quad.triple for quad in (*named, *holding(union))}
+    graph = NamedNode(GRAPH_UPDATE)
+    return set(), named | {Quad(triple.subject, triple.predicate, triple.object, graph) for triple in new}
 
 
-def keeping_union(text: str) -> str:
+def keeping_union(text: str, base: str | None = None) -> str:
     """Return an update that does what `text` says, and what the union then needs, in one transaction.
 
-    InputError where it is no update, or would read what is not in this graph.
+    The text has passed `check`.
     """
-    _check(text)
-    prologue, operations = prologue_and_operations(text)
+    start = after_prologue(text)
+    prologue, operations = text[:start], text[start:]
     if not operations:
         return prologue
+    # A text may end with a semicolon, or with a comment that the new line ends.
+    semicolon = ";" if _parses(f"{text}\n; CLEAR DEFAULT", base) else ""
     # Oxigraph takes a prologue before the first operation only, so it stays in front.
     return f"""{prologue}
 COPY DEFAULT TO <{_BEFORE}> ;
-{operations} ;
+{operations}
+{semicolon}
 INSERT {{ GRAPH <{GRAPH_UPDATE}> {{ ?s ?p ?o }} }}
 WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?o }} }} }} ;
 DELETE {{ GRAPH ?g {{ ?s ?p ?o }} }}
@@ -66,21 +81,28 @@ DELETE {{ ?s ?p ?o }} WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?
 INSERT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} }}"""
 
 
-def _check(text: str) -> None:
-    """Refuse what reads from elsewhere; parse by itself, so that the parser's line and column are the writer's."""
-    if asks_another_server(text) or loads_a_document(text):
-        raise InputError("LOAD and SERVICE read from elsewhere, which is not allowed here: use INSERT DATA")
+def _parses(text: str, base: str | None) -> bool:
     try:
-        Store().update(text, prefixes=PREFIXES)
+        parse_update(text, base)
+    except SyntaxError:
+        return False
+    return True
+
+
+def _in_place(text: str, base: str | None) -> SyntaxError | None:
+    """Return what the parser says of a text as it was written, which is known to be no update."""
+    try:
+        Store().update(text, base_iri=base, prefixes=PREFIXES)
     except SyntaxError as error:
-        raise InputError(f"not a SPARQL update: {error}") from error
-    except (RuntimeError, OSError):
-        return  # it names a graph that an empty store has not
+        return error
+    except RuntimeError:
+        return None
+    return None
 
 
-def _inserted(text: str) -> tuple[set[Quad], set[Triple]]:
+def _inserted(text: str, base: str | None) -> tuple[set[Quad], set[Triple]]:
     """Return what an INSERT DATA puts into named graphs, and into the union."""
     store = Store()
-    store.update(text, prefixes=PREFIXES)
+    store.update(text, base_iri=base, prefixes=PREFIXES)
     union = set(store.quads_for_pattern(None, None, None, DefaultGraph()))
     return set(store) - union, {quad.triple for quad in union}

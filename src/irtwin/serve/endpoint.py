@@ -85,11 +85,11 @@ class Endpoint:
         accept = request.headers.get("accept", "")
         if negotiation.wants_page(accept):
             return page.response()
-        graphs = await self._named_graphs()
-        return description.response(accept, str(request.url.replace(query="")), graphs, self._updates.allowed)
+        graphs = await self._named_graphs(_address(request))
+        return description.response(accept, _address(request), graphs, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
-        await self._updates.do(operation, request.headers.get("authorization", ""))
+        await self._updates.do(operation, _address(request), request.headers.get("authorization", ""))
         return Response(status_code=204)
 
     async def _query(self, operation: Operation, request: Request, send: Send) -> None:
@@ -101,7 +101,9 @@ class Endpoint:
     async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
         async with self._pool.worker() as worker:
             deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
-            media_type = await self._ask(worker, operation, request.headers.get("accept", ""), deadline)
+            media_type = await self._ask(
+                worker, operation, _address(request), request.headers.get("accept", ""), deadline
+            )
             headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
             await send(
                 {
@@ -120,11 +122,12 @@ class Endpoint:
                 return
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
-    async def _ask(self, worker: Worker, operation: Operation, accept: str, deadline: float) -> str:
+    async def _ask(self, worker: Worker, operation: Operation, base: str, accept: str, deadline: float) -> str:
         request = {
             "text": operation.text,
             "default_graphs": operation.default_graphs,
             "named_graphs": operation.named_graphs,
+            "base": base,
             "accept": accept,
             "at_once": self._updates.just_now,
         }
@@ -135,11 +138,11 @@ class Endpoint:
             seconds = self._limits.seconds
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
 
-    async def _named_graphs(self) -> list[str]:
+    async def _named_graphs(self, base: str) -> list[str]:
         async with self._pool.worker() as worker:
             deadline = time.monotonic() + self._limits.seconds
             try:
-                await self._ask(worker, Operation("query", description.NAMED_GRAPHS), "text/csv", deadline)
+                await self._ask(worker, Operation("query", description.NAMED_GRAPHS), base, "text/csv", deadline)
             except NotBegun:
                 raise Refusal(503, "the graph cannot be read just now", {"Retry-After": "2"}) from None
             body = b"".join([piece async for piece in worker.pieces()])
@@ -155,6 +158,11 @@ def refused(refusal: Refusal) -> Response:
 async def _left(receive: Receive) -> None:
     while (await receive())["type"] != "http.disconnect":
         pass
+
+
+def _address(request: Request) -> str:
+    """Return the endpoint's address as the client wrote it, which relative IRIs are below."""
+    return str(request.url.replace(query=""))
 
 
 def _with_charset(media_type: str) -> str:

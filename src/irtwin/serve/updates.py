@@ -7,11 +7,12 @@ import hmac
 import json
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.sparql_text import using
+from irtwin.knowledge.no_network import leave_network
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.snapshot import OLDEST
@@ -38,23 +39,17 @@ class Updates:
         """Whether an update is so young that a worker may not have seen it."""
         return time.monotonic() - self._last < 2 * OLDEST
 
-    async def do(self, operation: Operation, authorization: str) -> None:
-        """Do an update, whole or not at all. Raises Refusal."""
+    async def do(self, operation: Operation, base: str, authorization: str) -> None:
+        """Do an update, whole or not at all; relative IRIs are below `base`. Raises Refusal."""
         if self._token is None:
             raise Refusal(403, "this endpoint is read-only")
         if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
             raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
-        text = operation.text
-        if operation.default_graphs or operation.named_graphs:
-            try:
-                text = using(text, operation.default_graphs, operation.named_graphs)
-            except InputError as error:
-                raise Refusal(400, str(error)) from error
         async with self._turn:
-            await self._run(text)
+            await self._run({**asdict(operation), "base": base})
             self._last = time.monotonic()
 
-    async def _run(self, text: str) -> None:
+    async def _run(self, request: dict[str, object]) -> None:
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "irtwin.serve.updates", str(self._folder), str(self._limits.memory)),
             stdin=asyncio.subprocess.PIPE,
@@ -63,7 +58,7 @@ class Updates:
         )
         try:
             async with asyncio.timeout(self._limits.seconds):
-                out, _ = await process.communicate(text.encode())
+                out, _ = await process.communicate(json.dumps(request).encode())
         except TimeoutError:
             raise Refusal(503, f"the update was cancelled after {self._limits.seconds:g} s; nothing changed") from None
         finally:
@@ -78,7 +73,8 @@ class Updates:
 
 
 def main(folder: Path, memory: int) -> None:
-    """Do the update on standard input; write what is wrong with it, as JSON."""
+    """Do the update on standard input; write what is wrong with it. Both are JSON."""
+    leave_network()
     answer: dict[str, object] = {}
     try:
         graph = KnowledgeGraph(folder)
@@ -88,8 +84,9 @@ def main(folder: Path, memory: int) -> None:
     else:
         with graph:
             limit_memory(memory)
+            request = json.load(sys.stdin.buffer)
             try:
-                graph.update(sys.stdin.buffer.read().decode())
+                graph.update(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
             except InputError as error:
                 answer = {"status": 400, "message": str(error), "headers": {}}
     json.dump(answer, sys.stdout)

@@ -20,6 +20,7 @@ from pyoxigraph import QueryResultsFormat, QueryTriples, RdfFormat, serialize
 
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.no_network import leave_network
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
@@ -65,6 +66,7 @@ class _Sink:
 
 def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
     """Answer queries on the graph in `folder` until standard input ends; bytes of memory and seconds for each."""
+    leave_network()
     out = sys.stdout.buffer
     with Snapshot(folder) as snapshot:
         limit_memory(memory)
@@ -84,7 +86,7 @@ def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
 
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
-    found = graph.answer(request["text"], request["default_graphs"], request["named_graphs"])
+    found = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
     offered = negotiation.TRIPLES if isinstance(found, QueryTriples) else negotiation.SOLUTIONS
     media_type = negotiation.best(request["accept"], offered)
     if media_type is None:
