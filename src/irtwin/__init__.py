@@ -8,11 +8,16 @@ __version__ = "0.1.0"
 __all__ = ["adopt", "ask", "diagnose", "export", "predict", "run"]
 
 if TYPE_CHECKING:
-    from irtwin.workflow import adopt, ask, diagnose, export, predict, run
+    from irtwin.asking import ask, export
+    from irtwin.workflow import adopt, diagnose, predict, run
 
 
 def __getattr__(name: str) -> Any:
-    """Import the workflow when it is first used: `irtwin --help` need not wait for it."""
+    """Import what is asked for when it is first used: `irtwin --help` need not wait for it."""
+    if name in ("ask", "export"):
+        from irtwin import asking
+
+        return getattr(asking, name)
     if name in __all__:
         from irtwin import workflow
 

@@ -48,6 +48,7 @@ _workspace = click.option(
 _database = click.option(
     "--database", metavar="URL", envvar="IRTWIN_DATABASE", help="SQLAlchemy URL; SQLite in the workspace if not given."
 )
+_no_database = click.option("--database", hidden=True, expose_value=False)  # as other commands have; not needed to read
 _graph = click.option(
     "--graph",
     "graph_url",
@@ -92,26 +93,24 @@ def demo(workspace: Path) -> None:
 @click.argument("question", required=False)
 @click.option("--robot", metavar="NAME", help="Ask it of one robot, by its name.")
 @_workspace
-@_database
+@_no_database
 @_graph
 @click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True)
-def query(
-    question: str | None, robot: str | None, workspace: Path, database: str | None, graph_url: str | None, form: str
-) -> None:
+def query(question: str | None, robot: str | None, workspace: Path, graph_url: str | None, form: str) -> None:
     """Ask the graph a question, by its name or in SPARQL.
 
     Without a QUESTION: list those that have names, theme by theme.
     """
-    from irtwin import workflow
+    from irtwin import asking
     from irtwin.knowledge.no_network import leave_network
     from irtwin.knowledge.queries import to_csv, to_json
 
     if question is None:
-        answer = workflow.questions()
+        answer = asking.questions()
     else:
         if graph_url is None:
             leave_network()
-        answer = workflow.ask(question, workspace, robot=robot, database=database, graph_url=graph_url)
+        answer = asking.ask(question, workspace, robot=robot, graph_url=graph_url)
     for fault in answer.faults:
         _say(f"irtwin: {fault}")
     if form == "table":
@@ -208,17 +207,17 @@ def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | No
 
 @cli.command()
 @_workspace
-@_database
+@_no_database
 @_graph
 @click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
-def export(workspace: Path, database: str | None, graph_url: str | None, owl: Path) -> None:
+def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
     """Write the whole graph as one OWL file for Protégé.
 
     Ontology, individuals and inferences, in RDF/XML.
     """
-    from irtwin import workflow
+    from irtwin import asking
 
-    workflow.export(owl, workspace, database=database, graph_url=graph_url)
+    asking.export(owl, workspace, graph_url=graph_url)
     click.echo(owl)
 
 
@@ -343,12 +342,10 @@ def reason(source: Path, out: Path, dl: bool) -> None:
 @cli.command()
 @click.argument("triple", nargs=-1, required=True)
 @_workspace
-@_database
+@_no_database
 @_graph
 @click.option("--json", "as_json", is_flag=True, help="Write nested objects instead of an outline.")
-def explain(
-    triple: tuple[str, ...], workspace: Path, database: str | None, graph_url: str | None, as_json: bool
-) -> None:
+def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool) -> None:
     """Say how a triple of the graph is known.
 
     By which rule, mapping or provider, from which facts, down to runs, files and checksums. TRIPLE is subject,
@@ -356,10 +353,10 @@ def explain(
     """
     import json
 
-    from irtwin import workflow
+    from irtwin import asking
     from irtwin.knowledge.explanation import to_json, to_text
 
-    found = workflow.explain(" ".join(triple), workspace, database=database, graph_url=graph_url)
+    found = asking.explain(" ".join(triple), workspace, graph_url=graph_url)
     if as_json:
         click.echo(json.dumps([to_json(each) for each in found], indent=2, ensure_ascii=False))
     else:

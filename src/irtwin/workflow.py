@@ -6,8 +6,8 @@ import io
 import json
 import shutil
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -15,21 +15,18 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from irtwin import resources
+from irtwin.asking import WORKSPACE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.knowledge import queries
 from irtwin.knowledge.backup import backup as keep
-from irtwin.knowledge.explain import explain as explain_triples
 from irtwin.knowledge.explain import explain_one
-from irtwin.knowledge.explanation import Explanation
-from irtwin.knowledge.export import export_owl
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.table import Table
+from irtwin.knowledge.snapshot import Snapshot, kept
 from irtwin.knowledge.validation import validate
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
@@ -38,14 +35,12 @@ from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
 from irtwin.report.gap import render_alone
 from irtwin.report.render import render
 from irtwin.report.scene import draw_scene
-from irtwin.serve.snapshot import Snapshot
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load, to_json
 
 Announce = Callable[[str], None]
-WORKSPACE = Path("irtwin-workspace")
 
 
 def run(
@@ -176,44 +171,6 @@ def adopt(
         return _report(place, graph, robot_id)
 
 
-def ask(
-    question: str,
-    workspace: Path | str = WORKSPACE,
-    *,
-    robot: str | None = None,
-    database: str | None = None,
-    graph_url: str | None = None,
-) -> Table:
-    """Answer a named question, of all robots or of one by its name, or one in SPARQL, from a workspace's graph."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        return queries.ask(graph, question, robot)
-
-
-def explain(
-    triple: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
-) -> tuple[Explanation, ...]:
-    """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        return explain_triples(graph, triple)
-
-
-def questions() -> Table:
-    """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
-    known = queries.named_questions().values()
-    rows = (
-        {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
-    )
-    return Table(("theme", "name", "of", "question"), tuple(rows))
-
-
-def export(
-    owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
-) -> None:
-    """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        export_owl(graph, owl)
-
-
 def backup(
     archive: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> None:
@@ -241,9 +198,16 @@ def _check_effects(data_set: DataSet) -> None:
         raise InputError(f"{data_set.folder / 'dataset.toml'}: [twin] effects: {error}") from error
 
 
-def _graph(place: Workspace, url: str | None) -> KnowledgeGraph:
-    """Open the workspace's graph: in its folder, or on a SPARQL server."""
-    return KnowledgeGraph(url or place.graph_folder, place.folder)
+@contextmanager
+def _graph(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
+    """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server.
+
+    Who reads the folder meanwhile sees what was there before, if anything was.
+    """
+    with KnowledgeGraph(url or place.graph_folder, place.folder) as graph, ExitStack() as held:
+        if url is None and graph.graphs():
+            held.enter_context(kept(place.graph_folder))
+        yield graph
 
 
 def _map(place: Workspace, graph: KnowledgeGraph) -> None:

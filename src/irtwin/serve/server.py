@@ -18,12 +18,12 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
+from irtwin.knowledge.snapshot import Snapshot
 from irtwin.serve import ontology, page
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.snapshot import Snapshot
 from irtwin.serve.updates import Updates
 
 _GRACE = 3  # s that answers under way may still take when the server stops

@@ -13,9 +13,9 @@ from pathlib import Path
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.no_network import leave_network
+from irtwin.knowledge.snapshot import OLDEST
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
-from irtwin.serve.snapshot import OLDEST
 from irtwin.serve.worker import limit_memory
 
 

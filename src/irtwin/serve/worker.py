@@ -21,10 +21,10 @@ from pyoxigraph import QueryResultsFormat, QueryTriples, RdfFormat, serialize
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.no_network import leave_network
+from irtwin.knowledge.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.snapshot import Snapshot
 
 FRAME = struct.Struct(">cI")
 _PIECE = 1 << 20  # bytes; a failure before the first piece is full can still be told as such

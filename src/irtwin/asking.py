@@ -1,0 +1,68 @@
+"""Answers from a workspace's graph as it stands: nothing is written, no lock is taken, no writer is waited for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from irtwin.errors import InputError
+from irtwin.knowledge import queries
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.snapshot import Snapshot
+from irtwin.knowledge.table import Table
+
+if TYPE_CHECKING:
+    from irtwin.knowledge.explanation import Explanation
+
+WORKSPACE = Path("irtwin-workspace")
+
+
+def ask(
+    question: str, workspace: Path | str = WORKSPACE, *, robot: str | None = None, graph_url: str | None = None
+) -> Table:
+    """Answer a named question, of all robots or of one by its name, or one in SPARQL, from a workspace's graph.
+
+    `graph_url` is that of a SPARQL server that keeps the graph. InputError where there is no graph or no answer.
+    """
+    with _graph(Path(workspace), graph_url) as graph:
+        return queries.ask(graph, question, robot)
+
+
+def explain(triple: str, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> tuple[Explanation, ...]:
+    """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
+    from irtwin.knowledge.explain import explain as explain_triples
+
+    with _graph(Path(workspace), graph_url) as graph:
+        return explain_triples(graph, triple)
+
+
+def export(owl: Path, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> None:
+    """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
+    from irtwin.knowledge.export import export_owl
+
+    with _graph(Path(workspace), graph_url) as graph:
+        export_owl(graph, owl)
+
+
+def questions() -> Table:
+    """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
+    known = queries.named_questions().values()
+    rows = (
+        {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
+    )
+    return Table(("theme", "name", "of", "question"), tuple(rows))
+
+
+@contextmanager
+def _graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
+    if url is not None:
+        with KnowledgeGraph(url, workspace) as graph:
+            yield graph
+        return
+    folder = workspace / "graph"
+    if not folder.is_dir():
+        raise InputError(f"{workspace}: no workspace here; run `irtwin run DATASET --workspace {workspace}` first")
+    with Snapshot(folder) as snapshot:
+        yield snapshot.graph

@@ -1,0 +1,80 @@
+"""A folder of links to the files of another: they stay when their owner removes them, as in RocksDB's checkpoints."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_PREFIX = ".view-"
+_PUBLISHED = f"{_PREFIX}of-all-"
+
+
+@contextmanager
+def linked(folder: Path, ignored: tuple[str, ...], copied: tuple[str, ...] = ()) -> Iterator[Path]:
+    """Give a folder beside another, with links to its files but those whose names start with one of `ignored`.
+
+    Files whose names match one of the patterns `copied` are copied, as they will be written on. The folder is locked,
+    so that nobody takes it for left behind. FileNotFoundError where a file goes meanwhile, OSError where links cannot
+    be made there.
+    """
+    with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=folder.parent, ignore_cleanup_errors=True) as name:
+        lock = os.open(name, os.O_RDONLY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            for file in folder.iterdir():
+                if file.name.startswith(ignored):
+                    continue
+                if any(map(file.match, copied)):
+                    shutil.copyfile(file, Path(name) / file.name)
+                else:
+                    os.link(file, Path(name) / file.name)
+            yield Path(name)
+        finally:
+            os.close(lock)
+
+
+@contextmanager
+def published(view: Path) -> Iterator[None]:
+    """Let others find a linked folder by `found` for as long as this lasts."""
+    name = view.with_name(view.name.replace(_PREFIX, _PUBLISHED, 1))
+    view.rename(name)
+    try:
+        yield
+    finally:
+        name.rename(view)
+
+
+def found(folder: Path) -> Path | None:
+    """Return the folder of links that a process that lives has published beside a folder."""
+    return next((view for view in folder.parent.glob(f"{_PUBLISHED}*") if _is_locked(view)), None)
+
+
+def _is_locked(view: Path) -> bool:
+    try:
+        lock = os.open(view, os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False
+
+
+def remove_left_behind(folder: Path) -> None:
+    """Remove the links that killed processes left beside a folder."""
+    for left in folder.parent.glob(f"{_PREFIX}*"):
+        with suppress(OSError):  # it is in use, or another process removes it just now
+            lock = os.open(left, os.O_RDONLY)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(left)
+            finally:
+                os.close(lock)
