@@ -7,6 +7,7 @@ import json
 import math
 import socket
 import threading
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -42,6 +43,7 @@ def test_values_follow_the_names() -> None:
     ("said", "message"),
     [
         (b"{", "no JSON"),
+        (b"POST /robot HTTP/1.1\r\n", "an HTTP request, as a web page may make it"),
         (b"\xff\xfe", "no JSON"),
         (b"[" * 60_000, "no JSON"),
         (b"[1]", "no JSON object"),
@@ -96,3 +98,21 @@ def test_clients_on_a_port() -> None:
         with pytest.raises(InputError, match=f"port {port} cannot be listened on"), listening(port, handle):
             pass
     assert len(taken) == 15
+
+
+def test_an_http_request_ends_its_connection_before_its_body_is_read() -> None:
+    taken: list[State] = []
+    refused: list[str] = []
+    body = line() + b"\n" + line(time=6.5) + b"\n"
+    head = f"POST / HTTP/1.1\r\nOrigin: http://evil.example\r\nContent-Length: {len(body)}\r\n\r\n".encode()
+    with listening(0, lambda lines: feed(lines, READER, taken.append, refused.append)) as port:
+        with socket.create_connection(("127.0.0.1", port)) as browser:
+            browser.sendall(head + body)
+            with suppress(ConnectionResetError):
+                assert browser.recv(1) == b""
+        with socket.create_connection(("127.0.0.1", port)) as robot:
+            robot.sendall(line(time=7.5) + b"\n")
+            robot.shutdown(socket.SHUT_WR)
+            assert robot.recv(1) == b""
+    assert [state.time for state in taken] == [7.5]
+    assert len(refused) == 1 and "HTTP request" in refused[0]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import socketserver
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,6 +23,7 @@ from irtwin.errors import InputError
 
 LONGEST_LINE = 1 << 16  # bytes
 _PER_JOINT = ("velocity", "effort", "temperature")
+_HTTP = re.compile(rb"[A-Z]+ \S+ HTTP/\d")  # its first line
 _GREATEST = 1e300  # neither NaN nor infinite, nor an integer beyond a float
 _LATEST = 253402300799.0  # s: the end of the year 9999
 
@@ -57,6 +59,8 @@ class StateReader:
         try:
             said = json.loads(line)
         except (ValueError, RecursionError):
+            if _HTTP.match(line):
+                raise InputError("an HTTP request, as a web page may make it: its connection is ended") from None
             raise InputError("a line is no JSON") from None
         if not isinstance(said, dict):
             raise InputError("a line is no JSON object")
@@ -113,13 +117,24 @@ def lines_of(stream: BinaryIO) -> Iterator[bytes]:
         yield line
 
 
+def _till_http(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield lines till one begins an HTTP request: any web page can have a browser send those, samples and all."""
+    for line in lines:
+        yield line
+        if _HTTP.match(line):
+            return
+
+
 @contextmanager
 def listening(port: int, handle: Callable[[Iterator[bytes]], None]) -> Iterator[int]:
-    """Listen on this machine's own address, where `handle` gets the lines of each client; give the port."""
+    """Listen on this machine's own address, where `handle` gets the lines of each client; give the port.
+
+    An HTTP request ends the connection with its first line.
+    """
 
     class Handler(socketserver.StreamRequestHandler):
         def handle(self) -> None:
-            handle(lines_of(cast(BinaryIO, self.rfile)))
+            handle(_till_http(lines_of(cast(BinaryIO, self.rfile))))
 
     class Server(socketserver.ThreadingTCPServer):
         allow_reuse_address = True
