@@ -11,6 +11,7 @@ import click
 from irtwin import __version__
 from irtwin.errors import InputError
 
+_DAY = 86400.0  # s
 _WORKSPACE = Path("irtwin-workspace")
 
 
@@ -299,7 +300,7 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float) -> Non
 @click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 takes a free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; others may ask it.")
 @click.option("--timeout", type=click.FloatRange(min=0.1), default=30.0, show_default=True, help="Seconds per query.")
-@click.option("--memory", type=click.IntRange(min=64), default=1024, show_default=True, help="MB per query.")
+@click.option("--memory", type=click.IntRange(64, 1 << 20), default=1024, show_default=True, help="MB per query.")
 @click.option("--token-file", type=click.Path(path_type=Path), help="Allows updates by who sends the token in it.")
 def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
     """Answer SPARQL over HTTP, at /sparql.
@@ -311,6 +312,8 @@ def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, to
     from irtwin.serve.server import read_token
     from irtwin.serve.server import serve as serve_graph
 
+    if not timeout <= _DAY:  # which is also so of NaN
+        raise InputError(f"--timeout {timeout:g}: a query has at most a day, {_DAY:g} s")
     limits = Limits(seconds=timeout, memory=memory << 20)
     serve_graph(workspace / "graph", host, port, token=read_token(token_file), limits=limits, announce=_announce)
 

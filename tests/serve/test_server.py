@@ -57,6 +57,45 @@ def test_a_token_file_that_says_nothing(
     assert message in refused("--workspace", new_graph().parent, "--port", 0, "--token-file", file)
 
 
+@pytest.mark.parametrize("timeout", ["inf", "nan", "1e300"])
+def test_a_query_has_a_day_at_most(tmp_path: Path, timeout: str) -> None:
+    assert "a query has at most a day, 86400 s" in refused("--workspace", tmp_path, "--timeout", timeout)
+
+
+ELSEWHERE = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"}
+LINK = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
+
+
+@pytest.mark.parametrize(
+    ("method", "headers", "status"),
+    [
+        ("GET", ELSEWHERE, 403),
+        ("GET", {**ELSEWHERE, "Sec-Fetch-Site": "same-site"}, 403),
+        ("GET", {**LINK, "Sec-Fetch-Dest": "iframe"}, 403),
+        ("GET", {"Origin": "http://evil.example"}, 403),
+        ("POST", {"Origin": "http://evil.example"}, 403),
+        ("POST", {"Origin": "null"}, 403),
+        ("POST", {"Origin": "http://["}, 403),
+        ("POST", LINK, 403),
+        ("OPTIONS", {"Origin": "http://evil.example", "Access-Control-Request-Method": "POST"}, 403),
+        ("GET", LINK, 200),
+        ("GET", {"Sec-Fetch-Site": "none", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}, 200),
+        ("POST", {"Sec-Fetch-Site": "same-origin", "Origin": "https://a.proxy.example"}, 200),
+        ("POST", {"Origin": "own"}, 200),
+        ("POST", {}, 200),
+    ],
+)
+def test_pages_of_other_sites_get_no_answer(server, method: str, headers: dict[str, str], status: int) -> None:
+    said = {name: server.url if value == "own" else value for name, value in headers.items()}
+    if method == "POST":
+        response = CLIENT.post(server.sparql, data={"query": "ASK {}"}, headers=said)
+    else:
+        response = CLIENT.request(method, f"{server.sparql}?query=ASK{{}}", headers=said)
+    assert response.status_code == status
+    if status == 403:
+        assert response.text == "this server does not answer to other sites' pages\n"
+
+
 def test_it_listens_on_this_machine_alone(server) -> None:
     port = urlsplit(server.url).port
     listening = [c for c in psutil.Process(server.process.pid).net_connections() if c.status == psutil.CONN_LISTEN]

@@ -18,7 +18,9 @@ _HEADERS = {
 
 
 class Guard:
-    """Adds security headers; with `local`, answers only to this machine's own names.
+    """Adds security headers, and refuses what pages of other sites ask, of which they could not read the answer.
+
+    With `local`, it answers only to this machine's own names.
 
     A page from elsewhere can have its own name resolve to 127.0.0.1 and then read what is served there as if it were
     its own (DNS rebinding): such a request carries that name in Host.
@@ -40,10 +42,25 @@ class Guard:
                     headers.setdefault(name, value)
             await send(message)
 
-        if self._local and _host(Request(scope).headers.get("host", "")) not in _LOCAL:
+        request = Request(scope)
+        if self._local and _host(request.headers.get("host", "")) not in _LOCAL:
             refusal = PlainTextResponse("this server answers to localhost only\n", status_code=421)
             return await refusal(scope, receive, send_guarded)
+        if _from_another_site(request):
+            refusal = PlainTextResponse("this server does not answer to other sites' pages\n", status_code=403)
+            return await refusal(scope, receive, send_guarded)
         await self._app(scope, receive, send_guarded)
+
+
+def _from_another_site(request: Request) -> bool:
+    """Whether a browser says that another site's page asks; following a link there is the user's own doing."""
+    headers = request.headers
+    site = headers.get("sec-fetch-site")  # no page can forge it
+    if site is None:  # no browser, an old one, or an address that it does not trust: Origin tells, where it is said
+        origin = headers.get("origin")
+        return origin is not None and origin.lower().partition("://")[2] != headers.get("host", "").lower()
+    follows_link = headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
+    return site not in ("same-origin", "none") and not (request.method == "GET" and follows_link)
 
 
 def _host(header: str) -> str:
