@@ -5,18 +5,20 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from irtwin.serve import description, negotiation, page
+from irtwin.serve.answer import Answer, Answers
 from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
 from irtwin.serve.updates import Updates
 
 _METHODS = "GET, HEAD, POST, OPTIONS"
+_ROOM = 4  # largest answers that may wait for their clients
 _TRIES = 3  # workers that may be lost before a query begins
 _log = logging.getLogger(__name__)
 
@@ -28,6 +30,7 @@ class Endpoint:
         self._pool = pool
         self._updates = updates
         self._limits = limits
+        self._answers = Answers(_ROOM * limits.answer)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request. A client that leaves ends its query."""
@@ -99,28 +102,28 @@ class Endpoint:
         raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
 
     async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
-        async with self._pool.worker() as worker:
-            deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
-            media_type = await self._ask(
-                worker, operation, _address(request), request.headers.get("accept", ""), deadline
-            )
-            headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
-            await send(
-                {
-                    "type": "http.response.start",
-                    "status": 200,
-                    "headers": [(name.lower().encode(), value.encode()) for name, value in headers.items()],
-                }
-            )
-            try:
-                async with asyncio.timeout_at(deadline):
-                    async for piece in worker.pieces():
-                        await send({"type": "http.response.body", "body": piece, "more_body": True})
-            except (TimeoutError, Refusal) as error:
-                # The status is sent: all that can be done is not to end the body as if it were whole.
-                _log.warning("an answer was broken off: %s", error or f"after {self._limits.seconds:g} s")
-                return
-            await send({"type": "http.response.body", "body": b"", "more_body": False})
+        """Take the answer off the worker as fast as it makes it; the client may take its time."""
+        with self._answers.new() as answer, ExitStack() as held:
+            async with self._pool.worker() as worker:
+                deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
+                media_type = await self._ask(
+                    worker, operation, _address(request), request.headers.get("accept", ""), deadline
+                )
+                sending = asyncio.create_task(_send(answer, media_type, send))
+                held.callback(sending.cancel)
+                try:
+                    async with asyncio.timeout_at(deadline):
+                        async for piece in worker.pieces():
+                            answer.write(piece)
+                            self._answers.make_room()
+                            if answer.broken_off:
+                                raise Refusal(503, "too much is waiting for clients that do not read")
+                    answer.end()
+                except (TimeoutError, Refusal, OSError) as error:
+                    # The status is sent: all that can be done is not to end the body as if it were whole.
+                    _log.warning("an answer was broken off: %s", error or f"after {self._limits.seconds:g} s")
+                    answer.break_off()
+            await sending
 
     async def _ask(self, worker: Worker, operation: Operation, base: str, accept: str, deadline: float) -> str:
         request = {
@@ -153,6 +156,17 @@ def refused(refusal: Refusal) -> Response:
     """Turn a refusal into a response of one line."""
     text = f"{refusal.message}\n" if refusal.message else None
     return PlainTextResponse(text, status_code=refusal.status, headers=refusal.headers)
+
+
+async def _send(answer: Answer, media_type: str, send: Send) -> None:
+    """Send an answer at its client's pace; one that is broken off is not ended."""
+    headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
+    encoded = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+    await send({"type": "http.response.start", "status": 200, "headers": encoded})
+    async for piece in answer.pieces():
+        await send({"type": "http.response.body", "body": piece, "more_body": True})
+    if answer.whole:
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
 
 
 async def _left(receive: Receive) -> None:

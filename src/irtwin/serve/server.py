@@ -20,6 +20,7 @@ from starlette.routing import Route
 from irtwin.errors import InputError
 from irtwin.knowledge.snapshot import Snapshot
 from irtwin.serve import ontology, page
+from irtwin.serve.connections import Connection
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
 from irtwin.serve.pool import Limits, Pool
@@ -51,6 +52,7 @@ def serve(
     app = application(graph, host, token=token, limits=limits, opened=lambda: announce(address))
     config = uvicorn.Config(
         app,
+        http=Connection,
         log_level="error",
         access_log=False,
         server_header=False,
