@@ -131,3 +131,6 @@ def test_where_no_links_can_be_made_it_is_read_in_place(
     with Snapshot(folder) as snapshot:
         assert len(snapshot.graph.triples()) > 1000
         assert views(folder) == []
+    with KnowledgeGraph(folder) as graph, kept(folder), Snapshot(folder) as snapshot:
+        write(graph, 1)
+        assert seen(snapshot) == [1]

@@ -96,6 +96,12 @@ def test_pages_of_other_sites_get_no_answer(server, method: str, headers: dict[s
         assert response.text == "this server does not answer to other sites' pages\n"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel's filter is Linux'")
+def test_workers_have_no_network(server) -> None:
+    for worker in server.workers():
+        assert "Seccomp:\t2" in Path(f"/proc/{worker}/status").read_text()
+
+
 def test_it_listens_on_this_machine_alone(server) -> None:
     port = urlsplit(server.url).port
     listening = [c for c in psutil.Process(server.process.pid).net_connections() if c.status == psutil.CONN_LISTEN]

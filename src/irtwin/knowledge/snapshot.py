@@ -11,7 +11,6 @@ A writer that goes through many transactions before the graph is whole again kee
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -33,9 +32,14 @@ T = TypeVar("T")
 
 @contextmanager
 def kept(folder: Path) -> Iterator[None]:
-    """Let readers see a graph as it is now until this ends, however it ends; for who has it open to write."""
-    held, view = _whole(lambda: folder, lambda _, held: held.enter_context(linked(folder, _NO_DATA, _WRITTEN_ON)))
-    with held, published(view):
+    """Let readers see a graph as it is now until this ends, however it ends; for who has it open to write.
+
+    Where no links can be made they see each transaction.
+    """
+    held, view = _whole(lambda: folder, lambda source, held: _links(source, held, _WRITTEN_ON))
+    with held:
+        if view is not None:
+            held.enter_context(published(view))
         yield
 
 
@@ -77,7 +81,7 @@ class Snapshot:
     def _open(self) -> None:
         def opened(source: Path, view: ExitStack) -> KnowledgeGraph:
             self._checked, self._seen = time.monotonic(), self._state()
-            files = _lasting(source, view)
+            files = _links(source, view) or source
             return view.enter_context(KnowledgeGraph.as_it_stands(files, self._folder.parent))
 
         view, graph = _whole(self._source, opened)
@@ -85,16 +89,14 @@ class Snapshot:
         self._view, self.graph = view, graph
 
 
-def _lasting(source: Path, view: ExitStack) -> Path:
-    """Return a folder whose files stay; the folder itself where none can be made."""
-    if not os.access(source.parent, os.W_OK):
-        return source
+def _links(source: Path, held: ExitStack, copied: tuple[str, ...] = ()) -> Path | None:
+    """Return a folder of links to a store's files; None where none can be made."""
     try:
-        return view.enter_context(linked(source, _NO_DATA))
+        return held.enter_context(linked(source, _NO_DATA, copied))
     except FileNotFoundError:
         raise
-    except OSError:  # the disk is full, or knows no links, or the files are another user's
-        return source
+    except OSError:  # read-only, full, another user's, or without links
+        return None
 
 
 def _whole(source: Callable[[], Path], do: Callable[[Path, ExitStack], T]) -> tuple[ExitStack, T]:
