@@ -34,7 +34,7 @@ from irtwin.knowledge.validation import validate
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
-from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
+from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, robot_iri
 from irtwin.report.gap import render_alone
 from irtwin.report.render import render
 from irtwin.report.scene import draw_scene
@@ -42,6 +42,7 @@ from irtwin.serve.snapshot import Snapshot
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
+from irtwin.storage.staging import staged
 from irtwin.twin.files import load, to_json
 
 Announce = Callable[[str], None]
@@ -70,20 +71,15 @@ def run(
     for line in data_set.repairs:
         announce(f"  {line}")
     with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
-        outcome = ingest(place, data_set)
-        announce(f"  {outcome}")
+        robot_id = _take_in(place, data_set, announce)
         graph.load_ontology()
         _map(place, graph)
-        announce("Populating what the graph lacks")
-        populate(place, graph, lambda: _map(place, graph), announce)
-        announce("Reasoning")
-        inferred = reason(graph)
-        announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
-        for violation in validate(graph):
-            announce(f"  {violation}")
+        _reason(graph, announce)
         announce("Writing the report")
-        return _report(place, graph, identifier(data_set.robot.name))
+        report = _report(place, graph, robot_id)
+        if _populate_others(place, graph, announce):
+            _reason(graph, announce)
+        return report
 
 
 def diagnose(
@@ -126,15 +122,13 @@ def diagnose(
         render_alone(data_set, document, found.evidence, report)
     if workspace is not None:
         announce("Keeping the diagnosis")
+        robot_id = identifier(data_set.robot.name)
+        twin = None if found.twin is None else to_json(found.twin)
         with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-            ingest(place, data_set)
-            record(
-                place,
-                identifier(data_set.robot.name),
-                document,
-                found.evidence,
-                None if found.twin is None else to_json(found.twin),
-            )
+            check_name(place, data_set.robot.name)
+            with staged(place, robot_id) as apart:
+                ingest(apart, data_set)
+                record(apart, robot_id, document, found.evidence, twin)
             graph.load_ontology()
             _map(place, graph)
             reason(graph)
@@ -166,12 +160,13 @@ def adopt(
     robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> Path:
     """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
-    robot_id = identifier(robot)
     with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        adopt_twin(place, robot_id)
+        robot_id = find_robot(place, robot)
+        with staged(place, robot_id) as apart:
+            adopt_twin(apart, robot_id)
+            _populate_apart(apart, lambda line: None)
         graph.load_ontology()
         _map(place, graph)
-        populate(place, graph, lambda: _map(place, graph), lambda line: None)
         reason(graph)
         return _report(place, graph, robot_id)
 
@@ -250,6 +245,46 @@ def _map(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
     documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
     refresh(graph, place.engine, documents, place.mapped_rows)
+
+
+def _take_in(place: Workspace, data_set: DataSet, announce: Announce) -> str:
+    """Ingest a data set and populate what follows from it, all or nothing; return the robot_id."""
+    robot_id = identifier(data_set.robot.name)
+    check_name(place, data_set.robot.name)
+    announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
+    with staged(place, robot_id) as apart:
+        announce(f"  {ingest(apart, data_set)}")
+        announce("Populating what the graph lacks")
+        try:
+            _populate_apart(apart, announce)
+        except InputError as error:
+            raise InputError(f"{data_set.folder}: {error}; nothing of this data set was stored") from error
+    return robot_id
+
+
+def _populate_apart(apart: Workspace, announce: Announce) -> None:
+    """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
+    with KnowledgeGraph(workspace=apart.folder) as graph:
+        graph.load_ontology()
+        _map(apart, graph)
+        populate(apart, graph, lambda: _map(apart, graph), announce)
+
+
+def _populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
+    """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other."""
+
+    def set_aside(robot_id: str, reason: InputError) -> None:
+        announce(f"  {robot_id} is set aside: {reason}; `irtwin drop {robot_id}` takes it out")
+
+    return populate(place, graph, lambda: _map(place, graph), announce, set_aside)
+
+
+def _reason(graph: KnowledgeGraph, announce: Announce) -> None:
+    announce("Reasoning")
+    inferred = reason(graph)
+    announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
+    for violation in validate(graph):
+        announce(f"  {violation}")
 
 
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:

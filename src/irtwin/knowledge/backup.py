@@ -25,13 +25,13 @@ from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.source import snapshot_options
 from irtwin.storage import engine
 from irtwin.storage.archive import pack, unpack
-from irtwin.storage.database import DIAGNOSES, LIVE, TWINS, Workspace
-from irtwin.storage.schema import Base, Moment
+from irtwin.storage.database import DIAGNOSES, TWINS, Workspace
+from irtwin.storage.schema import LIVE, Base, Moment
 from irtwin.storage.series import FOLDER
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, LIVE, "reports")
 _GRAPH = "graph.nq"
-_NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_-][A-Za-z0-9_.-]*")
+_NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*")
 _AT_ONCE = 5000  # rows
 _ALL = "SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } }"
 
