@@ -70,15 +70,15 @@ def run(
     _check_effects(data_set)
     for line in data_set.repairs:
         announce(f"  {line}")
-    with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+    with Workspace(Path(workspace), database) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
         robot_id = _take_in(place, data_set, announce)
         graph.load_ontology()
-        _map(place, graph)
-        _reason(graph, announce)
+        map_rows(place, graph)
+        conclude(graph, announce)
         announce("Writing the report")
         report = _report(place, graph, robot_id)
-        if _populate_others(place, graph, announce):
-            _reason(graph, announce)
+        if populate_others(place, graph, announce):
+            conclude(graph, announce)
         return report
 
 
@@ -124,13 +124,13 @@ def diagnose(
         announce("Keeping the diagnosis")
         robot_id = identifier(data_set.robot.name)
         twin = None if found.twin is None else to_json(found.twin)
-        with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+        with Workspace(Path(workspace), database) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
                 record(apart, robot_id, document, found.evidence, twin)
             graph.load_ontology()
-            _map(place, graph)
+            map_rows(place, graph)
             reason(graph)
     return found
 
@@ -160,13 +160,13 @@ def adopt(
     robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> Path:
     """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
         robot_id = find_robot(place, robot)
         with staged(place, robot_id) as apart:
             adopt_twin(apart, robot_id)
             _populate_apart(apart, lambda line: None)
         graph.load_ontology()
-        _map(place, graph)
+        map_rows(place, graph)
         reason(graph)
         return _report(place, graph, robot_id)
 
@@ -180,7 +180,7 @@ def ask(
     graph_url: str | None = None,
 ) -> Table:
     """Answer a named question, of all robots or of one by its name, or one in SPARQL, from a workspace's graph."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
         return queries.ask(graph, question, robot)
 
 
@@ -188,7 +188,7 @@ def explain(
     triple: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> tuple[Explanation, ...]:
     """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
         return explain_triples(graph, triple)
 
 
@@ -205,7 +205,7 @@ def export(
     owl: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> None:
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
+    with Workspace.existing(Path(workspace), database) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
         export_owl(graph, owl)
 
 
@@ -215,8 +215,10 @@ def backup(
     """Write a workspace into one archive: graph, database, series, twins, diagnoses and reports; others may write."""
     check_place(archive)
     with Workspace.existing(Path(workspace), database) as place, ExitStack() as held:
-        graph = KnowledgeGraph(graph_url) if graph_url else None
-        if graph is None and place.graph_folder.exists():
+        if graph_url:
+            graph = KnowledgeGraph(graph_url)
+        else:
+            place.check_graph()
             graph = held.enter_context(Snapshot(place.graph_folder)).current()  # takes no lock
         keep(place, graph, archive)
 
@@ -236,12 +238,7 @@ def _check_effects(data_set: DataSet) -> None:
         raise InputError(f"{data_set.folder / 'dataset.toml'}: [twin] effects: {error}") from error
 
 
-def _graph(place: Workspace, url: str | None) -> KnowledgeGraph:
-    """Open the workspace's graph: in its folder, or on a SPARQL server."""
-    return KnowledgeGraph(url or place.graph_folder, place.folder)
-
-
-def _map(place: Workspace, graph: KnowledgeGraph) -> None:
+def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
     documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
     refresh(graph, place.engine, documents, place.mapped_rows)
@@ -266,20 +263,21 @@ def _populate_apart(apart: Workspace, announce: Announce) -> None:
     """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
     with KnowledgeGraph(workspace=apart.folder) as graph:
         graph.load_ontology()
-        _map(apart, graph)
-        populate(apart, graph, lambda: _map(apart, graph), announce)
+        map_rows(apart, graph)
+        populate(apart, graph, lambda: map_rows(apart, graph), announce)
 
 
-def _populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
+def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
     """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other."""
 
     def set_aside(robot_id: str, reason: InputError) -> None:
         announce(f"  {robot_id} is set aside: {reason}; `irtwin drop {robot_id}` takes it out")
 
-    return populate(place, graph, lambda: _map(place, graph), announce, set_aside)
+    return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
 
 
-def _reason(graph: KnowledgeGraph, announce: Announce) -> None:
+def conclude(graph: KnowledgeGraph, announce: Announce) -> None:
+    """Reason over the graph and check its constraints; say what was found."""
     announce("Reasoning")
     inferred = reason(graph)
     announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, exists, inspect, select, update
+from sqlalchemy import URL, exists, func, inspect, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -20,6 +20,11 @@ from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Joint, Robo
 from irtwin.storage.series import FOLDER, inside, is_whole, read_series, write_series
 
 Outcome = Literal["new", "unchanged", "replaced"]
+_DATABASE = "irtwin.db"
+_FROM_A_BACKUP = (
+    "`irtwin restore ARCHIVE --workspace NEW` makes another workspace of a backup; without one, run the data sets "
+    "again into a new one (where a server keeps the database, give --database)"
+)
 TWINS, DIAGNOSES = "twins", "diagnoses"
 
 
@@ -37,14 +42,18 @@ class Workspace:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{folder}: cannot make the workspace: {error.strerror}; choose another folder") from None
-        self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / "irtwin.db")))
+        if url is None:
+            _check_that_nothing_is_lost(folder)
+        self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
+        engine.check(self.engine)
         self._make_tables()
 
     @classmethod
     def existing(cls, folder: Path, url: str | None = None) -> Self:
         """Open a workspace that must be there already. Raises InputError where it is not."""
-        if url is None and not (folder / "irtwin.db").is_file():
+        if url is None and not (folder / _DATABASE).is_file():
+            _check_that_nothing_is_lost(folder)
             raise InputError(f"{folder}: no workspace here; run `irtwin run DATASET --workspace {folder}` first")
         return cls(folder, url)
 
@@ -52,6 +61,17 @@ class Workspace:
     def graph_folder(self) -> Path:
         """Where the graph's store lies."""
         return self.folder / "graph"
+
+    def check_graph(self) -> None:
+        """Raise InputError where the graph's folder is not there, though the database knows of robots."""
+        with self.reading() as session:
+            robots = session.scalar(select(func.count()).select_from(Robot))
+        if robots and not (self.graph_folder / "CURRENT").is_file():
+            raise InputError(
+                f"{self.graph_folder}: the graph is missing, or a part of its files; nothing of the database is lost: "
+                f"`irtwin repair --workspace {self.folder}` makes the graph anew of it (where a server keeps the "
+                "graph, give --graph)"
+            )
 
     @property
     def mapped_rows(self) -> Path:
@@ -151,12 +171,13 @@ class Workspace:
 
     def read_document(self, path: str, checksum: str) -> bytes:
         """Read a document by its path and SHA-256. Raises InputError where it is gone or another."""
+        again = "run or diagnose its data set again"
         try:
             content = inside(self.folder, path).read_bytes()
         except OSError as error:
-            raise InputError(f"{self.folder / path}: cannot be read: {error.strerror}; diagnose again") from None
+            raise InputError(f"{self.folder / path}: cannot be read ({error.strerror}); {again}") from None
         if hashlib.sha256(content).hexdigest() != checksum:
-            raise InputError(f"{self.folder / path}: changed since it was written; diagnose again")
+            raise InputError(f"{self.folder / path}: changed since it was written; {again}")
         return content
 
     def remove_orphans(self) -> None:
@@ -218,14 +239,31 @@ class Workspace:
 
     def _make_tables(self) -> None:
         tables = Base.metadata.sorted_tables
-        if not inspect(self.engine).has_table(tables[-1].name):  # readers need not wait for the lock
+        there = inspect(self.engine).get_table_names()
+        if not any(table.name in there for table in tables):  # readers need not wait for the lock
+            if self.engine.dialect.name == "sqlite":
+                _check_that_nothing_is_lost(self.folder, "its database holds no tables")
             with self._writing() as session:
                 Base.metadata.create_all(session.connection())
         inspector = inspect(self.engine)
         for table in tables:
-            known = inspector.get_columns(table.name) if inspector.has_table(table.name) else []
+            if not inspector.has_table(table.name):
+                raise InputError(
+                    f"{engine.shown(self.engine.url)}: table {table.name} is missing, damaged or of another irtwin "
+                    f"version; {_FROM_A_BACKUP}"
+                )
+            known = inspector.get_columns(table.name)
             if {column["name"] for column in known} != set(table.columns.keys()):
                 raise InputError(
                     f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
                     "choose a new workspace and ingest again"
                 )
+
+
+def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missing") -> None:
+    """Raise InputError where files lie in a workspace that only a database could have named."""
+    if what.startswith(_DATABASE) and (folder / _DATABASE).exists():
+        return
+    for name in ("graph", FOLDER, TWINS, DIAGNOSES):
+        if next((folder / name).glob("[!.]*"), None) is not None:
+            raise InputError(f"{folder}: {what}, though {name}/ is full; {_FROM_A_BACKUP}")

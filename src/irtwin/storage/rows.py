@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import RowMapping, Select, Table, delete, insert, select
+from sqlalchemy import Connection, RowMapping, Select, Table, delete, insert, select
 from sqlalchemy.orm import Session
 
 from irtwin.storage.schema import LIVE, Activity, Base, Joint, Robot, Run, Series, in_utc
@@ -65,12 +65,12 @@ def data_set_rows(session: Session, robot_id: str) -> Rows:
     }
 
 
-def named_files(session: Session) -> list[NamedFile]:
+def named_files(connection: Connection) -> list[NamedFile]:
     """Return the files of the workspace that the database names."""
     found = []
     for table, columns in _FILES.items():
         for file, checksum in columns:
-            rows = session.execute(select(Base.metadata.tables[table])).mappings()
+            rows = connection.execute(select(Base.metadata.tables[table])).mappings()
             found += [NamedFile(row[file], row[checksum], _owner(row)) for row in rows if row[file] is not None]
     return found
 
