@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from irtwin.errors import InputError
+from irtwin.knowledge import store_files
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
@@ -47,9 +48,12 @@ def telling(method: Method) -> Method:
 
 
 def check_files(folder: Path) -> None:
-    """Raise InputError where a folder holds files of a store but not the one to begin with: it would begin anew."""
+    """Raise InputError where files of a store are missing or altered. Without the first one it would begin anew."""
     if not (folder / "CURRENT").is_file() and next(folder.glob("[0-9M]*"), None) is not None:
         raise InputError(damaged(folder, "its file CURRENT is missing"))
+    fault = store_files.fault(folder)
+    if fault is not None:
+        raise InputError(damaged(folder, fault))
 
 
 def damaged(folder: Path, reason: str) -> str:

@@ -20,6 +20,7 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+from irtwin.knowledge import store_files
 from irtwin.knowledge.blank_nodes import has_blank_node, same
 from irtwin.knowledge.damage import check_files, telling, told
 from irtwin.knowledge.rdf_input import read_rdf, refuse
@@ -51,6 +52,7 @@ class KnowledgeGraph:
 
     def __init__(self, place: Path | str | None = None, workspace: Path | None = None):
         self._store: Store | SparqlServer
+        self._read_only = False
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
@@ -76,7 +78,7 @@ class KnowledgeGraph:
         Raises OSError or RuntimeError where that process changed the files just now.
         """
         graph = cls.__new__(cls)
-        graph.folder = path
+        graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
         graph._workspace = workspace or path.parent
         return graph
@@ -90,6 +92,10 @@ class KnowledgeGraph:
 
     def close(self) -> None:
         """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
+        if self.folder is not None and isinstance(self._store, Store) and not self._read_only:
+            with told(self.folder):
+                self._store.flush()
+                store_files.note_sums(self.folder)
         self._store = Store()
 
     def load_ontology(self) -> None:

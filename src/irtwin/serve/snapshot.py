@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Self
 
 from irtwin.errors import InputError
+from irtwin.knowledge.damage import check_files
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.serve.linked import linked, remove_left_behind
 
@@ -35,6 +36,7 @@ class Snapshot:
     def __init__(self, folder: Path):
         self._folder = folder
         self._view = ExitStack()
+        check_files(folder)
         remove_left_behind(folder)
         self._open()
 
