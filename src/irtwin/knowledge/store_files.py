@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from zlib import crc32
 
@@ -36,7 +37,10 @@ def fault(folder: Path) -> str | None:
 def note_sums(folder: Path) -> None:
     """Note the CRC-32 of the tables, so that a later change of them is found."""
     known = _sums(folder)
-    sums = {name: known.get(name) or _crc(folder / name) for name in _tables(folder) or {}}
+    sums = {}
+    for name in _tables(folder) or {}:
+        with suppress(FileNotFoundError):  # the store has merged it into another meanwhile
+            sums[name] = known[name] if name in known else _crc(folder / name)
     if sums != known:
         temporary = folder / f".{_SUMS}"
         temporary.write_text(json.dumps(sums))
