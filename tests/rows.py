@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ def twin(twin_id: str) -> list[Base]:
             robot_id=ROBOT,
             created=NOON,
             file=f"twins/{twin_id}.json",
-            sha256="2" * 64,
+            sha256=sha256(b"{}").hexdigest(),
             split="by run",
         ),
         TwinRun(twin_id=twin_id, run_id=f"{ROBOT}.work", part="fit"),

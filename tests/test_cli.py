@@ -48,7 +48,19 @@ def test_help_imports_nothing_heavy():
     code = f"import sys, irtwin.cli; print([m for m in sys.modules if m in {HEAVY!r}])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
     text = irtwin("--help").stdout
-    for command in ("run", "demo", "diagnose", "predict", "adopt", "query", "export", "excite", "map"):
+    for command in (
+        "run",
+        "demo",
+        "diagnose",
+        "predict",
+        "adopt",
+        "drop",
+        "repair",
+        "query",
+        "export",
+        "excite",
+        "map",
+    ):
         assert f"  {command} " in text
 
 

@@ -383,6 +383,36 @@ def live(workspace: Path, database: str | None, graph_url: str | None, port: int
 
 
 @cli.command()
+@click.argument("robot")
+@_workspace
+@_database
+@_graph
+def drop(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Forget a ROBOT, by its name.
+
+    Its data set, twin, diagnosis, live runs and report, and all that the graph says of it.
+    """
+    from irtwin import upkeep
+
+    upkeep.drop(robot, workspace, database=database, graph_url=graph_url)
+
+
+@cli.command()
+@_workspace
+@_database
+def repair(workspace: Path, database: str | None) -> None:
+    """Make a damaged graph anew from the database.
+
+    Says which series, twins and diagnoses are missing or altered: exit status 2 then. A damaged database comes back by
+    `restore`.
+    """
+    from irtwin import upkeep
+
+    upkeep.repair(workspace, database=database, announce=_say)
+    click.echo(workspace)
+
+
+@cli.command()
 @click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
 @_workspace
 @_database

@@ -44,7 +44,7 @@ def watch(
 
     with (
         Workspace.existing(workspace, database) as place,
-        KnowledgeGraph(graph_url or place.graph_folder, place.folder) as graph,
+        KnowledgeGraph.of_workspace(place, graph_url) as graph,
         LiveTwin(place, graph, announce) as twin,
     ):
         reader = StateReader(twin.joints)

@@ -31,13 +31,14 @@ from irtwin.knowledge.validation import validate
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
-from irtwin.providers.records import identifier, ingest, load_robot, robot_iri
+from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, robot_iri
 from irtwin.report.gap import render_alone
 from irtwin.report.render import render
 from irtwin.report.scene import draw_scene
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
+from irtwin.storage.staging import staged
 from irtwin.twin.files import load, to_json
 
 Announce = Callable[[str], None]
@@ -64,21 +65,16 @@ def run(
     _check_effects(data_set)
     for line in data_set.repairs:
         announce(f"  {line}")
-    with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
-        outcome = ingest(place, data_set)
-        announce(f"  {outcome}")
+    with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        robot_id = _take_in(place, data_set, announce)
         graph.load_ontology()
-        _map(place, graph)
-        announce("Populating what the graph lacks")
-        populate(place, graph, lambda: _map(place, graph), announce)
-        announce("Reasoning")
-        inferred = reason(graph)
-        announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
-        for violation in validate(graph):
-            announce(f"  {violation}")
+        map_rows(place, graph)
+        conclude(graph, announce)
         announce("Writing the report")
-        return _report(place, graph, identifier(data_set.robot.name))
+        report = _report(place, graph, robot_id)
+        if populate_others(place, graph, announce):
+            conclude(graph, announce)
+        return report
 
 
 def diagnose(
@@ -121,17 +117,15 @@ def diagnose(
         render_alone(data_set, document, found.evidence, report)
     if workspace is not None:
         announce("Keeping the diagnosis")
-        with Workspace(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-            ingest(place, data_set)
-            record(
-                place,
-                identifier(data_set.robot.name),
-                document,
-                found.evidence,
-                None if found.twin is None else to_json(found.twin),
-            )
+        robot_id = identifier(data_set.robot.name)
+        twin = None if found.twin is None else to_json(found.twin)
+        with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+            check_name(place, data_set.robot.name)
+            with staged(place, robot_id) as apart:
+                ingest(apart, data_set)
+                record(apart, robot_id, document, found.evidence, twin)
             graph.load_ontology()
-            _map(place, graph)
+            map_rows(place, graph)
             reason(graph)
     return found
 
@@ -161,12 +155,13 @@ def adopt(
     robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> Path:
     """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
-    robot_id = identifier(robot)
-    with Workspace.existing(Path(workspace), database) as place, _graph(place, graph_url) as graph:
-        adopt_twin(place, robot_id)
+    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        robot_id = find_robot(place, robot)
+        with staged(place, robot_id) as apart:
+            adopt_twin(apart, robot_id)
+            _populate_apart(apart, lambda line: None)
         graph.load_ontology()
-        _map(place, graph)
-        populate(place, graph, lambda: _map(place, graph), lambda line: None)
+        map_rows(place, graph)
         reason(graph)
         return _report(place, graph, robot_id)
 
@@ -177,8 +172,10 @@ def backup(
     """Write a workspace into one archive: graph, database, series, twins, diagnoses and reports; others may write."""
     check_place(archive)
     with Workspace.existing(Path(workspace), database) as place, ExitStack() as held:
-        graph = KnowledgeGraph(graph_url) if graph_url else None
-        if graph is None and place.graph_folder.exists():
+        if graph_url:
+            graph = KnowledgeGraph(graph_url)
+        else:
+            place.check_graph()
             graph = held.enter_context(Snapshot(place.graph_folder)).current()  # takes no lock
         keep(place, graph, archive)
 
@@ -199,21 +196,62 @@ def _check_effects(data_set: DataSet) -> None:
 
 
 @contextmanager
-def _graph(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
+def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
     """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server.
 
     Who reads the folder meanwhile sees what was there before, if anything was.
     """
-    with KnowledgeGraph(url or place.graph_folder, place.folder) as graph, ExitStack() as held:
+    with KnowledgeGraph.of_workspace(place, url) as graph, ExitStack() as held:
         if url is None and graph.graphs():
             held.enter_context(kept(place.graph_folder))
         yield graph
 
 
-def _map(place: Workspace, graph: KnowledgeGraph) -> None:
+def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
     documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
     refresh(graph, place.engine, documents, place.mapped_rows)
+
+
+def _take_in(place: Workspace, data_set: DataSet, announce: Announce) -> str:
+    """Ingest a data set and populate what follows from it, all or nothing; return the robot_id."""
+    robot_id = identifier(data_set.robot.name)
+    check_name(place, data_set.robot.name)
+    announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
+    with staged(place, robot_id) as apart:
+        announce(f"  {ingest(apart, data_set)}")
+        announce("Populating what the graph lacks")
+        try:
+            _populate_apart(apart, announce)
+        except InputError as error:
+            raise InputError(f"{data_set.folder}: {error}; nothing of this data set was stored") from error
+    return robot_id
+
+
+def _populate_apart(apart: Workspace, announce: Announce) -> None:
+    """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
+    with KnowledgeGraph(workspace=apart.folder) as graph:
+        graph.load_ontology()
+        map_rows(apart, graph)
+        populate(apart, graph, lambda: map_rows(apart, graph), announce)
+
+
+def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
+    """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other."""
+
+    def set_aside(robot_id: str, reason: InputError) -> None:
+        announce(f"  {robot_id} is set aside: {reason}; `irtwin drop {robot_id}` takes it out")
+
+    return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
+
+
+def conclude(graph: KnowledgeGraph, announce: Announce) -> None:
+    """Reason over the graph and check its constraints; say what was found."""
+    announce("Reasoning")
+    inferred = reason(graph)
+    announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
+    for violation in validate(graph):
+        announce(f"  {violation}")
 
 
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:

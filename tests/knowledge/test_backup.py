@@ -10,13 +10,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from pyoxigraph import NamedNode, Triple
 from sqlalchemy import func, select
 
 import rows
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.backup import backup, restore
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.storage.database import Workspace
@@ -29,7 +30,9 @@ State = tuple[dict[str, list[tuple[object, ...]]], dict[str, str], int]
 def fill(place: Workspace) -> None:
     place.ingest(*rows.data_set())
     made = [*rows.twin(f"{rows.ROBOT}.abc")]
-    place.replace_activity(rows.activity("twin.1", "identification"), [], made, documents={"twins/a.json": b"{}"})
+    place.replace_activity(
+        rows.activity("twin.1", "identification"), [], made, documents={f"twins/{rows.ROBOT}.abc.json": b"{}"}
+    )
     report = place.report_path(rows.ROBOT)
     report.parent.mkdir()
     report.write_text("<html>")
@@ -121,6 +124,10 @@ with Workspace(Path(sys.argv[1])) as place:
 """
 
 
+KNOWING = KnowledgeGraph()
+KNOWING.replace(in_graph([Triple(NamedNode("a:a"), NamedNode("a:a"), NamedNode("a:a"))], GRAPH_SOURCE), GRAPH_SOURCE)
+
+
 def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> None:
     filled = Workspace(tmp_path / "before")
     tests = Path(rows.__file__).parent
@@ -129,7 +136,7 @@ def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> Non
         assert process.stdout is not None
         process.stdout.readline()
         for number in range(2):
-            backup(filled, None, tmp_path / f"{number}.zip")
+            backup(filled, KNOWING, tmp_path / f"{number}.zip")
         process.kill()
         written = process.stdout.read().split()
     filled.close()
@@ -168,7 +175,7 @@ def refuse(archive: Path, message: str) -> None:
     with pytest.raises(InputError, match=message):
         restore(archive, folder)
     assert not folder.exists()
-    assert not list(archive.parent.glob(".restore-*"))
+    assert not list(archive.parent.glob(".irtwin-restore-*"))
     assert not (archive.parent / "outside").exists()
 
 
@@ -256,3 +263,32 @@ def test_nothing_is_overwritten(archive: Path, filled: Workspace, tmp_path: Path
     (tmp_path / "empty").mkdir()
     restore(archive, tmp_path / "empty")
     assert (tmp_path / "empty" / "irtwin.db").is_file()
+
+
+def test_a_lost_or_altered_file_is_not_backed_up(tmp_path: Path) -> None:
+    with Workspace(tmp_path / "before") as place:
+        fill(place)
+        for damage in (lambda file: file.write_bytes(b"PAR1"), Path.unlink):
+            for name in ("series", "twins"):
+                file = next((place.folder / name).iterdir())
+                content = file.read_bytes()
+                damage(file)
+                with (
+                    KnowledgeGraph(place.graph_folder) as graph,
+                    pytest.raises(InputError, match=f"{file.name} (altered|missing); nothing was written"),
+                ):
+                    backup(place, graph, tmp_path / "kept.zip")
+                file.write_bytes(content)
+        assert [path.name for path in tmp_path.iterdir()] == ["before"]
+        assert not list(place.folder.glob(".*"))
+
+
+def test_an_incomplete_archive_of_an_earlier_version_is_told(archive: Path, filled: Workspace) -> None:
+    with filled.reading() as session:
+        path = session.scalars(select(Series.path)).first()
+    refuse(altered(archive, lambda contents: contents.pop(path)), f"{path} missing or altered; use another backup")
+    refuse(altered(archive, lambda contents: contents.update({path: b"PAR1"})), "missing or altered")
+    refuse(altered(archive, lambda contents: contents.pop("graph.nq")), "incomplete: it holds no graph")
+    refuse(
+        altered(archive, lambda contents: contents.update({"graph.nq": b""})), "incomplete: its graph knows no robot"
+    )

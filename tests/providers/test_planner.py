@@ -93,3 +93,24 @@ def test_each_runs_once_and_the_graph_is_refreshed_after_it(graph, monkeypatch):
     assert len(ran) == len(set(ran)) == len(kept)
     assert all(activity.started <= activity.ended for activity in kept)
     assert refreshed[-1] == len(ran)
+
+
+def test_a_robot_that_a_provider_refuses_is_set_aside_and_others_go_on(graph, monkeypatch):
+    refused, kept = [], []
+
+    def provide(workspace: object, key: str) -> provider.Made:
+        if key.startswith("B"):
+            raise InputError("its torque is dead")
+        return provider.Made(key[0], [], [])
+
+    monkeypatch.setattr(planner, "load_provider", lambda name: provide)
+    workspace = SimpleNamespace(replace_activity=lambda activity, *_: kept.append(activity.subject.rpartition("/")[2]))
+
+    def populate(*set_aside: planner.SetAside) -> bool:
+        return planner.populate(workspace, graph, lambda: None, lambda line: None, *set_aside)
+
+    assert populate(lambda robot_id, reason: refused.append((robot_id, str(reason))))
+    assert refused == [("B", "its torque is dead")]  # once, though its run would be refused too
+    assert "A.2" in kept
+    with pytest.raises(InputError, match="its torque is dead"):
+        populate()

@@ -36,7 +36,7 @@ elif point == "second file":
         kill() if len(calls) == 2 else put(*arguments)
     files.put_in_place = second
 elif point == "rows dropped":
-    database._insert = kill
+    database.insert_rows = kill
 elif point == "rows written":
     event.listen(workspace.engine, "commit", kill)
 elif point == "committed":

@@ -9,41 +9,42 @@ import json
 import os
 import re
 import shutil
-import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from pyoxigraph import NamedNode, Quad, QuerySolutions, RdfFormat, parse, serialize
+from pyoxigraph import NamedNode, Quad, RdfFormat, parse, serialize
 from sqlalchemy import Connection, Table, func, insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from irtwin.errors import InputError
+from irtwin.knowledge.damage import told
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.source import snapshot_options
-from irtwin.storage import engine
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE
+from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
-from irtwin.storage.database import DIAGNOSES, LIVE, TWINS, Workspace
-from irtwin.storage.schema import Base, Moment
+from irtwin.storage.database import DIAGNOSES, TWINS, Workspace
+from irtwin.storage.rows import NamedFile, named_files
+from irtwin.storage.schema import LIVE, Base, Moment, Robot
 from irtwin.storage.series import FOLDER
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, LIVE, "reports")
 _GRAPH = "graph.nq"
-_NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_-][A-Za-z0-9_.-]*")
+_NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*")
 _AT_ONCE = 5000  # rows
-_ALL = "SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } }"
 
 
-def backup(place: Workspace, graph: KnowledgeGraph | None, archive: Path) -> None:
+def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
     """Write a workspace into an archive, whole or not at all, while others may write.
 
     Rows and files are those of one moment: files are linked while the writers' lock is held, rows read from a snapshot
     taken then. The graph is that of a moment just after; what it lacks or has more is set right by the next mapping.
+    Raises InputError where a file that the database names is missing or altered, or the graph is damaged.
     """
-    with tempfile.TemporaryDirectory(prefix=".backup-", dir=place.folder) as name:
-        held = Path(name)
+    with files.working_folder(place.folder, ".backup-") as held:
         with place.engine.connect() as connection:
             connection.execution_options(**snapshot_options(place.engine))
             with connection.begin():
@@ -51,11 +52,18 @@ def backup(place: Workspace, graph: KnowledgeGraph | None, archive: Path) -> Non
                     connection.execute(select(func.count()).select_from(Base.metadata.sorted_tables[0]))
                     contents = dict(_linked(place.folder, held))
                 contents |= _dump_rows(connection, held)
-        if graph is not None:
-            serialize(_quads(graph), str(held / _GRAPH), RdfFormat.N_QUADS)
-            contents[_GRAPH] = held / _GRAPH
+                named = named_files(connection)
+        lost = [file for file in named if file.path not in contents]
+        if lost:
+            raise InputError(_incomplete(place.folder, lost, "missing", "nothing was written"))
+        with told(graph.folder):
+            serialize(graph.quads(), str(held / _GRAPH), RdfFormat.N_QUADS)
+        contents[_GRAPH] = held / _GRAPH
         about = {"software": f"irtwin {version('irtwin')}", "created": datetime.now(UTC).isoformat(timespec="seconds")}
-        pack(contents, archive, about)
+        altered = pack(contents, archive, about, {file.path: file.sha256 for file in named})
+        lost = [file for file in named if file.path in altered]
+        if lost:
+            raise InputError(_incomplete(place.folder, lost, "altered", "nothing was written"))
 
 
 def restore(archive: Path, folder: Path, database: str | None = None, graph_url: str | None = None) -> None:
@@ -67,24 +75,39 @@ def restore(archive: Path, folder: Path, database: str | None = None, graph_url:
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise InputError(f"{folder}: is there already; restore into a new folder")
     folder.absolute().parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".restore-", dir=folder.absolute().parent) as name:
-        held = Path(name) / "workspace"
-        held.mkdir()
-        names = set(unpack(archive, held, _NAMES))
+    with files.working_folder(folder.absolute().parent, ".irtwin-restore-") as working:
+        held = working / "workspace"
         with Workspace(held, database) as place:
-            with KnowledgeGraph(graph_url or place.graph_folder) as graph:
+            sums = dict(unpack(archive, held, _NAMES))
+            with KnowledgeGraph(graph_url or place.graph_folder, held) as graph:
                 if graph.graphs():
                     raise InputError(f"{graph_url}: the server holds a graph already; give an empty one")
-                if _GRAPH in names:
+                with engine.writing(place.engine) as session:
+                    for table in Base.metadata.sorted_tables:
+                        _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")
+                    lost = [file for file in named_files(session.connection()) if sums.get(file.path) != file.sha256]
+                    if lost:
+                        raise InputError(_incomplete(archive, lost, "missing or altered", "use another backup"))
+                    if _GRAPH not in sums:
+                        raise InputError(f"{archive}: incomplete: it holds no graph; use another backup")
+                    robots = session.scalar(select(func.count()).select_from(Robot))
+                    names = (str(quad.graph_name) for quad in _read_quads(archive, held / _GRAPH))
+                    if robots and not any(name.startswith(f"<{GRAPH_SOURCE}") for name in names):
+                        raise InputError(f"{archive}: incomplete: its graph knows no robot; use another backup")
                     graph.replace(_read_quads(archive, held / _GRAPH), "")
-            with engine.writing(place.engine) as session:
-                for table in Base.metadata.sorted_tables:
-                    _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")
         shutil.rmtree(held / "rows", ignore_errors=True)
         (held / _GRAPH).unlink(missing_ok=True)
         if folder.exists():
             folder.rmdir()
         held.rename(folder)
+
+
+def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) -> str:
+    robots = ", ".join(sorted({file.robot_id for file in lost}))
+    return (
+        f"{place}: {lost[0].path}{f' and {len(lost) - 1} more files' if len(lost) > 1 else ''} {what}; {then}: run the "
+        f"data set of {robots} again, or take the robot out by `irtwin drop`"
+    )
 
 
 def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
@@ -144,12 +167,6 @@ def _in_chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]
             chunk = []
     if chunk:
         yield chunk
-
-
-def _quads(graph: KnowledgeGraph) -> Iterator[Quad]:
-    """Yield the quads of all named graphs, as one query sees them."""
-    for row in cast(QuerySolutions, graph.answer(_ALL)):
-        yield Quad(row["s"], row["p"], row["o"], row["g"])
 
 
 def _read_quads(archive: Path, file: Path) -> Iterator[Quad]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from pyoxigraph import (
     DefaultGraph,
@@ -20,7 +20,9 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+from irtwin.knowledge import store_files
 from irtwin.knowledge.blank_nodes import has_blank_node, same
+from irtwin.knowledge.damage import check_files, telling, told
 from irtwin.knowledge.keywords import refuse_service
 from irtwin.knowledge.rdf_input import read_rdf, refuse
 from irtwin.knowledge.series_functions import Functions, series_functions
@@ -34,6 +36,8 @@ from irtwin.resources import folder
 
 if TYPE_CHECKING:
     import rdflib  # half a second to import, for those who ask for it
+
+    from irtwin.storage.database import Workspace
 
 MOST_ROWS = 1_000_000
 
@@ -50,14 +54,24 @@ class KnowledgeGraph:
 
     def __init__(self, place: Path | str | None = None, workspace: Path | None = None):
         self._store: Store | SparqlServer
+        self._read_only = False
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
-        try:
-            if place is None:
-                self._store = Store()
-            else:
-                self._store = SparqlServer(str(place)) if is_url(place) else Store(str(place))
-        except OSError as error:
-            raise InputError(f"{place}: the graph cannot be opened: {error}") from error
+        self.folder = None if place is None or is_url(place) else Path(place)
+        if self.folder is None:
+            self._store = Store() if place is None else SparqlServer(str(place))
+            return
+        check_files(self.folder)
+        with told(self.folder):
+            self._store = Store(str(self.folder))
+        for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
+            old.unlink(missing_ok=True)
+
+    @classmethod
+    def of_workspace(cls, place: Workspace, url: str | None = None) -> Self:
+        """Open a workspace's graph: in its folder, or on a SPARQL server. InputError where it is damaged or lost."""
+        if url is None:
+            place.check_graph()
+        return cls(url or place.graph_folder, place.folder)
 
     @classmethod
     def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
@@ -66,6 +80,7 @@ class KnowledgeGraph:
         Raises OSError or RuntimeError where that process changed the files just now.
         """
         graph = cls.__new__(cls)
+        graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
         graph._workspace = workspace or path.parent
         return graph
@@ -79,6 +94,10 @@ class KnowledgeGraph:
 
     def close(self) -> None:
         """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
+        if self.folder is not None and isinstance(self._store, Store) and not self._read_only:
+            with told(self.folder):
+                self._store.flush()
+                store_files.note_sums(self.folder)
         self._store = Store()
 
     def load_ontology(self) -> None:
@@ -88,6 +107,7 @@ class KnowledgeGraph:
             in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
         )
 
+    @telling
     def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
         """Make the quads the whole content of the named graphs whose IRIs start with one of `below`.
 
@@ -109,6 +129,7 @@ class KnowledgeGraph:
             self._store.flush()
         return changed
 
+    @telling
     def change(self, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
         """Take quads out of their named graphs and put others in, in one transaction; the rest stays untouched.
 
@@ -134,24 +155,34 @@ class KnowledgeGraph:
         found = (self._store.quads_for_pattern(it.subject, it.predicate, it.object, None) for it in triples)
         return (quad for quads in found for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
 
+    def quads(self) -> Iterator[Quad]:
+        """Yield the quads of all named graphs, as one query sees them."""
+        for row in cast(QuerySolutions, self.answer("SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } }")):
+            yield Quad(row["s"], row["p"], row["o"], row["g"])
+
+    @telling
     def graphs_with(self, triple: Triple) -> list[str]:
         """Return the IRIs of the named graphs that hold a triple."""
         return [quad.graph_name.value for quad in self._holding([triple]) if isinstance(quad.graph_name, NamedNode)]
 
+    @telling
     def holds(self, triple: Triple) -> bool:
         """Whether some named graph holds a triple."""
         return next(iter(self._holding([triple])), None) is not None
 
+    @telling
     def graphs(self, *below: str) -> list[str]:
         """Return the IRIs of the named graphs, of all or of those that start with one of `below`."""
         return sorted(name for name in _names(self._store) if not below or name.startswith(below))
 
+    @telling
     def triples(self, *below: str) -> set[Triple]:
         """Return the triples of the named graphs whose IRIs start with one of `below`, of all without it."""
         if not below:
             return {quad.triple for quad in self._store.quads_for_pattern(None, None, None, DefaultGraph())}
         return {triple for name in self.graphs(*below) for triple in _read(self._store, name)}
 
+    @telling
     def query(self, text: str, bindings: Mapping[str, str] | None = None) -> Table:
         """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
 
@@ -172,12 +203,14 @@ class KnowledgeGraph:
         found = ((triple.subject, triple.predicate, triple.object) for triple in _counted(answer))
         return Table(columns, tuple(dict(zip(columns, map(to_python, triple), strict=True)) for triple in found))
 
+    @telling
     def construct(self, text: str) -> set[Triple]:
         """Return the triples that a CONSTRUCT makes of the union of all named graphs."""
         triples = self.answer(text)
         assert not isinstance(triples, QuerySolutions | QueryBoolean)
         return set(triples)
 
+    @telling
     def answer(
         self,
         text: str,
@@ -209,6 +242,7 @@ class KnowledgeGraph:
                 raise InputError(f"{error}: see the functions of ontology/providers.ttl and of SPARQL 1.1") from None
             raise
 
+    @telling
     def update(
         self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str = ID
     ) -> None:

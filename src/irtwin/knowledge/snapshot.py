@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from irtwin.errors import InputError
+from irtwin.knowledge.damage import check_files
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.linked import found, linked, published, remove_left_behind
 
@@ -53,6 +54,7 @@ class Snapshot:
         self._folder = folder
         self._view = ExitStack()
         remove_left_behind(folder)
+        check_files(folder)
         self._open()
 
     def __enter__(self) -> Self:

@@ -17,7 +17,7 @@ from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.series import inside
-from irtwin.twin.files import load
+from irtwin.twin.files import from_json
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate
 
@@ -37,7 +37,8 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         robot_id = session.get_one(schema.Run, run_id).robot_id
         row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one()
         role = session.get_one(schema.TwinRun, (row.twin_id, run_id))
-    twin = load(inside(workspace.folder, row.file))
+    document = workspace.read_document(row.file, row.sha256).decode()
+    twin = from_json(document, inside(workspace.folder, row.file))
     robot = load_robot(workspace, robot_id)
     motion = condition(load_run(workspace, robot, run_id), robot, twin.cutoff)
     ledger = twin.ledger(motion)

@@ -17,7 +17,8 @@ from irtwin.providers.records import load_robot, load_run, run_iri
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
-from irtwin.storage.database import LIVE, TWINS, Workspace
+from irtwin.storage.database import TWINS, Workspace
+from irtwin.storage.schema import LIVE
 from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin

@@ -28,9 +28,9 @@ from irtwin.providers import live_run
 from irtwin.providers.joint_stream import State
 from irtwin.providers.records import run_iri
 from irtwin.providers.watched_run import WatchedRun
-from irtwin.storage.database import LIVE, Workspace
-from irtwin.storage.journal import Header, Journal, left_behind, read_journal
-from irtwin.storage.schema import Joint, Run
+from irtwin.storage.database import Workspace
+from irtwin.storage.journal import DamagedJournal, Header, Journal, left_behind, read_journal
+from irtwin.storage.schema import LIVE, Joint, Run
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
@@ -228,6 +228,11 @@ class LiveTwin:
         for path in left_behind(self._folder):
             try:
                 header, samples = read_journal(path)
+            except DamagedJournal as error:
+                aside = path.with_suffix(".damaged")
+                path.rename(aside)
+                self._announce(f"{error}; what it held is lost to the graph, the file is kept as {aside}")
+                continue
             except ValueError:
                 self._announce(f"{path}: a crash cut it off before its first sample; dropped")
                 path.unlink()

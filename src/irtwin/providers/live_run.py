@@ -15,9 +15,8 @@ import pyarrow as pa
 from irtwin.providers.joint_stream import State
 from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
-from irtwin.storage.database import LIVE
 from irtwin.storage.journal import Header, Rows
-from irtwin.storage.schema import Activity, Base, JointState, LiveState, Run, RunState
+from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunState
 
 PREFIXES = ("q", "dq", "tau", "temp")  # of the columns for a State's values of each joint, as in a log
 _MADE: dict[str, type[Base]] = {"run_state": RunState, "joint_state": JointState, "live_state": LiveState}

@@ -38,23 +38,45 @@ class Declaration:
     populates: frozenset[str]
 
 
+SetAside = Callable[[str, InputError], None]
+
+
 def populate(
-    workspace: Workspace, graph: KnowledgeGraph, refresh: Callable[[], None], announce: Callable[[str], None]
-) -> None:
+    workspace: Workspace,
+    graph: KnowledgeGraph,
+    refresh: Callable[[], None],
+    announce: Callable[[str], None],
+    set_aside: SetAside | None = None,
+) -> bool:
     """Run every provider on every individual that lacks what it populates and has what it requires.
 
     Providers run in dependency order, each once; `refresh` brings the graph up to date with the database
-    after each that made something.
+    after each that made something. Returns whether any did.
+
+    A robot whose data a provider refuses is left as it is from there on, and `set_aside` is told its robot_id and why;
+    without `set_aside` the InputError is raised.
     """
+    refused: set[str] = set()
+    made_something = False
     for declaration in in_order(declarations(graph)):
-        subjects = lacking(graph, declaration)
+        subjects = [subject for subject in lacking(graph, declaration) if _robot_id(subject) not in refused]
         if not subjects:
             continue
         announce(f"  {declaration.name}: {len(subjects)} individual{'s' if len(subjects) > 1 else ''}")
         provide = load_provider(declaration.name)
+        count = 0
         for subject in subjects:
+            if _robot_id(subject) in refused:
+                continue
             started = datetime.now(UTC)
-            made = provide(workspace, subject.rpartition("/")[2])
+            try:
+                made = provide(workspace, subject.rpartition("/")[2])
+            except InputError as error:
+                if set_aside is None:
+                    raise
+                refused.add(_robot_id(subject))
+                set_aside(_robot_id(subject), error)
+                continue
             activity = Activity(
                 activity_id=f"{declaration.name}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
                 robot_id=made.robot_id,
@@ -65,7 +87,16 @@ def populate(
                 software=f"irtwin {version('irtwin')}",
             )
             workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
-        refresh()
+            count += 1
+        if count:
+            made_something = True
+            refresh()
+    return made_something
+
+
+def _robot_id(subject: str) -> str:
+    """Return the robot that a robot's or a run's IRI is about."""
+    return subject.rpartition("/")[2].partition(".")[0]
 
 
 def declarations(graph: KnowledgeGraph) -> list[Declaration]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import json
 import math
 import re
+import unicodedata
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,6 +25,8 @@ from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.schema import Joint, Robot, Run
 
 _INDIVIDUALS = "https://w3id.org/irtwin/id/"
+_PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
+_READABLE = 40  # characters of a name that is not plain
 # signal of a run -> prefix of its columns in the log format
 _PER_JOINT = {"q": "q", "dq": "dq", "ddq": "ddq", "torque": "tau", "current": "i", "temperature": "temp"}
 
@@ -34,7 +38,7 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
     runs = [_run_row(robot_id, run, now) for run in data_set.runs]
     taken = {row.run_id for row in runs}
     if len(taken) < len(runs):
-        raise InputError(f"{data_set.folder}: two runs have names that differ in punctuation alone; rename one")
+        raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
     series = {
         row.run_id: signals_table(run.signals, data_set.robot) for row, run in zip(runs, data_set.runs, strict=True)
     }
@@ -43,8 +47,52 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
 
 
 def identifier(name: str) -> str:
-    """Return a name as it stands in IRIs and keys: letters, digits, "_" and "-"."""
-    return re.sub(r"[^A-Za-z0-9_-]", "_", name)
+    """Return a name as it stands in IRIs, keys and names of files; other names have others.
+
+    Letters, digits, "_" and "-" stay as they are. Any other name, and one too long for a file's, is what of it can be
+    read, "~", and a checksum of the whole. Two ways to write the same letters in Unicode are the same name.
+    """
+    name = unicodedata.normalize("NFC", name)
+    if _PLAIN.fullmatch(name):
+        return name
+    readable = re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:_READABLE]
+    return f"{readable}~{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:16]}"
+
+
+def find_robot(workspace: Workspace, name: str) -> str:
+    """Return the robot_id of a robot by its name. Raises InputError, with the nearest name, where there is none."""
+    known = _names(workspace)
+    for robot_id, of in known.items():
+        if name == robot_id or identifier(of) == identifier(name):
+            return robot_id
+    near = difflib.get_close_matches(name, known.values(), 1, 0.0)
+    hint = f'the nearest is "{near[0]}"' if near else "it has none; run a data set first"
+    raise InputError(f'{workspace.folder}: no robot "{name}" here; {hint}')
+
+
+def check_name(workspace: Workspace, name: str) -> None:
+    """Raise InputError where a robot of this name would be taken for another of the workspace, or be there twice."""
+    for robot_id, known in _names(workspace).items():
+        same = unicodedata.normalize("NFC", known) == unicodedata.normalize("NFC", name)
+        if (robot_id == identifier(name)) != same:
+            raise InputError(
+                f'{workspace.folder}: robot "{known}" has the identifier {robot_id} of an earlier irtwin, which does '
+                f'not tell it from others; take it out by `irtwin drop "{known}"` and run its data set again'
+            )
+        if not same and _folded(known) == _folded(name):
+            raise InputError(
+                f'{workspace.folder}: robot "{name}" differs from "{known}" there in upper and lower case or in the '
+                f"form of letters alone; write it alike if it is the same robot, give it another name if not"
+            )
+
+
+def _names(workspace: Workspace) -> dict[str, str]:
+    with workspace.reading() as session:
+        return {robot_id: name for robot_id, name in session.execute(select(Robot.robot_id, Robot.name))}
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
 def robot_iri(robot_id: str) -> str:

@@ -22,8 +22,11 @@ _MOST_MANIFEST = 1 << 28  # bytes: some 2 million files
 _PIECE = 1 << 20
 
 
-def pack(contents: Mapping[str, Path], archive: Path, about: Mapping[str, Any]) -> None:
-    """Write files, by their names in the archive, and what is to be said of them; whole or not at all."""
+def pack(contents: Mapping[str, Path], archive: Path, about: Mapping[str, Any], known: Mapping[str, str]) -> list[str]:
+    """Write files, by their names in the archive, and what is to be said of them; whole or not at all.
+
+    known: SHA-256 that files are to have. Where one has another nothing is written; returns the names of such files.
+    """
     sums: dict[str, dict[str, Any]] = {}
     with files.temporary_beside(archive.parent) as temporary:
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as target:
@@ -33,13 +36,17 @@ def pack(contents: Mapping[str, Path], archive: Path, about: Mapping[str, Any]) 
                 entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
                 with file.open("rb") as source, target.open(entry, "w", force_zip64=True) as sink:
                     sums[name] = dict(zip(("sha256", "size"), _copy(source, sink), strict=True))
+            altered = [name for name, checksum in known.items() if sums[name]["sha256"] != checksum]
+            if altered:
+                return altered
             manifest = {**_FORMAT, **about, "files": sums}
             target.writestr(_MANIFEST, json.dumps(manifest, indent=1))
         files.put_in_place(temporary, archive)
+    return []
 
 
-def unpack(archive: Path, folder: Path, names: re.Pattern[str]) -> Iterator[str]:
-    """Write an archive's files into a folder and yield their names, each once its checksum agreed.
+def unpack(archive: Path, folder: Path, names: re.Pattern[str]) -> Iterator[tuple[str, str]]:
+    """Write an archive's files into a folder and yield their names and SHA-256, each once that agreed.
 
     names: what a name must be, and no other is written.
 
@@ -59,7 +66,7 @@ def unpack(archive: Path, folder: Path, names: re.Pattern[str]) -> Iterator[str]
             with source.open(name) as content, file.open("xb") as sink:
                 if _copy(content, sink)[0] != checksum:
                     raise InputError(f"{archive}: {name} is damaged, its checksum differs; use another backup")
-            yield name
+            yield name, checksum
 
 
 @contextmanager

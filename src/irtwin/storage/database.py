@@ -6,20 +6,25 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, Table, delete, exists, insert, inspect, select, update
+from sqlalchemy import URL, exists, func, inspect, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage.gap_schema import GapDiagnosis
-from irtwin.storage.schema import Activity, ActivityUse, Base, Joint, Robot, Run, Series, Twin, in_utc
-from irtwin.storage.series import FOLDER, inside, read_series, write_series
+from irtwin.storage.rows import drop_activities, drop_data_set, drop_robot, facts, insert_rows, values, with_dependents
+from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Joint, Robot, Run, Series, Twin
+from irtwin.storage.series import FOLDER, inside, is_whole, read_series, write_series
 
 Outcome = Literal["new", "unchanged", "replaced"]
-LIVE = "live"  # role of runs, and provider of what is known of them
+_DATABASE = "irtwin.db"
+_FROM_A_BACKUP = (
+    "`irtwin restore ARCHIVE --workspace NEW` makes another workspace of a backup; without one, run the data sets "
+    "again into a new one (where a server keeps the database, give --database)"
+)
 TWINS, DIAGNOSES = "twins", "diagnoses"
 
 
@@ -37,14 +42,18 @@ class Workspace:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{folder}: cannot make the workspace: {error.strerror}; choose another folder") from None
-        self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / "irtwin.db")))
+        if url is None:
+            _check_that_nothing_is_lost(folder)
+        self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
+        engine.check(self.engine)
         self._make_tables()
 
     @classmethod
     def existing(cls, folder: Path, url: str | None = None) -> Self:
         """Open a workspace that must be there already. Raises InputError where it is not."""
-        if url is None and not (folder / "irtwin.db").is_file():
+        if url is None and not (folder / _DATABASE).is_file():
+            _check_that_nothing_is_lost(folder)
             raise InputError(f"{folder}: no workspace here; run `irtwin run DATASET --workspace {folder}` first")
         return cls(folder, url)
 
@@ -52,6 +61,17 @@ class Workspace:
     def graph_folder(self) -> Path:
         """Where the graph's store lies."""
         return self.folder / "graph"
+
+    def check_graph(self) -> None:
+        """Raise InputError where the graph's folder is not there, though the database knows of robots."""
+        with self.reading() as session:
+            robots = session.scalar(select(func.count()).select_from(Robot))
+        if robots and not (self.graph_folder / "CURRENT").is_file():
+            raise InputError(
+                f"{self.graph_folder}: the graph is missing, or a part of its files; nothing of the database is lost: "
+                f"`irtwin repair --workspace {self.folder}` makes the graph anew of it (where a server keeps the "
+                "graph, give --graph)"
+            )
 
     @property
     def mapped_rows(self) -> Path:
@@ -86,9 +106,9 @@ class Workspace:
             if known and self._holds(session, robot.robot_id, rows):
                 return "unchanged"
             if known:
-                self._drop_data_set(session, robot.robot_id)
-                session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(_values(robot)))
-            _insert(session, [*rows[1 if known else 0 :], *self._store(series, "measured", None)])
+                drop_data_set(session, robot.robot_id)
+                session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(values(robot)))
+            insert_rows(session, [*rows[1 if known else 0 :], *self._store(series, "measured", None)])
         self.remove_orphans()
         return "replaced" if known else "new"
 
@@ -114,11 +134,11 @@ class Workspace:
             same = select(Activity.activity_id).where(
                 Activity.provider.in_((activity.provider, instead_of)), Activity.subject == activity.subject
             )
-            _drop_activities(session, _with_dependents(session, set(session.scalars(same))))
+            drop_activities(session, with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
                 files.write(inside(self.folder, path), content)
             modelled = self._store(series or {}, "modelled", activity.activity_id)
-            _insert(session, [activity, *uses, *rows, *modelled])
+            insert_rows(session, [activity, *uses, *rows, *modelled])
         self.remove_orphans()
 
     def keep_live_run(self, run: Run, series: pa.Table, activity: Activity, rows: Sequence[Base]) -> Series:
@@ -126,13 +146,13 @@ class Workspace:
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, "measured", None)
             run.file, run.sha256 = stored.path, stored.series_id
-            _insert(session, [run, stored, activity, *rows])
+            insert_rows(session, [run, stored, activity, *rows])
         return stored
 
     def drop_robot(self, robot_id: str) -> None:
         """Forget a robot and everything derived from it."""
         with self._writing() as session:
-            self._drop_robot(session, robot_id)
+            drop_robot(session, robot_id)
         self.remove_orphans()
 
     def read_series(self, run_id: str, kind: str = "measured", columns: Sequence[str] | None = None) -> pa.Table:
@@ -151,12 +171,13 @@ class Workspace:
 
     def read_document(self, path: str, checksum: str) -> bytes:
         """Read a document by its path and SHA-256. Raises InputError where it is gone or another."""
+        again = "run or diagnose its data set again"
         try:
             content = inside(self.folder, path).read_bytes()
         except OSError as error:
-            raise InputError(f"{self.folder / path}: cannot be read: {error.strerror}; diagnose again") from None
+            raise InputError(f"{self.folder / path}: cannot be read ({error.strerror}); {again}") from None
         if hashlib.sha256(content).hexdigest() != checksum:
-            raise InputError(f"{self.folder / path}: changed since it was written; diagnose again")
+            raise InputError(f"{self.folder / path}: changed since it was written; {again}")
         return content
 
     def remove_orphans(self) -> None:
@@ -206,39 +227,32 @@ class Workspace:
         return rows
 
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
-        """Whether exactly these source rows are stored already, with their series."""
+        """Whether exactly these source rows are stored already, with their series undamaged."""
         stored: list[Base] = []
         for kind in (Robot, Joint):
             stored += session.scalars(select(kind).where(kind.robot_id == robot_id))
         stored += session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
-        paths = select(Series.path).join(Run).where(Run.robot_id == robot_id, Series.kind == "measured")
-        whole = all(inside(self.folder, path).is_file() for path in session.scalars(paths))
-        return whole and {_facts(row) for row in stored} == {_facts(row) for row in rows}
-
-    def _drop_robot(self, session: Session, robot_id: str) -> None:
-        made = select(Activity.activity_id).where(Activity.robot_id == robot_id)
-        _drop_activities(session, set(session.scalars(made)))
-        session.execute(delete(Series).where(Series.run_id.in_(select(Run.run_id).where(Run.robot_id == robot_id))))
-        for kind in (Run, Joint, Robot):
-            session.execute(delete(kind).where(kind.robot_id == robot_id))
-
-    def _drop_data_set(self, session: Session, robot_id: str) -> None:
-        """Drop what a data set said and what was derived from it; the robot stays, and so do its live runs."""
-        made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
-        _drop_activities(session, set(session.scalars(made)))
-        runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
-        session.execute(delete(Series).where(Series.run_id.in_(runs)))
-        session.execute(delete(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
-        session.execute(delete(Joint).where(Joint.robot_id == robot_id))
+        measured = select(Series.path, Series.series_id).join(Run)
+        measured = measured.where(Run.robot_id == robot_id, Series.kind == "measured")
+        whole = all(is_whole(self.folder, path, checksum) for path, checksum in session.execute(measured))
+        return whole and {facts(row) for row in stored} == {facts(row) for row in rows}
 
     def _make_tables(self) -> None:
         tables = Base.metadata.sorted_tables
-        if not inspect(self.engine).has_table(tables[-1].name):  # readers need not wait for the lock
+        there = inspect(self.engine).get_table_names()
+        if not any(table.name in there for table in tables):  # readers need not wait for the lock
+            if self.engine.dialect.name == "sqlite":
+                _check_that_nothing_is_lost(self.folder, "its database holds no tables")
             with self._writing() as session:
                 Base.metadata.create_all(session.connection())
         inspector = inspect(self.engine)
         for table in tables:
-            known = inspector.get_columns(table.name) if inspector.has_table(table.name) else []
+            if not inspector.has_table(table.name):
+                raise InputError(
+                    f"{engine.shown(self.engine.url)}: table {table.name} is missing, damaged or of another irtwin "
+                    f"version; {_FROM_A_BACKUP}"
+                )
+            known = inspector.get_columns(table.name)
             if {column["name"] for column in known} != set(table.columns.keys()):
                 raise InputError(
                     f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
@@ -246,55 +260,10 @@ class Workspace:
                 )
 
 
-def _values(row: Base) -> dict[str, Any]:
-    return {column.name: getattr(row, column.name) for column in row.__table__.columns}
-
-
-def _facts(row: Base) -> tuple[object, ...]:
-    """A row's values, to compare; the time of taking in is no fact of the data set."""
-    values = _values(row)
-    if isinstance(row, Run):
-        values["start_time"] = in_utc(row.start_time) if row.start_time_from == "log" else None
-    return (row.__tablename__, *values.values())
-
-
-def _insert(session: Session, rows: Iterable[Base]) -> None:
-    """Insert rows, those first that others refer to."""
-    by_table: dict[str, list[dict[str, Any]]] = {}
-    for row in rows:
-        by_table.setdefault(row.__tablename__, []).append(_values(row))
-    for table in Base.metadata.sorted_tables:
-        if table.name in by_table:
-            session.execute(insert(table), by_table[table.name])
-
-
-def _made_tables() -> list[Table]:
-    return [table for table in Base.metadata.sorted_tables if "activity_id" in table.columns]
-
-
-def _with_dependents(session: Session, activities: set[str]) -> set[str]:
-    """Add the activities whose rows refer to rows of these activities, and theirs in turn."""
-    found = set(activities)
-    new = found
-    while new:
-        dependents: set[str] = set()
-        for table in _made_tables():
-            for key in table.foreign_keys:
-                parent = key.column.table
-                if parent.name != Activity.__tablename__ and "activity_id" in parent.columns:
-                    dependents |= set(
-                        session.scalars(
-                            select(table.columns["activity_id"])
-                            .join(parent, key.parent == key.column)
-                            .where(parent.columns["activity_id"].in_(new))
-                            .distinct()
-                        )
-                    )
-        new = dependents - found
-        found = found | new
-    return found
-
-
-def _drop_activities(session: Session, activities: set[str]) -> None:
-    for table in reversed(_made_tables()):
-        session.execute(delete(table).where(table.columns["activity_id"].in_(activities)))
+def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missing") -> None:
+    """Raise InputError where files lie in a workspace that only a database could have named."""
+    if what.startswith(_DATABASE) and (folder / _DATABASE).exists():
+        return
+    for name in ("graph", FOLDER, TWINS, DIAGNOSES):
+        if next((folder / name).glob("[!.]*"), None) is not None:
+            raise InputError(f"{folder}: {what}, though {name}/ is full; {_FROM_A_BACKUP}")

@@ -17,6 +17,8 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
+_DAMAGE = ("malformed", "not a database", "could not decode to UTF-8", "Could not decode to UTF-8")
+_FULL = ("is full", "disk I/O error")
 BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
 _WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
 
@@ -39,6 +41,7 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
+        event.listen(engine, "handle_error", lambda context: _tell(address, context.original_exception))
     try:
         with engine.connect() as connection:
             if engine.dialect.name == "sqlite":
@@ -89,10 +92,39 @@ def use_write_ahead_log(engine: Engine) -> None:
                 driver.execute("PRAGMA journal_mode = WAL")
                 return
             except sqlite3.OperationalError as error:
+                _tell(engine.url, error)
                 # SQLite does not wait here by itself while another process makes the same change.
                 if "locked" not in str(error) or time.monotonic() > deadline:
                     raise
+            except sqlite3.DatabaseError as error:
+                _tell(engine.url, error)
+                raise
         time.sleep(0.05)
+
+
+def check(engine: Engine) -> None:
+    """Look through an SQLite database. Raises InputError where its file is damaged."""
+    if engine.dialect.name == "sqlite":
+        with engine.connect() as connection:
+            found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
+        if found != "ok":
+            raise InputError(_damaged(engine.url, " ".join(str(found).split())))
+
+
+def _tell(url: URL, error: BaseException) -> None:
+    """Raise InputError for what SQLite says of a damaged file or a full disk."""
+    reason = " ".join(str(error).split())
+    if any(text in reason for text in _DAMAGE):
+        raise InputError(_damaged(url, reason)) from error
+    if any(text in reason for text in _FULL):
+        raise InputError(f"{url.database}: cannot be written ({reason}); make room, nothing was changed") from error
+
+
+def _damaged(url: URL, reason: str) -> str:
+    return (
+        f"{url.database}: the database is damaged ({reason[:160]}); `irtwin restore ARCHIVE --workspace NEW` makes "
+        "another of a backup; without one, run the data sets again into a new workspace"
+    )
 
 
 def _address(url: str | URL) -> URL:

@@ -12,6 +12,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,10 @@ class Header:
     robot_id: str
     payload_kg: float
     columns: tuple[str, ...]
+
+
+class DamagedJournal(ValueError):
+    """A journal whose header cannot be read, though samples may follow it."""
 
 
 class Journal:
@@ -60,12 +65,29 @@ def read_journal(path: Path) -> tuple[Header, Rows]:
     line, found, data = content.partition(b"\n")
     if not found:
         raise ValueError(f"{path}: ends within its header")
-    said = json.loads(line)
-    header = Header(**{**said, "columns": tuple(said["columns"])})
+    try:
+        header = _header(json.loads(line))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise DamagedJournal(f"{path}: its header is damaged") from None
+    if path.name != f"{header.run_id}{_ENDING}":
+        raise DamagedJournal(f"{path}: its header is that of run {header.run_id!r}")
     width = len(header.columns)
     rows = np.frombuffer(data[: len(data) // (8 * width) * 8 * width]).reshape(-1, width)
     rising = np.diff(rows[:, 0]) > 0  # a power failure may leave zeros at the end
     return header, rows[: len(rows) if rising.all() else int(np.argmin(rising)) + 1]
+
+
+def _header(said: Any) -> Header:
+    header = Header(**{**said, "columns": tuple(said["columns"])})
+    texts = (header.run_id, header.robot_id, *header.columns)
+    if not all(isinstance(text, str) for text in texts) or header.columns[:1] != ("time",):
+        raise TypeError
+    return Header(header.run_id, header.robot_id, float(header.payload_kg), header.columns)
+
+
+def of_robot(folder: Path, robot_id: str) -> list[Path]:
+    """Return the journals of a robot's live runs."""
+    return sorted(folder.glob(f"{robot_id}.*{_ENDING}"))
 
 
 def left_behind(folder: Path) -> Iterator[Path]:

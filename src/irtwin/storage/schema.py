@@ -13,6 +13,8 @@ from sqlalchemy import DateTime, Dialect, ForeignKey
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
+LIVE = "live"  # role of runs that were watched, and provider of what is known of them
+
 
 class Moment(TypeDecorator[datetime]):
     """A time kept as UTC in a column without time zone, so that every database gives it back alike.

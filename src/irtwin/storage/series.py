@@ -52,6 +52,12 @@ def read_series(workspace: Path, path: str, series_id: str, columns: Sequence[st
     return pq.read_table(file, columns=None if columns is None else list(columns))
 
 
+def is_whole(workspace: Path, path: str, sha256: str) -> bool:
+    """Whether a file of the workspace is there and is what was written."""
+    file = inside(workspace, path)
+    return file.is_file() and checksum(file) == sha256
+
+
 def checksum(file: Path) -> str:
     """Return the sha256 of a file's bytes, in hexadecimal."""
     with file.open("rb") as stream:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
@@ -27,20 +29,24 @@ class SeriesWindows:
     """
 
     def __init__(self, file: Path) -> None:
-        """Read the file's metadata. Raises InputError where there is no such file."""
+        """Read the file's metadata. Raises InputError where there is no such file, or it is damaged."""
         if not file.is_file():
             raise InputError(f"{file}: the series is missing; ingest the data set again")
         self._file = str(file)
-        schema = pq.read_schema(file)
+        try:
+            schema = pq.read_schema(file)
+            self._summary = read_summary(schema)
+        except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(_damaged(self._file)) from error
         self.channels = tuple(name for name in schema.names if name != "time")
-        self._summary = read_summary(schema)
 
     @cached_property
     def begin(self) -> float:
         """Time of the first sample, s."""
         if self._summary is not None:
             return float(self._summary.begins[0])
-        return float(self._run("SELECT min(time) FROM read_parquet(?)").fetchall()[0][0])
+        first = self._fetch(lambda: self._run("SELECT min(time) FROM read_parquet(?)").fetchall())
+        return float(first[0][0])
 
     def mean(self, channel: str, start: float, end: float) -> float | None:
         """Return the mean of the samples in a window."""
@@ -102,7 +108,7 @@ class SeriesWindows:
         edges = " UNION ALL ".join([one] * len(ranges))
         text = f"SELECT count(value), coalesce(fsum(value), 0), {extremes} FROM ({edges})"
         values = [value for edge in ranges for value in (self._file, *map(float, edge))]
-        count, total, least, greatest = _connection().execute(text, values).fetchall()[0]
+        count, total, least, greatest = self._fetch(lambda: _connection().execute(text, values).fetchall())[0]
         return int(count), float(total), float(least), float(greatest)
 
     def _until(self, at: float, channel: str, groups: Channel) -> float:
@@ -119,7 +125,7 @@ class SeriesWindows:
     def _samples(self, channel: str, start: float, end: float, most: int | None = None) -> tuple[Floats, Floats]:
         limit = "" if most is None else f" LIMIT {most}"
         text = f"{self._samples_of(channel)}{limit}"  # in the order of the file, which is that of time
-        found: dict[str, Any] = self._run(text, float(start), float(end)).fetchnumpy()
+        found: dict[str, Any] = self._fetch(lambda: self._run(text, float(start), float(end)).fetchnumpy())
         return found["time"], found["value"].astype(np.float64, copy=False)
 
     def _samples_of(self, channel: str) -> str:
@@ -137,8 +143,21 @@ class SeriesWindows:
         if channel not in self.channels:
             raise InputError(f"there is no channel {channel!r}; there are {', '.join(self.channels)}")
 
+    def _fetch(self, ask: Callable[[], Any]) -> Any:
+        """Return what a query finds. Raises InputError where the file is damaged."""
+        import duckdb
+
+        try:
+            return ask()
+        except duckdb.Error as error:
+            raise InputError(_damaged(self._file)) from error
+
     def _run(self, text: str, *values: float) -> duckdb.DuckDBPyConnection:
         return _connection().execute(text, [self._file, *values])
+
+
+def _damaged(file: str) -> str:
+    return f"{file}: the series is damaged; run its data set again"
 
 
 @lru_cache(maxsize=256)

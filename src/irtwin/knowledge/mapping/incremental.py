@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import marshal
+import sqlite3
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import metadata
@@ -19,11 +20,12 @@ import numpy.typing as npt
 from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import Connection, Engine
 
+from irtwin.errors import InputError
 from irtwin.knowledge.blank_nodes import has_blank_node
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
-from irtwin.knowledge.mapping.remembered import ENTRY, Entries, RememberedRows
+from irtwin.knowledge.mapping.remembered import ENTRY, DamagedRows, Entries, RememberedRows
 from irtwin.knowledge.mapping.source import read, schema_version
 from irtwin.knowledge.mapping.terms import Row
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, OWL
@@ -40,6 +42,16 @@ def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], fi
     was put back, or a crash between the two, leads to a full run, as another document, table or software does.
     Raises InputError as `map_database`; graph and file then stay as they were.
     """
+    try:
+        _refresh(graph, engine, documents, file)
+    except (DamagedRows, sqlite3.DatabaseError) as error:
+        if isinstance(error, sqlite3.OperationalError) and "no such" not in str(error):
+            raise InputError(f"{file}: cannot be written: {error}") from error
+        file.unlink()  # what it remembers can be had from the database
+        _refresh(graph, engine, documents, file)
+
+
+def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path) -> None:
     with planned(engine, documents) as (connection, statements), RememberedRows(file) as remembered:
         run = _Run(connection, statements, remembered)
         made_by = _digest(

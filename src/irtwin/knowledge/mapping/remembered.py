@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from datetime import date, datetime, time
 from decimal import Decimal
 from pathlib import Path
 from typing import Any, Self
+from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +25,8 @@ Entries = npt.NDArray[np.void]
 
 _TABLES = """
 CREATE TABLE IF NOT EXISTS version (name TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS statement (number INTEGER PRIMARY KEY, entries BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS kept (id INTEGER PRIMARY KEY, content TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS entries (number INTEGER PRIMARY KEY, content BLOB NOT NULL, crc INTEGER NOT NULL);
+CREATE TABLE IF NOT EXISTS kept_row (id INTEGER PRIMARY KEY, content TEXT NOT NULL, crc INTEGER NOT NULL);
 """
 _PLAIN = (type(None), bool, int, float, str)
 _RESTORED: dict[str, Callable[[str], Any]] = {
@@ -36,6 +38,10 @@ _RESTORED: dict[str, Callable[[str], Any]] = {
 }
 
 
+class DamagedRows(Exception):
+    """What is remembered is not what was written."""
+
+
 class RememberedRows:
     """One transaction on the file: what is done in the block is kept if it ends well, and is undone if not."""
 
@@ -44,12 +50,13 @@ class RememberedRows:
 
     def __enter__(self) -> Self:
         self._connection = _opened(self._file)
-        self._next = self._connection.execute("SELECT coalesce(max(id), 0) + 1 FROM kept").fetchone()[0]
+        self._next = self._connection.execute("SELECT coalesce(max(id), 0) + 1 FROM kept_row").fetchone()[0]
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._connection.execute("COMMIT" if kind is None else "ROLLBACK")
-        self._connection.close()
+        with closing(self._connection):  # undoes what was not committed
+            if kind is None:
+                self._connection.execute("COMMIT")
 
     @property
     def version(self) -> str | None:
@@ -64,39 +71,49 @@ class RememberedRows:
 
     def forget(self) -> None:
         """Start anew, with no rows."""
-        for table in ("version", "statement", "kept"):
+        for table in ("version", "entries", "kept_row"):
             self._connection.execute(f"DELETE FROM {table}")
         self._next = 1
 
     def entries(self, statement: int) -> Entries:
         """Return the entries of a statement's rows, (N,) of ENTRY, by rising hash."""
-        found = self._connection.execute("SELECT entries FROM statement WHERE number = ?", (statement,)).fetchone()
-        return np.frombuffer(b"" if found is None else found[0], ENTRY)
+        found = self._connection.execute("SELECT content, crc FROM entries WHERE number = ?", (statement,)).fetchone()
+        return np.frombuffer(b"" if found is None else _checked(*found), ENTRY)
 
     def set_entries(self, statement: int, entries: Entries) -> None:
         """Keep a statement's entries in place of those it had, each row once."""
         _, first = np.unique(entries["row"], return_index=True)
         self.drop(np.delete(entries, first))
+        content = entries[first].tobytes()
         self._connection.execute(
-            "INSERT OR REPLACE INTO statement VALUES (?, ?)", (statement, entries[first].tobytes())
+            "INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", (statement, content, crc32(content))
         )
 
     def keep(self, rows: Sequence[Row]) -> range:
         """Keep rows; return their numbers."""
         ids = range(self._next, self._next + len(rows))
         self._next += len(rows)
-        self._connection.executemany("INSERT INTO kept VALUES (?, ?)", zip(ids, map(_written, rows), strict=True))
+        contents = map(_written, rows)
+        self._connection.executemany(
+            "INSERT INTO kept_row VALUES (?, ?, ?)",
+            ((number, content, crc32(content.encode())) for number, content in zip(ids, contents, strict=True)),
+        )
         return ids
 
     def rows(self, entries: Entries) -> Iterator[list[Any]]:
         """Yield the kept rows of these entries."""
         for number in entries["id"].tolist():
-            found = self._connection.execute("SELECT content FROM kept WHERE id = ?", (number,)).fetchone()
-            yield [_restored(value) if isinstance(value, dict) else value for value in json.loads(found[0])]
+            found = self._connection.execute("SELECT content, crc FROM kept_row WHERE id = ?", (number,)).fetchone()
+            if found is None:
+                raise DamagedRows
+            content = json.loads(_checked(found[0].encode(), found[1]))
+            yield [_restored(value) if isinstance(value, dict) else value for value in content]
 
     def drop(self, entries: Entries) -> None:
         """Drop the kept rows of these entries."""
-        self._connection.executemany("DELETE FROM kept WHERE id = ?", ((number,) for number in entries["id"].tolist()))
+        self._connection.executemany(
+            "DELETE FROM kept_row WHERE id = ?", ((number,) for number in entries["id"].tolist())
+        )
 
 
 def _opened(file: Path) -> sqlite3.Connection:
@@ -111,6 +128,12 @@ def _opened(file: Path) -> sqlite3.Connection:
     except sqlite3.DatabaseError:
         file.unlink()
         return _opened(file)
+
+
+def _checked(content: bytes, crc: int) -> bytes:
+    if crc32(content) != crc:
+        raise DamagedRows
+    return content
 
 
 def _written(row: Row) -> str:

@@ -1,0 +1,165 @@
+"""Commands killed at random moments: `python bench/kills.py [KILLS] [COMMAND ...]`; 30 kills of each by default.
+
+`migrate` has no place here: there is no such command, tables of another version are refused. After each kill a query
+must answer as before or as after, and the command done again must lead to the state of a workspace where nothing was
+killed: the same answers, as many triples, every file that the database names and no other.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+import data_sets
+import small_robots
+import synthetic
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.storage.database import Workspace
+from irtwin.storage.rows import named_files
+from irtwin.storage.series import is_whole
+
+State = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command on a workspace, which is a copy of `base`, with what it is fed on standard input."""
+
+    arguments: Callable[[Path], list[object]]
+    base: Path
+    fed: bytes = b""
+    grows: tuple[str, ...] = field(default=())  # what a killed one may rightly leave more of: journals that became runs
+
+
+def main(kills: int, names: list[str], seed: int = 1) -> int:
+    moments, failures = random.Random(seed), 0
+    with tempfile.TemporaryDirectory() as name:
+        commands = prepared(Path(name))
+        for kind in names or list(commands):
+            failures += killed_often(kind, commands[kind], kills, moments, Path(name) / "tried")
+    return failures
+
+
+def prepared(folder: Path) -> dict[str, Command]:
+    """Make a workspace of one robot, and what each command needs beside it."""
+    base = folder / "base"
+    first = small_robots.data_set(folder / "first", "First")
+    second = small_robots.data_set(folder / "second", "Second", seed=5)
+    robot = replace(synthetic.with_constants(synthetic.arm(3)), name="Third")
+    motions = [synthetic.swing(robot, seed, seconds=8.0) for seed in (1, 2, 3)]
+    runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
+    third = data_sets.write(folder / "third", robot, runs)
+    assert call(["run", first, "--workspace", base]).returncode == 0
+    assert call(["backup", folder / "kept.zip", "--workspace", base]).returncode == 0
+    (folder / "none").mkdir()
+    lines = (
+        {"robot": "First", "time": 1.7e9 + 0.01 * k, "position": [0.1, 0.2 + 1e-4 * k], "effort": [1.0, 2.0]}
+        for k in range(20_000)
+    )
+    fed = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
+    return {
+        "run": Command(lambda place: ["run", second, "--workspace", place], base),
+        "live": Command(lambda place: ["live", "--workspace", place], base, fed, ("triples", "runs")),
+        "diagnose": Command(lambda place: ["diagnose", third, "--json", folder / "d.json", "--workspace", place], base),
+        "restore": Command(lambda place: ["restore", folder / "kept.zip", "--workspace", place], folder / "none"),
+        "repair": Command(lambda place: ["repair", "--workspace", place], base),
+    }
+
+
+def killed_often(kind: str, command: Command, kills: int, moments: random.Random, place: Path) -> int:
+    copied(command.base, place)
+    began = time.perf_counter()
+    done = call(command.arguments(place), command.fed)
+    assert done.returncode == 0, done.stderr.decode()
+    length, clean = time.perf_counter() - began, state(place)
+    before = None if kind == "restore" else (copied(command.base, place), state(place))[1]
+    said: list[str] = []
+    killed = 0
+    for _ in range(kills):
+        copied(command.base, place)
+        moment = moments.uniform(0.0, 1.1 * length)
+        killed += kill(command, place, moment)
+        said += [f"{kind} killed after {moment:.2f} s: {fault}" for fault in faults(command, place, before, clean)]
+    print(
+        f"{kind}: {killed} of {kills} killed within {length:.1f} s, {len(said)} faults", *said, sep="\n  ", flush=True
+    )
+    return len(said)
+
+
+def faults(command: Command, place: Path, before: State | None, clean: State) -> list[str]:
+    found = []
+    if before is not None or any(place.glob("*")):
+        asked = call(["query", "energy_per_run", "--workspace", place, "--format", "csv"])
+        answers = [of["answers"] for of in (before, clean) if of is not None]
+        if asked.returncode != 0:
+            found.append(f"no answer: {asked.stderr.decode()[-300:]}")
+        elif not command.grows and asked.stdout not in answers and before is not None:
+            found.append("another answer")
+    if before is not None or not any(place.glob("*")):
+        done = call(command.arguments(place), command.fed)
+        if done.returncode != 0:
+            return [*found, f"not done again: {done.stderr.decode()[-300:]}"]
+    after = state(place)
+    different = [key for key in clean if after[key] != clean[key] and key not in command.grows]
+    return found + [f"{key} is {str(after[key])[:100]}, not {str(clean[key])[:100]}" for key in different]
+
+
+def state(place: Path) -> State:
+    asked = call(["query", "energy_per_run", "--workspace", place, "--format", "csv"])
+    with Workspace.existing(place) as workspace, workspace.reading() as session:
+        named = named_files(session.connection())
+        lost = [file.path for file in named if not is_whole(place, file.path, file.sha256)]
+        with KnowledgeGraph.of_workspace(workspace) as graph:
+            triples = len(graph.triples())
+    paths = {file.path for file in named}
+    files = {f"{folder}/{file.name}" for folder in ("series", "twins", "diagnoses") for file in glob(place / folder)}
+    hidden = [path.name for path in place.glob(".*")]
+    return {
+        "answers": asked.stdout, "triples": triples, "lost": lost, "orphans": sorted(files - paths), "hidden": hidden,
+        "runs": len(paths), "beside": [path.name for path in place.parent.glob(".irtwin-*")],
+    }  # fmt: skip
+
+
+def glob(folder: Path) -> list[Path]:
+    return list(folder.glob("*")) if folder.is_dir() else []
+
+
+def kill(command: Command, place: Path, moment: float) -> bool:
+    with tempfile.TemporaryFile() as fed:
+        fed.write(command.fed)
+        fed.seek(0)
+        with subprocess.Popen(
+            started(command.arguments(place)), stdin=fed, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        ) as process:
+            try:
+                process.wait(moment)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                return True
+    return False
+
+
+def copied(base: Path, place: Path) -> None:
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(base, place)
+
+
+def call(arguments: list[object], fed: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(started(arguments), input=fed, capture_output=True, check=False)
+
+
+def started(arguments: list[object]) -> list[str]:
+    return [sys.executable, "-m", "irtwin", *map(str, arguments)]
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 30, sys.argv[2:]) and 1)

@@ -1,0 +1,165 @@
+"""The files that a store consists of, looked through before it is opened.
+
+RocksDB opens sixteen of its tables at once and the others when they are read. An aggregate over a table that is then
+missing or altered never ends, and takes all memory. So the tables that the manifest names are compared with it, and
+with the CRC-32 that was noted when the store was closed; tables never change once they are written.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from zlib import crc32
+
+_SUMS = "irtwin-sums.json"
+_BLOCK, _HEADER = 32768, 7
+_PIECE = 1 << 20
+_TRIES = 20
+_NUMBERS = {2: 1, 3: 1, 4: 1, 6: 2, 9: 1, 10: 1, 200: 1, 202: 0, 203: 1, 300: 1}  # fields of a tag, all numbers
+_TEXT, _CURSOR, _DELETED, _NEW, _IGNORABLE = (1, 201), 5, 6, 103, 8192
+
+Tables = dict[str, int]  # name -> size
+
+
+def fault(folder: Path) -> str | None:
+    """Return what is wrong with a store's files; None where nothing is, or its manifest is for RocksDB to judge."""
+    found = None
+    for _ in range(_TRIES):
+        before = _manifest(folder)
+        found = _fault(folder)
+        if found is None or before == _manifest(folder):  # else another process changed the files meanwhile
+            return found
+    return found
+
+
+def note_sums(folder: Path) -> None:
+    """Note the CRC-32 of the tables, so that a later change of them is found."""
+    known = _sums(folder)
+    sums = {}
+    for name in _tables(folder) or {}:
+        with suppress(FileNotFoundError):  # the store has merged it into another meanwhile
+            sums[name] = known[name] if name in known else _crc(folder / name)
+    if sums != known:
+        temporary = folder / f".{_SUMS}"
+        temporary.write_text(json.dumps(sums))
+        temporary.replace(folder / _SUMS)
+
+
+def _fault(folder: Path) -> str | None:
+    sums = _sums(folder)
+    for name, size in (_tables(folder) or {}).items():
+        try:
+            if (folder / name).stat().st_size != size:
+                return f"{name} has another size"
+            if name in sums and _crc(folder / name) != sums[name]:
+                return f"{name} was altered"
+        except FileNotFoundError:
+            return f"{name} is missing"
+    return None
+
+
+def _sums(folder: Path) -> dict[str, int]:
+    try:
+        said = json.loads((folder / _SUMS).read_text())
+    except (OSError, ValueError):
+        return {}
+    return said if isinstance(said, dict) else {}
+
+
+def _crc(file: Path) -> int:
+    crc = 0
+    with file.open("rb") as stream:
+        while piece := stream.read(_PIECE):
+            crc = crc32(piece, crc)
+    return crc
+
+
+def _manifest(folder: Path) -> bytes:
+    try:
+        return (folder / (folder / "CURRENT").read_text().strip()).read_bytes()
+    except (OSError, ValueError):
+        return b""
+
+
+def _tables(folder: Path) -> Tables | None:
+    """Return the tables that the manifest names; None where it cannot be read."""
+    tables: Tables = {}
+    try:
+        for record in _records(_manifest(folder)):
+            _apply(record, tables)
+    except (IndexError, ValueError):
+        return None
+    return tables
+
+
+def _records(manifest: bytes) -> Iterator[bytes]:
+    """Yield the records of a file in RocksDB's log format."""
+    record = b""
+    for block in range(0, len(manifest), _BLOCK):
+        place, end = block, min(block + _BLOCK, len(manifest))
+        while place + _HEADER <= end:
+            length, kind = int.from_bytes(manifest[place + 4 : place + 6], "little"), manifest[place + 6]
+            if kind == 0:
+                break
+            if kind > 4:
+                raise ValueError("a kind of record that manifests do not have")
+            record += manifest[place + _HEADER : place + _HEADER + length]
+            if kind in (1, 4):  # whole, or the last part of one
+                yield record
+                record = b""
+            place += _HEADER + length
+
+
+def _apply(record: bytes, tables: Tables) -> None:
+    """Follow one edit of the store's version."""
+    fields = _Fields(record)
+    while fields.place < len(record):
+        tag = fields.number()
+        if tag == _NEW:
+            fields.number()  # level
+            name, size = f"{fields.number():06d}.sst", fields.number()
+            fields.skip_texts(2)  # smallest and largest key
+            fields.number(), fields.number()  # and sequence number
+            while fields.number() != 1:
+                fields.skip_texts(1)
+            tables[name] = size
+        elif tag == _DELETED:
+            fields.number()
+            tables.pop(f"{fields.number():06d}.sst", None)
+        elif tag == _CURSOR:
+            fields.number()
+            fields.skip_texts(1)
+        elif tag in _TEXT or tag & _IGNORABLE:
+            fields.skip_texts(1)
+        else:
+            for _ in range(_NUMBERS[tag] if tag in _NUMBERS else _unknown(tag)):
+                fields.number()
+
+
+class _Fields:
+    """The fields of a record: numbers of seven bits a byte, and texts after their length."""
+
+    def __init__(self, record: bytes) -> None:
+        self._record = record
+        self.place = 0
+
+    def number(self) -> int:
+        value = shift = 0
+        while True:
+            byte = self._record[self.place]
+            self.place += 1
+            value |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return value
+
+    def skip_texts(self, count: int) -> None:
+        for _ in range(count):
+            length = self.number()
+            self.place += length
+
+
+def _unknown(tag: int) -> int:
+    raise ValueError(f"unknown tag {tag}")

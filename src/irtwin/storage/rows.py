@@ -1,0 +1,156 @@
+"""The rows of a robot, across all tables: put in, taken out, compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, RowMapping, Select, Table, delete, insert, select
+from sqlalchemy.orm import Session
+
+from irtwin.storage.schema import LIVE, Activity, Base, Joint, Robot, Run, Series, in_utc
+
+Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
+
+# table -> its columns that name files of the workspace, with those of their SHA-256
+_FILES = {
+    "series": [("path", "series_id")],
+    "twin": [("file", "sha256")],
+    "gap_diagnosis": [("file", "sha256"), ("evidence_file", "evidence_sha256"), ("twin_file", "twin_sha256")],
+}
+
+
+@dataclass(frozen=True)
+class NamedFile:
+    """A file that the database names: its path in the workspace, its SHA-256, and the robot_id that it is of."""
+
+    path: str
+    sha256: str
+    robot_id: str
+
+
+def values(row: Base) -> dict[str, Any]:
+    """Return a row's values, by column."""
+    return {column.name: getattr(row, column.name) for column in row.__table__.columns}
+
+
+def facts(row: Base) -> tuple[object, ...]:
+    """Return a row's values, to compare; the time of taking in is no fact of the data set."""
+    said = values(row)
+    if isinstance(row, Run):
+        said["start_time"] = in_utc(row.start_time) if row.start_time_from == "log" else None
+    return (row.__tablename__, *said.values())
+
+
+def insert_rows(session: Session, rows: Iterable[Base]) -> None:
+    """Insert rows, those first that others refer to."""
+    by_table: Rows = {}
+    for row in rows:
+        by_table.setdefault(row.__tablename__, []).append(values(row))
+    insert_values(session, by_table)
+
+
+def insert_values(session: Session, rows: Rows) -> None:
+    """Insert rows of tables, those first that others refer to."""
+    for table in Base.metadata.sorted_tables:
+        if rows.get(table.name):
+            session.execute(insert(table), rows[table.name])
+
+
+def data_set_rows(session: Session, robot_id: str) -> Rows:
+    """Return the rows of a robot, its data set and what was derived from it: all but its live runs."""
+    return {
+        table.name: [dict(row) for row in session.execute(found).mappings()] for table, found in _data_set(robot_id)
+    }
+
+
+def named_files(connection: Connection) -> list[NamedFile]:
+    """Return the files of the workspace that the database names."""
+    found = []
+    for table, columns in _FILES.items():
+        for file, checksum in columns:
+            rows = connection.execute(select(Base.metadata.tables[table])).mappings()
+            found += [NamedFile(row[file], row[checksum], _owner(row)) for row in rows if row[file] is not None]
+    return found
+
+
+def files_of(rows: Rows) -> dict[str, str]:
+    """Return the files of the workspace that rows name: path -> SHA-256."""
+    return {
+        row[file]: row[checksum]
+        for table, columns in _FILES.items()
+        for file, checksum in columns
+        for row in rows.get(table, [])
+        if row[file] is not None
+    }
+
+
+def drop_data_set(session: Session, robot_id: str) -> None:
+    """Drop what a data set said and what was derived from it; the robot stays, and so do its live runs."""
+    made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
+    drop_activities(session, set(session.scalars(made)))
+    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
+    session.execute(delete(Series).where(Series.run_id.in_(runs)))
+    session.execute(delete(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
+    session.execute(delete(Joint).where(Joint.robot_id == robot_id))
+
+
+def drop_robot(session: Session, robot_id: str) -> None:
+    """Drop a robot and all that is known of it."""
+    made = select(Activity.activity_id).where(Activity.robot_id == robot_id)
+    drop_activities(session, set(session.scalars(made)))
+    session.execute(delete(Series).where(Series.run_id.in_(select(Run.run_id).where(Run.robot_id == robot_id))))
+    for kind in (Run, Joint, Robot):
+        session.execute(delete(kind).where(kind.robot_id == robot_id))
+
+
+def drop_activities(session: Session, activities: set[str]) -> None:
+    """Drop activities with all that they made."""
+    for table in reversed(_made_tables()):
+        session.execute(delete(table).where(table.columns["activity_id"].in_(activities)))
+
+
+def with_dependents(session: Session, activities: set[str]) -> set[str]:
+    """Add the activities whose rows refer to rows of these activities, and theirs in turn."""
+    found = set(activities)
+    new = found
+    while new:
+        dependents: set[str] = set()
+        for table in _made_tables():
+            for key in table.foreign_keys:
+                parent = key.column.table
+                if parent.name != Activity.__tablename__ and "activity_id" in parent.columns:
+                    dependents |= set(
+                        session.scalars(
+                            select(table.columns["activity_id"])
+                            .join(parent, key.parent == key.column)
+                            .where(parent.columns["activity_id"].in_(new))
+                            .distinct()
+                        )
+                    )
+        new = dependents - found
+        found = found | new
+    return found
+
+
+def _data_set(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
+    """Yield each table with the query of a robot's rows in it, without its live runs'."""
+    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
+    made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
+    for table in Base.metadata.sorted_tables:
+        rows = select(table)
+        if table.name == Run.__tablename__ or table.name == Series.__tablename__:
+            yield table, rows.where(table.columns["run_id"].in_(runs))
+        elif "activity_id" in table.columns:
+            yield table, rows.where(table.columns["activity_id"].in_(made))
+        else:
+            yield table, rows.where(table.columns["robot_id"] == robot_id)
+
+
+def _owner(row: RowMapping) -> str:
+    return str(row["robot_id"] if "robot_id" in row else row["run_id"].partition(".")[0])
+
+
+def _made_tables() -> list[Table]:
+    return [table for table in Base.metadata.sorted_tables if "activity_id" in table.columns]

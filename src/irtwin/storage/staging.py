@@ -1,0 +1,68 @@
+"""A robot worked on apart: what is made of it takes its place in the workspace at once, or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import update
+
+from irtwin.errors import InputError
+from irtwin.storage import engine, files
+from irtwin.storage.database import Workspace
+from irtwin.storage.rows import Rows, data_set_rows, drop_data_set, files_of, insert_values
+from irtwin.storage.schema import Robot
+from irtwin.storage.series import inside, is_whole
+
+_PREFIX = ".staged-"
+
+
+@contextmanager
+def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
+    """Give a workspace that holds one robot, with its data set and all that was derived, but not its live runs.
+
+    Where the block ends well, what the robot is there replaces in one transaction what it was. Else all stays as it
+    was, and so it does where the process is killed. Others may read and write meanwhile.
+    """
+    with files.working_folder(place.folder, _PREFIX) as folder, Workspace(folder) as apart:
+        before = _rows(place, robot_id)
+        _put(place, before, apart, robot_id)
+        try:
+            yield apart
+        except InputError as error:
+            raise InputError(str(error).replace(str(folder), str(place.folder))) from error
+        after = _rows(apart, robot_id)
+        if after != before or not all(is_whole(place.folder, *file) for file in files_of(before).items()):
+            _put(apart, after, place, robot_id)
+            place.remove_orphans()
+
+
+def _rows(place: Workspace, robot_id: str) -> Rows:
+    with place.reading() as session:
+        return data_set_rows(session, robot_id)
+
+
+def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> None:
+    """Make the rows, and the files that they name, all that the target has of the robot's data set."""
+    with engine.writing(target.engine) as session:
+        for path, checksum in files_of(rows).items():
+            if is_whole(source.folder, path, checksum):  # else whoever needs it says so
+                _link(source, target, path)
+        drop_data_set(session, robot_id)
+        if session.get(Robot, robot_id) is None:
+            insert_values(session, rows)
+        else:
+            session.execute(update(Robot).where(Robot.robot_id == robot_id).values(**rows["robot"][0]))
+            insert_values(session, {**rows, "robot": []})
+
+
+def _link(source: Workspace, target: Workspace, path: str) -> None:
+    """Give a file of one workspace a name in the other, in place of a damaged one."""
+    file = inside(target.folder, path)
+    file.parent.mkdir(exist_ok=True)
+    linked = file.with_name(f".{file.name}.tmp")
+    linked.unlink(missing_ok=True)
+    os.link(inside(source.folder, path), linked)
+    files.put_in_place(linked, file)
+    linked.unlink(missing_ok=True)  # it was the same file already

@@ -1,0 +1,144 @@
+"""A workspace kept in order: a robot taken out, a damaged graph made anew."""
+
+from __future__ import annotations
+
+import fcntl
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from pyoxigraph import Quad
+
+from irtwin.asking import WORKSPACE
+from irtwin.errors import InputError
+from irtwin.knowledge.damage import told
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
+from irtwin.providers.records import find_robot
+from irtwin.storage import files
+from irtwin.storage.database import Workspace
+from irtwin.storage.journal import left_behind, of_robot
+from irtwin.storage.rows import named_files
+from irtwin.storage.schema import LIVE
+from irtwin.storage.series import is_whole
+from irtwin.workflow import Announce, conclude, map_rows, populate_others, rewriting
+
+_DAMAGED = "graph.damaged"
+
+
+def drop(
+    robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+) -> None:
+    """Forget a robot, by its name: rows, files, report, journals, and all that the graph says of it.
+
+    Raises InputError, with the nearest name, where there is no such robot, or one that is watched just now.
+    """
+    with (
+        Workspace.existing(Path(workspace), database) as place,
+        rewriting(place, graph_url) as graph,
+    ):
+        robot_id = find_robot(place, robot)
+        journals = of_robot(place.folder / LIVE, robot_id)
+        if set(journals) - set(left_behind(place.folder / LIVE)):
+            raise InputError(f'{place.folder}: "{robot}" is being watched; end `irtwin live` first')
+        place.drop_robot(robot_id)
+        for file in (*journals, place.report_path(robot_id)):
+            file.unlink(missing_ok=True)
+        if journals:  # the graph may show what no row ever said
+            place.mapped_rows.unlink(missing_ok=True)
+        graph.load_ontology()
+        map_rows(place, graph)
+        reason(graph)
+
+
+def repair(
+    workspace: Path | str = WORKSPACE, *, database: str | None = None, announce: Announce = lambda line: None
+) -> None:
+    """Make the graph of a workspace anew from its database, and look through its files.
+
+    The graph that was there is replaced once the new one is whole. What SPARQL updates had written is carried over
+    where it can be read; else the damaged graph is kept aside. Raises InputError where the database is damaged, or at
+    the end where files are lost that only a data set or a backup can give back.
+    """
+    with Workspace.existing(Path(workspace), database) as place, _nobody_else(place.graph_folder):
+        with files.working_folder(place.folder, ".repair-") as folder:
+            place.mapped_rows.unlink(missing_ok=True)
+            announce("Making the graph from the database")
+            with KnowledgeGraph(folder / "graph", place.folder) as graph:
+                graph.load_ontology()
+                map_rows(place, graph)
+                readable = _carry_over(place.graph_folder, graph, announce)
+                populate_others(place, graph, announce)
+                conclude(graph, announce)
+            _swap(place, folder / "graph", keep=not readable)
+        lost = _lost(place)
+    for line in lost:
+        announce(f"  {line}")
+    if lost:
+        raise InputError(
+            f"{place.folder}: the graph is whole again, but files are lost ({len(lost)}); "
+            "run the data sets of these robots again, restore a backup, or take the robots out by `irtwin drop`"
+        )
+
+
+@contextmanager
+def _nobody_else(folder: Path) -> Iterator[None]:
+    """Hold the store's own lock, where there is one. InputError where another process does."""
+    if not (folder / "LOCK").exists():
+        yield
+        return
+    with (folder / "LOCK").open("r+b") as lock:
+        try:
+            fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError(f"{folder}: another process has the graph open; end it first") from None
+        yield
+
+
+def _carry_over(old: Path, new: KnowledgeGraph, announce: Callable[[str], None]) -> bool:
+    """Copy what nobody but SPARQL updates wrote; return whether the old graph could be read to its end."""
+    if not (old / "CURRENT").is_file():
+        return not old.exists()
+    try:
+        with told(old), KnowledgeGraph.as_it_stands(old) as before:
+            written = [quad for quad in before.quads() if not _made(_name(quad))]
+    except InputError:
+        announce(f"  the graph could not be read; what SPARQL updates had written may still be in {_DAMAGED}/")
+        return False
+    if written:
+        new.replace(written, *{_name(quad) for quad in written})
+    return True
+
+
+def _made(name: str) -> bool:
+    """Whether mapping, rules or validation make a named graph."""
+    return name.startswith(GRAPH) and name != GRAPH_UPDATE
+
+
+def _name(quad: Quad) -> str:
+    return str(quad.graph_name)[1:-1]
+
+
+def _swap(place: Workspace, new: Path, keep: bool) -> None:
+    """Put the new graph in place. A kill in between leaves none, which the next opening tells."""
+    aside = place.folder / _DAMAGED
+    if place.graph_folder.exists():
+        shutil.rmtree(aside, ignore_errors=True)
+        place.graph_folder.rename(aside)
+    new.rename(place.graph_folder)
+    if not keep:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _lost(place: Workspace) -> list[str]:
+    with place.reading() as session:
+        named = named_files(session.connection())
+    found = []
+    for file in named:
+        with suppress(InputError):
+            if is_whole(place.folder, file.path, file.sha256):
+                continue
+        found.append(f"{file.path} of {file.robot_id} is missing or altered")
+    return found

@@ -1,0 +1,31 @@
+"""Data sets of small synthetic robots, identified in a second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import data_sets
+import synthetic
+from irtwin.signals.log import Run
+
+Change = Callable[[Run], Run]
+
+
+def data_set(folder: Path, name: str, seed: int = 1, change: Change = lambda run: run, tail: str = "") -> Path:
+    """Write the data set of an arm of two joints with three runs of 8 s; `change` spoils each run."""
+    robot = replace(synthetic.with_constants(synthetic.arm(2)), name=name)
+    motions = [synthetic.swing(robot, of, seconds=8.0) for of in range(seed, seed + 3)]
+    runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
+    return data_sets.write(folder, robot, [change(run) for run in runs], tail=tail)
+
+
+def with_signals(**scales: float) -> Change:
+    """Multiply signals of each run by a number."""
+
+    def change(run: Run) -> Run:
+        scaled = {name: getattr(run.signals, name) * scale for name, scale in scales.items()}
+        return replace(run, signals=replace(run.signals, **scaled))
+
+    return change

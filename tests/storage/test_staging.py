@@ -1,0 +1,117 @@
+"""A robot worked on apart: all of it takes its place at once, or nothing does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rows
+from irtwin.errors import InputError
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import LIVE, Activity
+from irtwin.storage.staging import staged
+from test_database import WORK, populate, state, workspace
+
+__all__ = ["workspace"]
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+sys.path[:0] = [{tests!r}, {tests!r} + "/storage"]
+from irtwin.storage import staging
+from irtwin.storage.database import Workspace
+from irtwin.storage.staging import staged
+import rows
+from test_database import populate
+
+with Workspace(Path({folder!r})) as place, staged(place, rows.ROBOT) as apart:
+    populate(apart)
+    kill = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+    if {point!r} == "apart":
+        kill()
+    setattr(staging, {point!r}, kill)
+"""
+
+
+def test_what_is_made_apart_takes_its_place(workspace: Workspace) -> None:
+    with staged(workspace, rows.ROBOT) as apart:
+        populate(apart)
+        assert not state(workspace)["robot"]
+        made = state(apart)
+    assert state(workspace) == made
+    assert workspace.read_series(WORK).equals(rows.samples(1))
+    assert not list(workspace.folder.glob(".staged-*"))
+
+
+def test_what_was_there_is_worked_on_apart(workspace: Workspace) -> None:
+    populate(workspace)
+    before = state(workspace)
+    with staged(workspace, rows.ROBOT) as apart:
+        assert state(apart) == before
+        assert apart.ingest(*rows.data_set()) == "unchanged"
+    assert state(workspace) == before
+
+
+@pytest.mark.parametrize("failure", [InputError("dead channel"), ZeroDivisionError("a bug")])
+def test_a_failure_leaves_the_earlier_state(workspace: Workspace, failure: Exception) -> None:
+    populate(workspace)
+    before = state(workspace)
+    robot, joints, runs, series = rows.data_set()
+    with pytest.raises(type(failure), match=str(failure)), staged(workspace, rows.ROBOT) as apart:
+        assert apart.ingest(robot, joints[:1], runs, series) == "replaced"
+        raise failure
+    assert state(workspace) == before
+    assert not list(workspace.folder.glob(".staged-*"))
+
+
+def test_a_message_names_the_workspace_not_the_place_apart(workspace: Workspace) -> None:
+    with pytest.raises(InputError) as raised, staged(workspace, rows.ROBOT) as apart:
+        apart.read_document("twins/none.json", "0")
+    assert str(raised.value).startswith(f"{workspace.folder}/twins/none.json")
+
+
+def test_other_robots_and_live_runs_stay(workspace: Workspace) -> None:
+    populate(workspace)
+    other = rows.run("alone", run_id="Other.alone", robot_id="Other")
+    workspace.ingest(rows.robot(robot_id="Other"), [], [other], {"Other.alone": rows.samples(4)})
+    live = rows.run("live_1", role=LIVE)
+    activity = Activity(
+        activity_id="live.1", robot_id=rows.ROBOT, provider=LIVE, subject="run", started=rows.NOON, ended=rows.NOON,
+        software="irtwin",
+    )  # fmt: skip
+    workspace.keep_live_run(live, rows.samples(8), activity, [])
+    robot, joints, runs, series = rows.data_set()
+    with staged(workspace, rows.ROBOT) as apart:
+        assert apart.ingest(robot, joints[:1], runs, series) == "replaced"
+    assert workspace.read_series(f"{rows.ROBOT}.live_1").equals(rows.samples(8))
+    assert workspace.read_series("Other.alone").equals(rows.samples(4))
+    assert len(state(workspace)["joint"]) == 1  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda file: file.write_bytes(b"PAR1")])
+def test_a_damaged_series_is_set_right_by_its_data_set(workspace: Workspace, damage) -> None:
+    populate(workspace)
+    for file in (workspace.folder / "series").iterdir():
+        damage(file)
+    with staged(workspace, rows.ROBOT) as apart:
+        assert apart.ingest(*rows.data_set()) == "replaced"
+    assert workspace.read_series(WORK).equals(rows.samples(1))
+
+
+@pytest.mark.parametrize("point", ["apart", "_link", "insert_values"])
+def test_a_kill_leaves_the_earlier_state(tmp_path: Path, point: str) -> None:
+    with Workspace(tmp_path) as place:
+        place.ingest(*rows.data_set())
+        before = state(place)
+    code = KILLED.format(tests=str(Path(rows.__file__).parent), folder=str(tmp_path), point=point)
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
+    with Workspace(tmp_path) as place:
+        assert list(tmp_path.glob(".staged-*"))
+        with staged(place, rows.ROBOT) as apart:
+            assert apart.ingest(*rows.data_set()) == "unchanged"
+        place.remove_orphans()
+        assert state(place) == before
+    assert not list(tmp_path.glob(".staged-*"))
