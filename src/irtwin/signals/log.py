@@ -7,7 +7,7 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,12 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.samples import Signals, read_signals
+from irtwin.signals.sampling import as_sampled
 
 ROLES = ("observed", "reference", "simulated")
 _SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _POWER_AT = ("mains", "dc_bus")
+_EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,10 @@ class Run:
 
 @dataclass(frozen=True)
 class DataSet:
-    """A robot and its runs; `effects` is what the twin is said to model, None for the baseline."""
+    """A robot and its runs; `effects` is what the twin is said to model, None for the baseline.
+
+    `repairs` says what was done to the samples: some dropped, a run cut at a hole in time, held samples thinned out.
+    """
 
     folder: Path
     robot: Robot
@@ -53,18 +58,17 @@ class DataSet:
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
-    """Read and check a data set; `repair` drops bad samples and says in `repairs` how many and which.
+    """Read and check a data set; `repair` drops bad samples.
 
-    Raises InputError, naming file, line or column, on whatever is wrong.
+    A run NAME with holes in time becomes several, NAME, NAME.2 and so on. Raises InputError, naming file, line or
+    column, on whatever is wrong.
     """
     file = folder / "dataset.toml"
     document = _read_toml(file)
     table = _Table(file, "[robot]", _take(document, "robot", dict, file, "[robot]"))
     robot = _robot(folder, table)
-    runs, repairs = [], []
-    for run, lines in _runs(folder, file, document, robot, repair):
-        runs.append(run)
-        repairs.extend(lines)
+    repairs: list[str] = []
+    runs = list(_runs(folder, file, document, robot, repair, repairs))
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
@@ -189,15 +193,17 @@ def _robot(folder: Path, table: _Table) -> Robot:
 
 
 def _runs(
-    folder: Path, file: Path, document: dict[str, Any], robot: Robot, repair: bool
-) -> Iterator[tuple[Run, list[str]]]:
+    folder: Path, file: Path, document: dict[str, Any], robot: Robot, repair: bool, repairs: list[str]
+) -> Iterator[Run]:
     for number, values in enumerate(_take(document, "run", list, file, "[[run]]"), start=1):
         table = _Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
         path = table.path("file", folder)
         role = table.text("role", "observed") or ""
         if role not in ROLES:
             raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
-        signals, repairs = read_signals(path, robot, repair=repair)
+        signals, dropped = read_signals(path, robot, repair=repair)
+        pieces, sampled = as_sampled(signals, path)
+        repairs += dropped + sampled
         run = Run(
             name=path.stem,
             file=path,
@@ -210,7 +216,18 @@ def _runs(
             notes={key: value for key, value in table.values.items() if key not in ("file", "role")},
             signals=signals,
         )
-        yield run, repairs
+        yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
+
+
+def _piece(run: Run, number: int, signals: Signals) -> Run:
+    """Return a run of some of its samples, named by its number from the second on; it started when they do."""
+    later = float(signals.time[0] - run.signals.time[0])
+    return replace(
+        run,
+        name=run.name if number == 1 else f"{run.name}.{number}",
+        started=run.started and run.started + timedelta(seconds=later),
+        signals=signals,
+    )
 
 
 def _centre(table: _Table) -> tuple[float, float, float]:
@@ -229,6 +246,8 @@ def _started(table: _Table) -> datetime | None:
         value = datetime(value.year, value.month, value.day)
     if not isinstance(value, datetime):
         raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {value!r}")
+    if not _EARLIEST <= value.year <= _LATEST:
+        raise InputError(f"{table.file}: {table.name} started lies in no year from {_EARLIEST} to {_LATEST}: {value}")
     return value if value.tzinfo else value.replace(tzinfo=UTC)
 
 
@@ -239,7 +258,7 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
         if run.name in names:
             raise InputError(f'{file}: two runs are named "{run.name}" ({names[run.name]}, {run.file}); rename one')
         names[run.name] = run.file
-    files = {run.file.resolve(): run.name for run in runs}
+    files = {run.file.resolve(): run.name for run in reversed(runs)}  # of a run in pieces, the first
     resolved = []
     for run in runs:
         if run.repeat_of is not None:

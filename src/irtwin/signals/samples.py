@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +28,7 @@ _REACH = {
     "current": 1e5,
 }
 _WHOLE_ROBOT = ("time", "power", "voltage", "current")
-_FEWEST = 20  # samples; fewer cannot be filtered
+FEWEST = 20  # samples; fewer cannot be filtered
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,10 @@ class Signals:
     temperature: np.ndarray | None = None
     power: np.ndarray | None = None
 
+    def rows(self, chosen: slice | np.ndarray) -> Signals:
+        """Return some of the samples."""
+        return replace(self, **{name: values[chosen] for name, values in vars(self).items() if values is not None})
+
 
 def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bool = True) -> tuple[Signals, list[str]]:
     """Read a run's file; return its signals and, with `repair`, a line for each kind of sample that was dropped.
@@ -61,8 +65,8 @@ def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bo
     keep, dropped = _bad_samples(columns, where, repair)
     if not keep.all():
         columns = {name: values[keep] for name, values in columns.items()}
-    if len(columns["time"]) < _FEWEST:
-        raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {_FEWEST}")
+    if len(columns["time"]) < FEWEST:
+        raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {FEWEST}")
     for joint in robot.joints:
         _check_unit(columns["time"], columns[f"q_{joint.name}"], joint, path)
     signals = _signals(columns, robot, path)
@@ -204,7 +208,8 @@ def _check_unit(time: np.ndarray, q: np.ndarray, joint: Joint, path: Path) -> No
     """Raise where a position is plainly in degrees: its speed or its range is far beyond the joint's."""
     if joint.kind == "prismatic":
         return
-    speed = np.quantile(np.abs(np.diff(q) / np.diff(time)), 0.99)
+    with np.errstate(over="ignore"):
+        speed = np.quantile(np.abs(np.diff(q) / np.diff(time)), 0.99)
     bounds = joint.upper - joint.lower
     too_fast = np.isfinite(joint.velocity) and speed > 4 * joint.velocity
     too_far = np.isfinite(bounds) and bounds > 0 and np.ptp(q) > 1.5 * bounds
