@@ -197,7 +197,7 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
         raise InputError(f"{source}: {what}; all links must hang on one base")
     depths = {roots[0]: 0}
     for link in links:
-        way = []
+        way: list[str] = []
         at = link
         while at not in depths and len(way) <= len(links):
             way.append(at)

@@ -12,12 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_input
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.samples import Signals, read_signals
 from irtwin.signals.sampling import as_sampled
 
 ROLES = ("observed", "reference", "simulated")
+_LARGEST = 20_000_000  # bytes of dataset.toml
+_GREATEST = 1e300  # of a number
 _SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _POWER_AT = ("mains", "dc_bus")
 _EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
@@ -100,7 +103,7 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
         for number, values in enumerate(runs if isinstance(runs, list) else [], start=1):
             table = _Table(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
             named = table.text("file")
-            if named is not None and (folder / named).resolve() == file.resolve():
+            if named is not None and _real(folder / named) == _real(file):
                 return table.number("payload_mass", least=0.0) or 0.0, _centre(table)
     return 0.0, (0.0, 0.0, 0.0)
 
@@ -116,7 +119,7 @@ class _Table:
     def text(self, key: str, default: str | None = None) -> str | None:
         value = self.values.get(key, default)
         if value is not None and not (isinstance(value, str) and value.strip()):
-            raise InputError(f"{self.file}: {self.name} {key} should be text, not {value!r}")
+            raise InputError(f"{self.file}: {self.name} {key} should be text, not {_shown(value)}")
         return value
 
     def number(self, key: str, *, least: float = -math.inf) -> float | None:
@@ -125,7 +128,7 @@ class _Table:
             return None
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < least:
             bound = "" if least == -math.inf else f" of at least {least:g}"
-            raise InputError(f"{self.file}: {self.name} {key} should be a number{bound}, not {value!r}")
+            raise InputError(f"{self.file}: {self.name} {key} should be a number{bound}, not {_shown(value)}")
         return float(value)
 
     def path(self, key: str, folder: Path) -> Path:
@@ -133,24 +136,60 @@ class _Table:
         if text is None:
             raise InputError(f"{self.file}: {self.name} {key} is missing")
         path = folder / text
-        if not path.resolve().is_relative_to(folder.resolve()):
+        real = _real(path)
+        if real is None:
+            raise InputError(f'{self.file}: {self.name} {key} = "{text[:200]}" is no path that can be followed')
+        if not real.is_relative_to(folder.resolve()):
             raise InputError(
                 f'{self.file}: {self.name} {key} = "{text}" leads out of the data set; copy the file into it'
             )
-        if not path.is_file():
+        if not real.is_file():
             raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
         return path
 
 
-def _read_toml(file: Path) -> dict[str, Any]:
+def _real(path: Path) -> Path | None:
+    """Return where a path leads; None where its links go round in a circle or a name is too long."""
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/") from error
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        real = path.resolve()
+        real.is_file()
+        return real
+    except (OSError, RuntimeError):  # Python 3.13 has the former for a circle, those before the latter
+        return None
+
+
+def _read_toml(file: Path) -> dict[str, Any]:
+    if not file.exists():
+        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
+    content = read_input(file, _LARGEST)
+    try:
+        document = tomllib.loads(content.decode())
+    except ValueError as error:  # an integer of thousands of digits is no TOMLDecodeError
         raise InputError(f"{file}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{file}: not valid TOML: nested too deeply") from error
+    _check_values(document, file, "")
+    return document
+
+
+def _check_values(value: Any, file: Path, name: str) -> None:
+    """Raise on numbers beyond a float and on null characters, which neither paths nor databases take."""
+    if isinstance(value, int) and not -_GREATEST <= value <= _GREATEST:
+        raise InputError(f"{file}: {name} is a number beyond {_GREATEST:g}")
+    if isinstance(value, str) and "\0" in value:
+        raise InputError(f"{file}: {name} has a null character in it")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_values(key, file, f"a key of {name}")
+            _check_values(inner, file, f"{name}.{key}".removeprefix("."))
+    if isinstance(value, list):
+        for inner in value:
+            _check_values(inner, file, name)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 60 else f"{text[:60]}..."
 
 
 def _take(document: dict[str, Any], key: str, kind: type, file: Path, name: str) -> Any:
@@ -245,7 +284,7 @@ def _started(table: _Table) -> datetime | None:
     if isinstance(value, date) and not isinstance(value, datetime):
         value = datetime(value.year, value.month, value.day)
     if not isinstance(value, datetime):
-        raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {value!r}")
+        raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {_shown(value)}")
     if not _EARLIEST <= value.year <= _LATEST:
         raise InputError(f"{table.file}: {table.name} started lies in no year from {_EARLIEST} to {_LATEST}: {value}")
     return value if value.tzinfo else value.replace(tzinfo=UTC)
