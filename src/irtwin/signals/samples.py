@@ -18,7 +18,7 @@ from irtwin.input_file import check_file, read_input
 from irtwin.robot.description import Joint, Robot
 
 # the largest magnitude that any robot reaches, by the column's prefix
-_REACH = {
+REACH = {
     "time": 1e11,
     "q": 1e4,
     "dq": 1e4,
@@ -174,7 +174,7 @@ def _known(columns: Sequence[str], robot: Robot, path: Path) -> list[str]:
     repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InputError(f"{path}: column {repeated[0]} stands there twice; keep one")
-    per_joint = {f"{kind}_{joint}" for kind in _REACH if kind not in _WHOLE_ROBOT for joint in robot.joint_names}
+    per_joint = {f"{kind}_{joint}" for kind in REACH if kind not in _WHOLE_ROBOT for joint in robot.joint_names}
     for name in names:
         kind, _, joint = name.partition("_")
         if kind in ("q", "dq", "ddq", "tau") and joint and name not in per_joint:
@@ -223,7 +223,7 @@ def _bad_samples(columns: dict[str, np.ndarray], where: _Where, repair: bool) ->
         keep[rows] = False
 
     for name, values in columns.items():
-        reach = _REACH[name if name in _WHOLE_ROBOT else name.partition("_")[0]]
+        reach = REACH[name if name in _WHOLE_ROBOT else name.partition("_")[0]]
         drop(keep & ~np.isfinite(values), name, "is not a finite number")
         with np.errstate(invalid="ignore"):
             drop(keep & (np.abs(values) > reach), name, f"is beyond {reach:g}, which no robot reaches")
