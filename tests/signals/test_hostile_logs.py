@@ -32,6 +32,12 @@ def refused(folder: Path) -> str:
     return said
 
 
+def refused_unread(folder: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read_data_set(folder)
+    return str(caught.value)
+
+
 def rewrite(folder: Path, line: str, instead: str) -> None:
     file = folder / "dataset.toml"
     text = file.read_text()
@@ -57,6 +63,15 @@ def rewrite(folder: Path, line: str, instead: str) -> None:
 def test_values_that_no_toml_should_have(folder, value, message):
     rewrite(folder, "^payload_mass.*$", f"payload_mass = {value}")
     assert re.search(message, refused(folder))
+
+
+def test_tables_in_tables_without_end(folder):
+    rewrite(folder, "^role.*$", ".".join("a" * 50_000) + " = 1")
+    assert "nested too deeply" in refused(folder)
+
+
+def test_a_folder_whose_name_no_disk_takes(tmp_path):
+    assert "not found" in refused_unread(tmp_path / ("x" * 5000))
 
 
 @pytest.mark.parametrize("year", ["0001", "1899", "2201", "9999"])
