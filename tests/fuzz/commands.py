@@ -14,6 +14,7 @@ import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import logs
@@ -28,6 +29,7 @@ import irtwin.workflow  # here, once, not in each child
 
 SECONDS = 60
 MEGABYTES = 2000  # beside what the libraries take
+_EXCITING = 4.0  # s until Ctrl-C: the best motion so far is kept
 LONGEST_LINE = 2000  # characters of an error
 _STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
@@ -66,7 +68,8 @@ def try_case(case: Case) -> Fault | None:
             stdin.write_bytes(_stream(case, folder) if command == "live" else b"")
             for file in writes:
                 file.unlink(missing_ok=True)
-            done = in_child(lambda arguments=arguments: _main(arguments), folder, stdin)  # type: ignore[misc]
+            patience = _EXCITING if command == "excite" else None
+            done = in_child(partial(_main, arguments), folder, stdin, patience)
             kind = _fault(done, writes)
             if kind is not None:
                 return Fault(f"{place + 1}: {command}", f"{command}: {kind}", done.err[-6000:])
@@ -116,14 +119,16 @@ def _main(arguments: list[str]) -> None:
     irtwin.cli.main()
 
 
-def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None) -> Done:
-    """Do some work in a child process with little time and memory."""
+def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, patience: float | None = None) -> Done:
+    """Do some work in a child process with little time and memory; Ctrl-C comes after `patience` s."""
     out, err = folder / "stdout", folder / "stderr"
     child = os.fork()
     if child == 0:
         _child(work, stdin or Path(os.devnull), out, err)
     end = os.pidfd_open(child)
     try:
+        if patience is not None and not select.select([end], [], [], patience)[0]:
+            os.kill(child, signal.SIGINT)
         if not select.select([end], [], [], SECONDS)[0]:
             os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
