@@ -3,13 +3,17 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint ontology lock clean
+.PHONY: demo test fuzz lint ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
 
 test: $(VENV)/test lint
 	$(BIN)/python -m pytest -n auto
+
+# Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
+fuzz: $(VENV)/test
+	$(BIN)/python tests/fuzz/fuzz.py
 
 lint: $(VENV)/test
 	$(BIN)/ruff check .

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import math
+import os
 import sys
 from collections.abc import Callable
+from io import TextIOWrapper
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,14 +18,26 @@ from irtwin.errors import InputError
 
 _DAY = 86400.0  # s
 _WORKSPACE = Path("irtwin-workspace")
+_LONGEST = 2000  # characters of an error
 
 
 def main() -> None:
     """Run the command line; a user's mistake is one line on standard error and exit status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 is no reason to stop
     try:
         cli.main(standalone_mode=False)
+        sys.stdout.flush()
     except InputError as error:
-        click.echo(f"irtwin: {error}", err=True)
+        _say(f"irtwin: {error}"[:_LONGEST])
+        sys.exit(2)
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+            raise
+        if error.errno != errno.EPIPE:  # else who read the answer has left, and needs no word
+            _say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; make room and try again")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python flushes once more at its end
         sys.exit(2)
     except click.ClickException as error:
         error.show()
@@ -28,6 +45,17 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("irtwin: stopped", err=True)
         sys.exit(130)
+
+
+class _Number(click.FloatRange):
+    """A finite number; a plain range lets NaN pass."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; fail where it is none, or not finite."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is no finite number.", param, ctx)
+        return float(number)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -176,8 +204,10 @@ def diagnose(
 @click.argument("twin", type=click.Path(path_type=Path))
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
-@click.option("--payload-mass", type=click.FloatRange(min=0.0), help="kg; as the run's data set says if not given.")
-@click.option("--payload-com", type=float, nargs=3, metavar="X Y Z", help="m in the flange frame; likewise.")
+@click.option("--payload-mass", type=_Number(0.0, 1e5), help="kg; as the run's data set says if not given.")
+@click.option(
+    "--payload-com", type=_Number(-10.0, 10.0), nargs=3, metavar="X Y Z", help="m in the flange frame; likewise."
+)
 def predict(
     twin: Path, run: Path, out: Path, payload_mass: float | None, payload_com: tuple[float, float, float] | None
 ) -> None:
@@ -224,13 +254,13 @@ def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
 
 @cli.command()
 @click.argument("urdf", type=click.Path(path_type=Path))
-@click.option("--seconds", type=click.FloatRange(min=1.0), required=True, help="Length of the motion.")
+@click.option("--seconds", type=_Number(min=1.0), required=True, help="Length of the motion.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV file to write.")
-@click.option("--rate", type=click.FloatRange(min=1.0), default=100.0, show_default=True, help="Samples per second.")
+@click.option("--rate", type=_Number(min=1.0), default=100.0, show_default=True, help="Samples per second.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Other seeds give other motions.")
 @click.option(
     "--box",
-    type=float,
+    type=_Number(-1e3, 1e3),
     nargs=6,
     metavar="X Y Z X Y Z",
     help="Two corners, m in the base frame, between which the flange stays; links stay above the floor anyway.",
@@ -282,9 +312,7 @@ def docs(out: Path) -> None:
 @click.argument("mapping", type=click.Path(path_type=Path))
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
-@click.option(
-    "--timeout", type=click.FloatRange(min=0.1), default=600.0, show_default=True, help="Seconds per triples map."
-)
+@click.option("--timeout", type=_Number(min=0.1), default=600.0, show_default=True, help="Seconds per triples map.")
 def map_database(mapping: Path, database: str, out: Path, timeout: float) -> None:
     """Turn a database into triples by an R2RML document.
 
@@ -299,7 +327,7 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float) -> Non
 @_workspace
 @click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 takes a free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; others may ask it.")
-@click.option("--timeout", type=click.FloatRange(min=0.1), default=30.0, show_default=True, help="Seconds per query.")
+@click.option("--timeout", type=_Number(min=0.1), default=30.0, show_default=True, help="Seconds per query.")
 @click.option("--memory", type=click.IntRange(64, 1 << 20), default=1024, show_default=True, help="MB per query.")
 @click.option("--token-file", type=click.Path(path_type=Path), help="Allows updates by who sends the token in it.")
 def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
@@ -445,7 +473,8 @@ def restore(archive: Path, workspace: Path, database: str | None, graph_url: str
 
 
 def _say(line: str) -> None:
-    click.echo(line, err=True)
+    """Write one line to standard error: names that were read may hold what breaks lines or steers a terminal."""
+    click.echo("".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line), err=True)
 
 
 def _excitation_progress() -> Callable[[int, float, float], None]:

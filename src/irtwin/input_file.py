@@ -10,13 +10,21 @@ from irtwin.errors import InputError
 
 def read_input(path: Path, most: int) -> bytes:
     """Return a file's content. Raises InputError where it cannot be read or has more than `most` bytes."""
+    if check_file(path) > most:
+        raise InputError(f"{path}: is larger than the {most // 1_000_000} MB that are read of such a file")
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that is there") from error
+
+
+def check_file(path: Path) -> int:
+    """Return a file's size in bytes. Raises InputError where it is not there, or no plain file."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{path}: is no file; name one that holds the input")
-        if status.st_size > most:
-            raise InputError(f"{path}: is larger than the {most // 1_000_000} MB that are read of such a file")
-        return path.read_bytes()
+        return status.st_size
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that is there") from error
     except ValueError as error:  # a null byte in the name

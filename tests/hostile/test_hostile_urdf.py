@@ -79,6 +79,12 @@ MALFORMED = {
     "inertia that is no number": (GOOD.replace('ixx="1"', 'ixx="x"'), "inertia"),
     "a number of a million digits": (GOOD.replace('lower="-1"', f'lower="{"9" * 1_000_000}"'), "finite number"),
     "a chain without a joint that moves": (chain(3000), "no joint moves"),
+    "more links than a robot has": (chain(50_000), "50001 links; a robot of more than 5000"),
+    "a chain deeper than any": (chain(501).replace("fixed", "continuous", 1), "a chain of more than 500 links"),
+    "more axes than a robot has": (
+        chain(101).replace("fixed", "continuous"),
+        "101 joints move; a robot of more than 100",
+    ),
 }
 
 

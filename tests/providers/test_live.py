@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import subprocess
 import sys
@@ -165,6 +166,67 @@ def test_states_that_are_not_later_are_refused(place: Workspace, graph: Knowledg
     assert live_run(place).sample_count == 2
     with pytest.raises(InputError, match="watching is over"):
         twin.receive(state(7))
+
+
+def moved(number: int, by: float) -> State:
+    """A state of the swing whose time is wrong by some seconds."""
+    right = state(number)
+    return dataclasses.replace(right, time=right.time + by)
+
+
+def counts(place: Workspace) -> list[tuple[float, int]]:
+    """When each live run began, s from noon, and its samples."""
+    with place.reading() as session:
+        found = session.scalars(select(Run).where(Run.role == "live").order_by(Run.start_time))
+        return [(round(run.start_time.timestamp() - NOON, 3), run.sample_count) for run in found]
+
+
+@pytest.mark.parametrize("wrong", [1800.0, -1800.0])
+def test_a_state_of_a_wrong_time_is_refused_by_itself(place: Workspace, graph: KnowledgeGraph, wrong: float) -> None:
+    with LiveTwin(place, graph) as twin:
+        for number in range(50):
+            twin.receive(state(number))
+        twin.receive(moved(50, wrong))
+        with pytest.raises(InputError, match="more than 60 s off those around it"):
+            twin.receive(state(51))
+        for number in range(52, 150):
+            twin.receive(state(number))
+    assert counts(place) == [(0.0, 149)]
+
+
+def test_a_state_far_ahead_of_the_clock_is_refused(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        for first in (0, 1):  # as the first of a robot, and later
+            with pytest.raises(InputError, match="more than 3600 s ahead of the clock"):
+                twin.receive(dataclasses.replace(state(0), time=253402300799.0))
+            for number in range(100 * first, 100 * first + 100):
+                twin.receive(state(number))
+    assert counts(place) == [(0.0, 200)]
+
+
+def test_a_hole_in_a_stream_ends_the_run(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        for number in range(50):
+            twin.receive(state(number))
+        for number in range(30):
+            twin.receive(moved(number, 300.0))
+    assert counts(place) == [(0.0, 50), (300.0, 30)]
+    assert twin.stored == 80
+
+
+def test_the_last_state_after_a_hole_is_kept(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        twin.receive(state(0))
+        twin.receive(moved(0, 300.0))
+    assert counts(place) == [(0.0, 1), (300.0, 1)]
+
+
+def test_a_first_state_of_a_wrong_time_does_not_stop_the_rest(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        twin.receive(moved(0, 1800.0))
+        for number in range(1, 100):
+            twin.receive(state(number))
+    assert counts(place) == [(0.01, 99), (1800.0, 1)]
 
 
 def test_where_storage_is_slow_the_source_waits(

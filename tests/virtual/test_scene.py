@@ -7,6 +7,7 @@ from scene_data import HOSTILE, bare, embedded, kr6, run
 
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements
+from irtwin.robot.urdf import parse_urdf
 from irtwin.virtual.scene import scene_html
 
 KR6 = kr6()
@@ -86,6 +87,20 @@ def test_a_robot_without_shapes_gets_a_skeleton_from_joint_to_joint() -> None:
     towards = [placed(part["placement"])[:3, 2] * part["size"][1] for part in tubes]
     assert any(np.allclose(tube, [0.1, 0, 0.3], atol=1e-4) for tube in towards)
     assert {part["joint"] for part in parts} == {-1, 0, 1}
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
+@pytest.mark.parametrize("count", [1, 2, 40])
+def test_a_robot_of_any_axes_is_drawn(count: int, kind: str) -> None:
+    links = "".join(f'<link name="l{number}"/>' for number in range(count + 1))
+    joints = "".join(
+        f'<joint name="j{number}" type="{kind}"><parent link="l{number}"/><child link="l{number + 1}"/>'
+        '<axis xyz="0 1 0"/></joint>'
+        for number in range(count)
+    )
+    robot = parse_urdf(f'<robot name="odd">{links}{joints}</robot>')
+    data = embedded(scene_html(robot, *run(robot)))
+    assert [joint["axis"] for joint in data["joints"]] == [[0.0, 1.0, 0.0]] * count
 
 
 def test_names_cannot_break_out_of_the_page() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pyarrow as pa
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import Run, payload_told
 from irtwin.signals.samples import read_signals
+from irtwin.signals.sampling import as_sampled
 from irtwin.twin.twin import Twin
 
 
@@ -40,10 +42,18 @@ def read_motion(
 def predict(twin: Twin, run: Run) -> pa.Table:
     """Return time (s), `tau_J` (N m) of each joint and `power` (W) that a twin predicts for a run's motion.
 
-    One row per sample of the run, as it was logged; power only where the twin has an effect of it.
+    One row per sample of the run, as it was logged, less those between holes in time that follow each other too soon;
+    power only where the twin has an effect of it. Raises InputError on a run that has nothing but holes.
     """
-    time = run.signals.time
+    pieces, _ = as_sampled(run.signals, run.file)
+    return pa.concat_tables([_piece(twin, replace(run, signals=piece), run.signals.time) for piece in pieces])
+
+
+def _piece(twin: Twin, run: Run, logged: np.ndarray) -> pa.Table:
+    """Predict a run without holes, at those of the logged times (N,) that lie in it."""
     motion = condition(run, twin.robot, twin.cutoff)
+    beyond = 2 / motion.rate  # a hole is longer, what stands after the last update of held positions shorter
+    time = logged[(logged >= motion.time[0]) & (logged < motion.time[-1] + beyond)]
     columns = {"time": time}
     for joint, values in zip(twin.robot.joint_names, twin.torque(motion).T, strict=True):
         columns[f"tau_{joint}"] = np.interp(time, motion.time, values)

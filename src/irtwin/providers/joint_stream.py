@@ -20,11 +20,14 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO, TypeGuard, cast
 
 from irtwin.errors import InputError
+from irtwin.signals.samples import REACH
 
 LONGEST_LINE = 1 << 16  # bytes
 _PER_JOINT = ("velocity", "effort", "temperature")
 _HTTP = re.compile(rb"[A-Z]+ \S+ HTTP/\d")  # its first line
-_GREATEST = 1e300  # neither NaN nor infinite, nor an integer beyond a float
+# of magnitude; neither NaN nor infinite, nor an integer beyond a float
+_GREATEST = {name: REACH[kind] for name, kind in (("position", "q"), ("velocity", "dq"), ("effort", "tau"))}
+_GREATEST |= {"temperature": REACH["temp"], "power": REACH["power"], "payload": 1e6, "time": 1e300}
 _LATEST = 253402300799.0  # s: the end of the year 9999
 
 
@@ -66,7 +69,9 @@ class StateReader:
             raise InputError("a line is no JSON object")
         robot = said.get("robot")
         if not isinstance(robot, str) or robot not in self._joints:
-            raise InputError(f"no robot {robot!r} in the workspace: run its data set first; known are {self._known}")
+            raise InputError(
+                f"no robot {str(robot)[:100]!r} in the workspace: run its data set first; known are {self._known}"
+            )
         order = self._order(robot, said.get("name"))
         time = _number(said, "time")
         if not 0.0 <= time <= _LATEST:
@@ -154,19 +159,20 @@ def listening(port: int, handle: Callable[[Iterator[bytes]], None]) -> Iterator[
 
 def _number(said: Mapping[str, Any], name: str) -> float:
     value = said.get(name)
-    if not _is_number(value):
-        raise InputError(f"`{name}` is no number")
+    if not _is_number(value, _GREATEST[name]):
+        raise InputError(f"`{name}` is no number within {_GREATEST[name]:g}")
     return float(value)
 
 
-def _is_number(value: Any) -> TypeGuard[int | float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and -_GREATEST < value < _GREATEST
+def _is_number(value: Any, most: float) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and -most <= value <= most
 
 
 def _numbers(said: Mapping[str, Any], name: str, order: Sequence[int]) -> tuple[float, ...]:
     if name not in said:
         return (math.nan,) * len(order)
     values = said[name]
-    if not isinstance(values, list) or len(values) != len(order) or not all(map(_is_number, values)):
-        raise InputError(f"`{name}` is to hold {len(order)} numbers, one for each joint")
+    most = _GREATEST[name]
+    if not isinstance(values, list) or len(values) != len(order) or not all(_is_number(it, most) for it in values):
+        raise InputError(f"`{name}` is to hold {len(order)} numbers within {most:g}, one for each joint")
     return tuple([float(values[place]) for place in order])

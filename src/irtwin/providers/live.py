@@ -3,7 +3,8 @@
 A state goes two ways. All are written to the robot's journal, a batch every 0.1 s. The newest of each robot is mapped
 by the R2RML documents, and what changed goes into the graph in one transaction; where states come faster than the graph
 takes them, the newest wins and the others are counted. Where storage cannot keep up, the source waits, and that too is
-counted. A run ends when the watching does, or after an hour, and is then a run like any other.
+counted. A run ends when the watching does, after a minute without a state,
+or after an hour, and is then a run like any other.
 """
 
 from __future__ import annotations
@@ -27,13 +28,14 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers import live_run
 from irtwin.providers.joint_stream import State
 from irtwin.providers.records import run_iri
-from irtwin.providers.watched_run import WatchedRun
+from irtwin.providers.watched_run import HOLE, WatchedRun
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import DamagedJournal, Header, Journal, left_behind, read_journal
 from irtwin.storage.schema import LIVE, Joint, Run
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
+AHEAD = 3600.0  # s by which a state's time may be ahead of the clock: clocks differ, years do not
 MOST_WAITING = 200_000  # samples held for storage; beyond, the source waits
 
 
@@ -57,6 +59,7 @@ class LiveTwin:
         self.waited = 0.0
         self._waiting = 0
         self._runs: dict[str, WatchedRun] = {}
+        self._left: list[WatchedRun] = []  # over, but for what waits for storage
         self._due: deque[WatchedRun] = deque()
         self._ended: deque[WatchedRun] = deque()
         self._failure: BaseException | None = None
@@ -80,10 +83,14 @@ class LiveTwin:
         self.stop()
 
     def receive(self, state: State) -> None:
-        """Take a state. Waits where storage is far behind. Raises InputError for one no newer than the last.
+        """Take a state. Waits where storage is far behind. Raises InputError for one that comes late, or too early.
 
+        A state more than a minute before or after the newest is held until the next one: where that goes on from it,
+        a new run began; where that goes on from the run, InputError is raised for the one held.
         Raises also what ended the work in the background: a full disk, say.
         """
+        if state.time > time.time() + AHEAD:
+            raise InputError(f"{state.robot_id}: a state more than {AHEAD:g} s ahead of the clock here; not stored")
         with self._lock:
             if self._waiting >= MOST_WAITING:
                 self._wait_for_room()
@@ -91,18 +98,53 @@ class LiveTwin:
             if self._stop.is_set():
                 raise InputError("the watching is over: not stored")
             run = self._runs.get(state.robot_id) or self._begin(state)
-            run.take(state)
-            self._waiting += 1
-            if run.due:
-                run.superseded += 1
-                self.superseded += 1
+            is_next = run.is_next(state)
+            doubted, run.doubted = run.doubted, None
+            if is_next:
+                self._take(run, state)
+            elif doubted is not None and state.time > doubted.time:
+                run.doubted = doubted
+                run = self._begin_again(run)
+                if run.is_next(state):
+                    self._take(run, state)
+                else:
+                    run.doubted = state
+                return
             else:
-                run.due = True
-                self._due.append(run)
-                self._news.notify()
+                run.doubted = state
+            if doubted is not None:
+                raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s off those around it; not stored")
+
+    def _take(self, run: WatchedRun, state: State) -> None:
+        run.take(state)
+        self._waiting += 1
+        if run.due:
+            run.superseded += 1
+            self.superseded += 1
+        else:
+            run.due = True
+            self._due.append(run)
+            self._news.notify()
+
+    def _begin_again(self, run: WatchedRun) -> WatchedRun:
+        """End a run whose next state leaps; return the one that begins with that state."""
+        state = run.doubted
+        assert state is not None
+        run.doubted = None
+        following = self._begin(state)
+        self._left.append(run)
+        self._take(following, state)
+        return following
 
     def stop(self) -> None:
         """Store what is left, end all runs, bring the graph up to date. Raises what ended the background work."""
+        with self._lock:
+            for run in [run for run in self._runs.values() if run.doubted is not None]:
+                try:
+                    self._begin_again(run)
+                except InputError as error:
+                    self._announce(str(error))
+            self._stop.set()
         self._wake_all()
         for thread in self._threads:
             thread.join()
@@ -172,10 +214,10 @@ class LiveTwin:
 
     def _store_samples(self) -> None:
         stopping = False
-        while not stopping or self._runs:
+        while not stopping or self._runs or self._left:
             stopping = self._stop.wait(BATCH)
             with self._lock:
-                batches = [(run, run.waiting) for run in self._runs.values() if run.waiting]
+                batches = [(run, run.waiting) for run in [*self._left, *self._runs.values()] if run.waiting]
                 for run, _ in batches:
                     run.waiting = []
             for run, states in batches:
@@ -191,15 +233,19 @@ class LiveTwin:
 
     def _end_runs(self, all_of_them: bool) -> None:
         for robot_id, run in list(self._runs.items()):
-            if not run.waiting and (all_of_them or run.length >= RUN_SECONDS):
-                self._ended.append(self._runs.pop(robot_id))
-                self._over.notify_all()
+            if run.doubted is None and (all_of_them or run.length >= RUN_SECONDS):
+                self._left.append(self._runs.pop(robot_id))
+        ended = [run for run in self._left if not run.waiting]
+        if ended:
+            self._left = [run for run in self._left if run.waiting]
+            self._ended += ended
+            self._over.notify_all()
 
     def _close_runs(self) -> None:
         while True:
             with self._over:
                 while not self._ended:
-                    if self._failure is not None or (self._stop.is_set() and not self._runs):
+                    if self._failure is not None or (self._stop.is_set() and not (self._runs or self._left)):
                         return
                     self._over.wait(1.0)
                 ended = list(self._ended)
@@ -244,7 +290,7 @@ class LiveTwin:
         """Bring the graph up to date with the database; runs that last look again what it shows of them."""
         refresh(self._graph, self._place.engine, self._documents, self._place.mapped_rows)
         with self._showing, self._lock:
-            for run in self._runs.values():
+            for run in [*self._left, *self._runs.values()]:
                 run.shown = None
 
     def _guarded(self, task: Callable[[], None]) -> None:

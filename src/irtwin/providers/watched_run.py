@@ -14,10 +14,15 @@ from irtwin.providers import live_run
 from irtwin.providers.joint_stream import State
 from irtwin.storage.journal import Header, Journal
 
+HOLE = 60.0  # s without a state: the run is over, and the next begins
+
 
 @dataclass
 class WatchedRun:
-    """A run that lasts. `waiting` is for storage; `shown` is what the graph says of it, None where that is unknown."""
+    """A run that lasts. `waiting` is for storage; `shown` is what the graph says of it, None where that is unknown.
+
+    `doubted` is a state whose time leaps: the next one tells whether a new run begins with it, or its time was wrong.
+    """
 
     header: Header
     joints: Sequence[str]
@@ -33,6 +38,7 @@ class WatchedRun:
     over: bool = False
     waiting: list[State] = field(default_factory=list)
     shown: set[Quad] | None = field(default_factory=set)
+    doubted: State | None = None
     _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
 
     @property
@@ -40,13 +46,19 @@ class WatchedRun:
         """Seconds from the first state to the newest."""
         return 0.0 if self.newest is None else self.newest.time - self.began
 
+    def is_next(self, state: State) -> bool:
+        """Whether a state follows the newest. Raises InputError where it comes late: as old, or a little older."""
+        if self.newest is None:
+            return True
+        if -HOLE < state.time - self.newest.time <= 0:
+            raise InputError(f"{state.robot_id}: a state of no later time than the one before; not stored")
+        return 0 < state.time - self.newest.time <= HOLE
+
     def take(self, state: State) -> None:
-        """Take the next state. Raises InputError where it is no later than the one before."""
+        """Take the next state, of a later time than the one before."""
         before, speed_before = self.newest, self.speed
         if before is None:
             self.began, self.speed, self.acceleration = state.time, state.velocity, (math.nan,) * len(self.joints)
-        elif state.time <= before.time:
-            raise InputError(f"{state.robot_id}: a state of no later time than the one before; not stored")
         else:
             step = state.time - before.time
             self.speed = live_run.speed_of(state, before)

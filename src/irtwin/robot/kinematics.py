@@ -17,15 +17,10 @@ def link_placements(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
 
 def flange(robot: Robot) -> str:
     """Return the name of the last link: the one farthest down the tree, the first of several."""
-    model = robot.model
-
-    def depth(frame: int) -> int:
-        steps = 0
-        while frame > 0:
-            frame, steps = model.frames[frame].parentFrame, steps + 1
-        return steps
-
-    return max(_frames(robot), key=lambda entry: depth(entry[1]))[0].name
+    depths = [0]
+    for frame in list(robot.model.frames)[1:]:  # a parent comes before its children
+        depths.append(depths[frame.parentFrame] + 1)
+    return max(_frames(robot), key=lambda entry: depths[entry[1]])[0].name
 
 
 def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:

@@ -17,6 +17,9 @@ from irtwin.robot.description import Joint, Link, Robot, Shape
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _LARGEST = 20_000_000  # bytes
+_MOST_LINKS = 5000
+_DEEPEST = 500  # links, base to flange: Pinocchio goes down the tree by recursion, and 5000 take the whole stack
+_MOST_JOINTS = 100  # that move
 _GREY = (0.7, 0.7, 0.72, 1.0)
 
 
@@ -84,6 +87,8 @@ def _links(root: Element, source: str) -> dict[str, Link]:
             if (shape := _shape(visual, materials, f'{source}: visual of link "{name}"')) is not None
         )
         links[name] = Link(name, value, shapes)
+    if len(links) > _MOST_LINKS:
+        raise InputError(f"{source}: has {len(links)} links; a robot of more than {_MOST_LINKS} cannot be modelled")
     if not links:
         raise InputError(f"{source}: has no link; a robot needs <link> and <joint> elements")
     return links
@@ -156,6 +161,8 @@ def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joi
         joints[name] = _joint(element, name, kind, where)
     if not joints:
         raise InputError(f"{source}: no joint moves; a robot needs at least one revolute or prismatic joint")
+    if len(joints) > _MOST_JOINTS:
+        raise InputError(f"{source}: {len(joints)} joints move; a robot of more than {_MOST_JOINTS} cannot be modelled")
     return joints
 
 
@@ -188,12 +195,19 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
     if len(roots) != 1:
         what = "no link is the base (the joints form a loop)" if not roots else f"several bases: {', '.join(roots)}"
         raise InputError(f"{source}: {what}; all links must hang on one base")
+    depths = {roots[0]: 0}
     for link in links:
-        steps, at = 0, link
-        while at in parents and steps <= len(links):
-            at, steps = parents[at], steps + 1
-        if steps > len(links):
+        way: list[str] = []
+        at = link
+        while at not in depths and len(way) <= len(links):
+            way.append(at)
+            at = parents[at]
+        if len(way) > len(links):
             raise InputError(f'{source}: the joints around link "{link}" form a loop; a URDF is a tree')
+        for below in reversed(way):
+            depths[below] = depths[parents[below]] + 1
+    if max(depths.values()) > _DEEPEST:
+        raise InputError(f"{source}: a chain of more than {_DEEPEST} links cannot be modelled")
 
 
 def _attribute(element: Element, key: str, source: str, what: str) -> str:

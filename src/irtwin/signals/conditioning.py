@@ -12,6 +12,8 @@ from irtwin.robot.description import Robot
 from irtwin.signals.filter import low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.samples import FEWEST
+from irtwin.signals.sampling import holes, interval
 
 _BAND_SHARE = 0.99  # of the speed's power lies below the band of the motion
 _BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the motion
@@ -19,25 +21,24 @@ _ABOVE_NOISE = 3.0  # times the mean noise: what stands out is motion
 _FEWEST_PERIODS = 10  # of the cutoff in a run
 _NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is chosen
 _AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this from those of the positions
-_FEWEST = 20  # samples
 STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
 def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
-    """Return the run's signals at an even rate (the median one), low-pass filtered without phase shift.
+    """Return the run's signals at an even rate (the sampling's), low-pass filtered without phase shift.
 
     Speeds and accelerations are derivatives of the filtered positions; speeds that were logged are taken instead
     where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`. Raises InputError on a cutoff
-    that is no positive number, or on a run of fewer than 20 samples.
+    that is no positive number, or on a run of fewer than 20 samples or with a hole in time.
     """
     signals = run.signals
-    if len(signals.time) < _FEWEST:
-        raise InputError(f"{run.file}: has {len(signals.time)} samples; a run needs at least {_FEWEST}")
+    if len(signals.time) < FEWEST:
+        raise InputError(f"{run.file}: has {len(signals.time)} samples; a run needs at least {FEWEST}")
     if cutoff is None:
         cutoff = choose_cutoff([run])
     if not (np.isfinite(cutoff) and cutoff > 0):
         raise InputError(f"a cutoff of {cutoff:g} Hz filters everything away; give a positive frequency")
-    time = _even_time(signals.time)
+    time = _even_time(run)
     rate = 1 / (time[1] - time[0])
 
     def clean(values: np.ndarray | None, order: int = 1) -> np.ndarray | None:
@@ -76,7 +77,7 @@ def choose_cutoff(runs: Iterable[Run]) -> float:
     motion and its accelerations as they are and takes away the noise above; at most 0.8 of the Nyquist frequency.
     Of several runs the one of the widest band decides.
     """
-    return max(_cutoff(run.signals.time, run.signals.q) for run in runs)
+    return max(_cutoff(run) for run in runs)
 
 
 def differentiate(signal: np.ndarray, rate: float) -> np.ndarray:
@@ -90,13 +91,16 @@ def _standing(q: np.ndarray, rate: float) -> np.ndarray:
     return np.asarray(np.abs(np.gradient(q, axis=0)) * rate < STANDSTILL)
 
 
-def _even_time(time: np.ndarray) -> np.ndarray:
-    count = round((time[-1] - time[0]) / float(np.median(np.diff(time)))) + 1
-    return np.linspace(time[0], time[-1], count)
+def _even_time(run: Run) -> np.ndarray:
+    time = run.signals.time
+    if len(holes(time)):
+        raise InputError(f"{run.file}: has a hole in time after {time[holes(time)[0] - 1]:.12g} s; make two runs of it")
+    return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / interval(time)) + 1)
 
 
-def _cutoff(time: np.ndarray, q: np.ndarray) -> float:
-    even = _even_time(time)
+def _cutoff(run: Run) -> float:
+    time, q = run.signals.time, run.signals.q
+    even = _even_time(run)
     rate = 1 / (even[1] - even[0])
     speed = np.diff(make_interp_spline(time, q, k=1)(even), axis=0)
     power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +13,13 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.samples import Signals, read_signals
+from irtwin.signals.sampling import as_sampled
+from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
 
 ROLES = ("observed", "reference", "simulated")
 _SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _POWER_AT = ("mains", "dc_bus")
+_EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,10 @@ class Run:
 
 @dataclass(frozen=True)
 class DataSet:
-    """A robot and its runs; `effects` is what the twin is said to model, None for the baseline."""
+    """A robot and its runs; `effects` is what the twin is said to model, None for the baseline.
+
+    `repairs` says what was done to the samples: some dropped, a run cut at a hole in time, held samples thinned out.
+    """
 
     folder: Path
     robot: Robot
@@ -53,18 +57,17 @@ class DataSet:
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
-    """Read and check a data set; `repair` drops bad samples and says in `repairs` how many and which.
+    """Read and check a data set; `repair` drops bad samples.
 
-    Raises InputError, naming file, line or column, on whatever is wrong.
+    A run NAME with holes in time becomes several, NAME, NAME.2 and so on. Raises InputError, naming file, line or
+    column, on whatever is wrong.
     """
     file = folder / "dataset.toml"
-    document = _read_toml(file)
-    table = _Table(file, "[robot]", _take(document, "robot", dict, file, "[robot]"))
+    document = read_toml(file)
+    table = Table(file, "[robot]", take(document, "robot", dict, file, "[robot]"))
     robot = _robot(folder, table)
-    runs, repairs = [], []
-    for run, lines in _runs(folder, file, document, robot, repair):
-        runs.append(run)
-        repairs.extend(lines)
+    repairs: list[str] = []
+    runs = list(_runs(folder, file, document, robot, repair, repairs))
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
@@ -92,71 +95,16 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
     """
     for folder in list(file.absolute().parents)[:2]:
         toml = folder / "dataset.toml"
-        runs = _read_toml(toml).get("run") if toml.is_file() else None
+        runs = read_toml(toml).get("run") if toml.is_file() else None
         for number, values in enumerate(runs if isinstance(runs, list) else [], start=1):
-            table = _Table(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
+            table = Table(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
             named = table.text("file")
-            if named is not None and (folder / named).resolve() == file.resolve():
+            if named is not None and real_path(folder / named) == real_path(file):
                 return table.number("payload_mass", least=0.0) or 0.0, _centre(table)
     return 0.0, (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class _Table:
-    """A TOML table whose faults name it."""
-
-    file: Path
-    name: str
-    values: dict[str, Any]
-
-    def text(self, key: str, default: str | None = None) -> str | None:
-        value = self.values.get(key, default)
-        if value is not None and not (isinstance(value, str) and value.strip()):
-            raise InputError(f"{self.file}: {self.name} {key} should be text, not {value!r}")
-        return value
-
-    def number(self, key: str, *, least: float = -math.inf) -> float | None:
-        value = self.values.get(key)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < least:
-            bound = "" if least == -math.inf else f" of at least {least:g}"
-            raise InputError(f"{self.file}: {self.name} {key} should be a number{bound}, not {value!r}")
-        return float(value)
-
-    def path(self, key: str, folder: Path) -> Path:
-        text = self.text(key)
-        if text is None:
-            raise InputError(f"{self.file}: {self.name} {key} is missing")
-        path = folder / text
-        if not path.resolve().is_relative_to(folder.resolve()):
-            raise InputError(
-                f'{self.file}: {self.name} {key} = "{text}" leads out of the data set; copy the file into it'
-            )
-        if not path.is_file():
-            raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
-        return path
-
-
-def _read_toml(file: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/") from error
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not valid TOML: {error}") from error
-
-
-def _take(document: dict[str, Any], key: str, kind: type, file: Path, name: str) -> Any:
-    value = document.get(key)
-    if not isinstance(value, kind) or not value:
-        raise InputError(f"{file}: {name} is missing")
-    return value
-
-
-def _robot(folder: Path, table: _Table) -> Robot:
+def _robot(folder: Path, table: Table) -> Robot:
     name = table.text("name")
     if name is None:
         raise InputError(f"{table.file}: [robot] name is missing")
@@ -175,7 +123,7 @@ def _robot(folder: Path, table: _Table) -> Robot:
         values = sheets.get(joint.name, {})
         if not isinstance(values, dict):
             raise InputError(f"{table.file}: [robot.joint.{joint.name}] should be a table")
-        sheet = _Table(table.file, f"[robot.joint.{joint.name}]", values)
+        sheet = Table(table.file, f"[robot.joint.{joint.name}]", values)
         given: dict[str, Any] = {key: sheet.number(key, least=0.0) for key in _SHEET}
         joints.append(replace(joint, **given))
     return replace(
@@ -189,15 +137,17 @@ def _robot(folder: Path, table: _Table) -> Robot:
 
 
 def _runs(
-    folder: Path, file: Path, document: dict[str, Any], robot: Robot, repair: bool
-) -> Iterator[tuple[Run, list[str]]]:
-    for number, values in enumerate(_take(document, "run", list, file, "[[run]]"), start=1):
-        table = _Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
+    folder: Path, file: Path, document: dict[str, Any], robot: Robot, repair: bool, repairs: list[str]
+) -> Iterator[Run]:
+    for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
+        table = Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
         path = table.path("file", folder)
         role = table.text("role", "observed") or ""
         if role not in ROLES:
             raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
-        signals, repairs = read_signals(path, robot, repair=repair)
+        signals, dropped = read_signals(path, robot, repair=repair)
+        pieces, sampled = as_sampled(signals, path)
+        repairs += dropped + sampled
         run = Run(
             name=path.stem,
             file=path,
@@ -210,25 +160,38 @@ def _runs(
             notes={key: value for key, value in table.values.items() if key not in ("file", "role")},
             signals=signals,
         )
-        yield run, repairs
+        yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
 
 
-def _centre(table: _Table) -> tuple[float, float, float]:
+def _piece(run: Run, number: int, signals: Signals) -> Run:
+    """Return a run of some of its samples, named by its number from the second on; it started when they do."""
+    later = float(signals.time[0] - run.signals.time[0])
+    return replace(
+        run,
+        name=run.name if number == 1 else f"{run.name}.{number}",
+        started=run.started and run.started + timedelta(seconds=later),
+        signals=signals,
+    )
+
+
+def _centre(table: Table) -> tuple[float, float, float]:
     value = table.values.get("payload_com", [0.0, 0.0, 0.0])
     if not (isinstance(value, list) and len(value) == 3):
         raise InputError(f"{table.file}: {table.name} payload_com should be three numbers in m")
-    x, y, z = (_Table(table.file, f"{table.name} payload_com", {"part": part}).number("part") or 0.0 for part in value)
+    x, y, z = (Table(table.file, f"{table.name} payload_com", {"part": part}).number("part") or 0.0 for part in value)
     return x, y, z
 
 
-def _started(table: _Table) -> datetime | None:
+def _started(table: Table) -> datetime | None:
     value = table.values.get("started")
     if value is None:
         return None
     if isinstance(value, date) and not isinstance(value, datetime):
         value = datetime(value.year, value.month, value.day)
     if not isinstance(value, datetime):
-        raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {value!r}")
+        raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {shown(value)}")
+    if not _EARLIEST <= value.year <= _LATEST:
+        raise InputError(f"{table.file}: {table.name} started lies in no year from {_EARLIEST} to {_LATEST}: {value}")
     return value if value.tzinfo else value.replace(tzinfo=UTC)
 
 
@@ -239,7 +202,7 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
         if run.name in names:
             raise InputError(f'{file}: two runs are named "{run.name}" ({names[run.name]}, {run.file}); rename one')
         names[run.name] = run.file
-    files = {run.file.resolve(): run.name for run in runs}
+    files = {run.file.resolve(): run.name for run in reversed(runs)}  # of a run in pieces, the first
     resolved = []
     for run in runs:
         if run.repeat_of is not None:

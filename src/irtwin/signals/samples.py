@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +14,11 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from irtwin.errors import InputError
+from irtwin.input_file import check_file, read_input
 from irtwin.robot.description import Joint, Robot
 
 # the largest magnitude that any robot reaches, by the column's prefix
-_REACH = {
+REACH = {
     "time": 1e11,
     "q": 1e4,
     "dq": 1e4,
@@ -28,7 +31,10 @@ _REACH = {
     "current": 1e5,
 }
 _WHOLE_ROBOT = ("time", "power", "voltage", "current")
-_FEWEST = 20  # samples; fewer cannot be filtered
+FEWEST = 20  # samples; fewer cannot be filtered
+_MOST_COLUMNS = 10_000
+_MOST_VALUES = 100_000_000  # of the columns that are read: 0.8 GB
+_LARGEST_CSV = 1_000_000_000  # bytes; held in memory while it is read
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,10 @@ class Signals:
     temperature: np.ndarray | None = None
     power: np.ndarray | None = None
 
+    def rows(self, chosen: slice | np.ndarray) -> Signals:
+        """Return some of the samples."""
+        return replace(self, **{name: values[chosen] for name, values in vars(self).items() if values is not None})
+
 
 def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bool = True) -> tuple[Signals, list[str]]:
     """Read a run's file; return its signals and, with `repair`, a line for each kind of sample that was dropped.
@@ -55,14 +65,17 @@ def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bo
     `measured`: whether torque or power has to be there, or the motion is enough. Raises InputError, naming file, line
     or row and column, on anything `LOG_FORMAT.md` calls bad input.
     """
-    table, first_line, repairs = _read_table(path, repair)
-    columns = _columns(table, robot, path)
+    read = {".csv": _read_csv, ".parquet": _read_parquet}.get(path.suffix)
+    if read is None:
+        raise InputError(f"{path}: a run is a .csv or a .parquet file; convert it to one of these")
+    table, first_line, repairs = read(path, robot, repair)
+    columns = {name.strip(): _floats(table.column(name)) for name in table.column_names}
     where = _Where(path, first_line)
     keep, dropped = _bad_samples(columns, where, repair)
     if not keep.all():
         columns = {name: values[keep] for name, values in columns.items()}
-    if len(columns["time"]) < _FEWEST:
-        raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {_FEWEST}")
+    if len(columns["time"]) < FEWEST:
+        raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {FEWEST}")
     for joint in robot.joints:
         _check_unit(columns["time"], columns[f"q_{joint.name}"], joint, path)
     signals = _signals(columns, robot, path)
@@ -83,29 +96,48 @@ class _Where:
         return f"{self.path}, {place}, column {column}"
 
 
-def _read_table(path: Path, repair: bool) -> tuple[pa.Table, int | None, list[str]]:
-    if path.suffix == ".csv":
-        return _read_csv(path, repair)
-    if path.suffix != ".parquet":
-        raise InputError(f"{path}: a run is a .csv or a .parquet file; convert it to one of these")
+def _read_parquet(path: Path, robot: Robot, repair: bool) -> tuple[pa.Table, None, list[str]]:
+    """Read the known columns of a file, once its own account of itself promises numbers that fit into the memory."""
+    check_file(path)
     try:
-        return pa.parquet.read_table(path, partitioning=None), None, []
+        with pa.parquet.ParquetFile(path) as file:
+            schema, groups = file.schema_arrow, range(file.num_row_groups)
+            known = _known(schema.names, robot, path)
+            rows = max(file.metadata.num_rows, sum(file.metadata.row_group(group).num_rows for group in groups))
+            _check_size(rows, len(known), path)
+            for name in known:
+                if not _is_numeric(schema.field(name).type):
+                    kind = str(schema.field(name).type)[:60]
+                    raise InputError(f"{path}: column {name} is of type {kind}; export it as numbers, in SI units")
+            return file.read(columns=known), None, []
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error}); export the run again") from error
-    except pa.ArrowException as error:
-        reason = str(error).splitlines()[0]
-        raise InputError(f"{path}: not a readable Parquet file ({reason}); export the run again") from error
+        raise InputError(f"{path}: cannot be read ({_first_line(error)}); export the run again") from error
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable Parquet file ({_first_line(error)}); export the run again") from error
 
 
-def _read_csv(path: Path, repair: bool) -> tuple[pa.Table, int, list[str]]:
-    try:
-        text = path.read_bytes().rstrip()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+def _is_numeric(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind))
+
+
+def _check_size(rows: int, columns: int, path: Path) -> None:
+    if rows == 0:
+        raise InputError(f"{path}: has no sample; an empty run cannot be used")
+    if rows * columns > _MOST_VALUES:
+        raise InputError(
+            f"{path}: {rows} samples of {columns} columns; a run may have {_MOST_VALUES:,} values: cut it into several"
+        )
+
+
+def _read_csv(path: Path, robot: Robot, repair: bool) -> tuple[pa.Table, int, list[str]]:
+    text = read_input(path, _LARGEST_CSV).rstrip()
     if not text:
         raise InputError(f"{path}: is empty; a run has a line of column names and a line for each sample")
     if b"\n" not in text:
         raise InputError(f"{path}: has no sample below its first line; an empty run cannot be used")
+    columns = text.count(b",", 0, text.index(b"\n")) + 1
+    if columns > _MOST_COLUMNS:
+        raise InputError(f"{path}, line 1: {columns} columns; a run has at most {_MOST_COLUMNS}")
     wrong: list[tuple[int, str]] = []
 
     def note(row: pa.csv.InvalidRow) -> str:
@@ -119,28 +151,30 @@ def _read_csv(path: Path, repair: bool) -> tuple[pa.Table, int, list[str]]:
             parse_options=pa.csv.ParseOptions(invalid_row_handler=note, ignore_empty_lines=False),
             convert_options=pa.csv.ConvertOptions(strings_can_be_null=True),
         )
-    except pa.ArrowException as error:
-        reason = str(error).splitlines()[0]
+        known = _known(table.column_names, robot, path)
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        too_long = "straddling" in str(error)  # Arrow's word for a line longer than the block it reads at once
+        reason = "a line is longer than 1 MB" if too_long else _first_line(error)
         raise InputError(f"{path}: not readable as CSV ({reason}); separate columns by commas") from error
     if wrong and not repair:
         line, what = wrong[0]
         last = ", the last one: the file was cut off" if line == text.count(b"\n") + 1 else ""
         raise InputError(f"{path}, line {line}{last}: {what}; mend it, or use --repair to drop such samples")
     lines = ", ".join(str(line) for line, _ in wrong[:10]) + (" ..." if len(wrong) > 10 else "")
-    return (
-        table,
-        2,
-        [f"{path}: {len(wrong)} samples dropped, wrong number of values: line {lines}"] if wrong else [],
-    )
+    _check_size(table.num_rows, len(known), path)
+    said = f"{path}: {len(wrong)} samples dropped, wrong number of values: line {lines}"
+    return table.select(known), 2, [said] if wrong else []
 
 
-def _columns(table: pa.Table, robot: Robot, path: Path) -> dict[str, np.ndarray]:
-    """Return the known columns as floats (text and nulls become NaN); raise on missing, repeated, foreign ones."""
-    names = [name.strip() for name in table.column_names]
-    repeated = sorted({name for name in names if names.count(name) > 1})
+def _known(columns: Sequence[str], robot: Robot, path: Path) -> list[str]:
+    """Return those columns that the log format knows; raise on missing, repeated, foreign ones."""
+    names = [name.strip() for name in columns]
+    if len(names) > _MOST_COLUMNS:
+        raise InputError(f"{path}: {len(names)} columns; a run has at most {_MOST_COLUMNS}")
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InputError(f"{path}: column {repeated[0]} stands there twice; keep one")
-    per_joint = {f"{kind}_{joint}" for kind in _REACH if kind not in _WHOLE_ROBOT for joint in robot.joint_names}
+    per_joint = {f"{kind}_{joint}" for kind in REACH if kind not in _WHOLE_ROBOT for joint in robot.joint_names}
     for name in names:
         kind, _, joint = name.partition("_")
         if kind in ("q", "dq", "ddq", "tau") and joint and name not in per_joint:
@@ -150,18 +184,20 @@ def _columns(table: pa.Table, robot: Robot, path: Path) -> dict[str, np.ndarray]
     for needed in ("time", *(f"q_{joint}" for joint in robot.joint_names)):
         if needed not in names:
             raise InputError(f"{path}: column {needed} is missing")
-    if table.num_rows == 0:
-        raise InputError(f"{path}: has no sample; an empty run cannot be used")
     known = per_joint.union(_WHOLE_ROBOT)
-    return {name: _floats(table.column(place)) for place, name in enumerate(names) if name in known}
+    return [column for column, name in zip(columns, names, strict=True) if name in known]
 
 
 def _floats(column: pa.ChunkedArray) -> np.ndarray:
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
         return np.array([_float(value) for value in column.to_pylist()])
-    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+    if not _is_numeric(column.type):
         return np.full(len(column), np.nan)
     return np.array(column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False))
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0][:200]
 
 
 def _float(text: str | None) -> float:
@@ -187,7 +223,7 @@ def _bad_samples(columns: dict[str, np.ndarray], where: _Where, repair: bool) ->
         keep[rows] = False
 
     for name, values in columns.items():
-        reach = _REACH[name if name in _WHOLE_ROBOT else name.partition("_")[0]]
+        reach = REACH[name if name in _WHOLE_ROBOT else name.partition("_")[0]]
         drop(keep & ~np.isfinite(values), name, "is not a finite number")
         with np.errstate(invalid="ignore"):
             drop(keep & (np.abs(values) > reach), name, f"is beyond {reach:g}, which no robot reaches")
@@ -204,7 +240,8 @@ def _check_unit(time: np.ndarray, q: np.ndarray, joint: Joint, path: Path) -> No
     """Raise where a position is plainly in degrees: its speed or its range is far beyond the joint's."""
     if joint.kind == "prismatic":
         return
-    speed = np.quantile(np.abs(np.diff(q) / np.diff(time)), 0.99)
+    with np.errstate(over="ignore"):
+        speed = np.quantile(np.abs(np.diff(q) / np.diff(time)), 0.99)
     bounds = joint.upper - joint.lower
     too_fast = np.isfinite(joint.velocity) and speed > 4 * joint.velocity
     too_far = np.isfinite(bounds) and bounds > 0 and np.ptp(q) > 1.5 * bounds

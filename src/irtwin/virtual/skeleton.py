@@ -41,7 +41,8 @@ def joint_axes(robot: Robot) -> np.ndarray:
     pin.computeJointJacobians(robot.model, data, np.zeros(len(robot.joints)))
     axes = np.empty((len(robot.joints), 3))
     for column, joint in enumerate(robot.joints):
-        twist = pin.getJointJacobian(robot.model, data, column + 1, pin.LOCAL)[:, column]
+        jacobian = pin.getJointJacobian(robot.model, data, column + 1, pin.LOCAL).reshape(6, -1)  # flat of one joint
+        twist = jacobian[:, column]
         axes[column] = twist[:3] if joint.kind == "prismatic" else twist[3:]
     return axes
 

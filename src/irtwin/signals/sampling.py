@@ -1,0 +1,105 @@
+"""How a run was sampled: at what interval, with what holes in time, and whether its positions were held."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from irtwin.errors import InputError
+from irtwin.signals.samples import FEWEST, Signals
+
+HOLE = 25.0  # intervals without a sample: nobody knows what the robot did meanwhile
+_MOST_PIECES = 100  # of one run; more, and it is not sampled but sprinkled
+_BURST = 4.0  # times the median: where a tenth of the samples lies farther apart, the stamps come in bursts
+_REGULAR = 0.9  # of the updates of held positions come at one pace, a sample more or less
+_STEPS = 2.0  # times its smallest, the usual step of a position; an encoder that counts up takes the smallest
+
+
+def interval(time: np.ndarray) -> float:
+    """Return the sampling interval (s) of rising times (N,): the median one, longer where stamps come in bursts."""
+    gaps = np.diff(time)
+    return float(max(np.median(gaps), np.quantile(gaps, 0.9) / _BURST))
+
+
+def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[str]]:
+    """Return a run's samples at the rate at which they were taken, in pieces without a hole; say what was done.
+
+    Held positions: one sample of each update stays. A piece of fewer than 20 samples is left out. A run that has
+    neither comes back as it is. Raises InputError where no piece is left, or there are more than 100.
+    """
+    signals, said = _without_held(signals, path)
+    pieces = _cut(signals)
+    if len(pieces) == 1:
+        return pieces, said
+    long = [piece for piece in pieces if len(piece.time) >= FEWEST]
+    first = f"from {pieces[0].time[-1]:.12g} s to {pieces[1].time[0]:.12g} s"
+    if not 0 < len(long) <= _MOST_PIECES:
+        raise InputError(
+            f"{path}: {len(pieces) - 1} holes in time, the first {first}, leave {len(long)} pieces of {FEWEST} "
+            f"samples; a run needs 1 to {_MOST_PIECES}: log it at an even rate"
+        )
+    others = "" if len(pieces) == 2 else f" (the first of {len(pieces) - 1} holes)"
+    left_out = sum(len(piece.time) for piece in pieces if len(piece.time) < FEWEST)
+    dropped = f"; {left_out} samples left out, in pieces of fewer than {FEWEST}" if left_out else ""
+    taken = "one run" if len(long) == 1 else f"{len(long)} runs"
+    return long, [*said, f"{path}: no samples {first}{others}; taken as {taken}{dropped}"]
+
+
+def holes(time: np.ndarray) -> np.ndarray:
+    """Return the samples (from 1 on) before which nothing was sampled for far longer than the interval."""
+    if len(time) < FEWEST:
+        return np.empty(0, dtype=int)
+    return np.flatnonzero(np.diff(time) > HOLE * interval(time)) + 1
+
+
+def _cut(signals: Signals) -> list[Signals]:
+    """Return the pieces between holes; what is a hole in a piece, by its own interval, cuts that again."""
+    todo, done = [signals], []
+    while todo:
+        piece = todo.pop()
+        cuts = holes(piece.time).tolist()
+        if cuts:
+            parts = [piece.rows(slice(*ends)) for ends in pairwise([0, *cuts, len(piece.time)])]
+            todo += reversed(parts)
+        else:
+            done.append(piece)
+    return done
+
+
+def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[str]]:
+    step = _hold(signals.q)
+    if step is None:
+        return signals, []
+    rows = _updates(signals.q, step)
+    logged, true = 1 / interval(signals.time), 1 / interval(signals.time[rows])
+    said = f"{path}: positions change at {true:.4g} Hz, samples are stamped at {logged:.4g} Hz; taken at the former"
+    return signals.rows(rows), [said]
+
+
+def _hold(q: np.ndarray) -> int | None:
+    """Return for how many samples positions (N, n) are held; None where they are not.
+
+    They are where some position changes at a pace of several samples and by steps of any size; where a joint stands or
+    creeps, so that its encoder counts up only now and then, they are not.
+    """
+    steps = np.abs(np.diff(q, axis=0))
+    changes = np.flatnonzero(steps.any(axis=1))
+    if len(changes) < FEWEST:
+        return None
+    paces = np.diff(changes)
+    usual = float(np.median(paces))
+    moving = paces[paces <= 2 * usual]
+    if usual < 2 or np.mean(np.abs(moving - usual) <= 1) < _REGULAR or np.mean(paces == 1) > 1 - _REGULAR:
+        return None
+    smallest = np.where(steps > 0, steps, np.inf).min(axis=0)
+    sizes = (steps / smallest)[steps > 0]
+    return round(usual) if np.median(sizes) > _STEPS else None
+
+
+def _updates(q: np.ndarray, step: int) -> np.ndarray:
+    """Return the rows at which positions are updated; while they stand, every `step`-th."""
+    changes = [0, *(np.flatnonzero(np.diff(q, axis=0).any(axis=1)) + 1).tolist(), len(q)]
+    rows = [np.arange(start, max(stop - step // 2, start + 1), step) for start, stop in pairwise(changes)]
+    return np.concatenate(rows)

@@ -1,0 +1,116 @@
+"""A data set's TOML file, read as hostile input: every fault names the file, the table and the key."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from irtwin.errors import InputError
+from irtwin.input_file import read_input
+
+_LARGEST = 20_000_000  # bytes
+_GREATEST = 1e300  # of a number
+_DEEPEST = 32  # tables in tables
+
+
+@dataclass(frozen=True)
+class Table:
+    """A TOML table whose faults name it."""
+
+    file: Path
+    name: str
+    values: dict[str, Any]
+
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """Return the text of a key. Raises InputError where it is no text, or blank."""
+        value = self.values.get(key, default)
+        if value is not None and not (isinstance(value, str) and value.strip()):
+            raise InputError(f"{self.file}: {self.name} {key} should be text, not {shown(value)}")
+        return value
+
+    def number(self, key: str, *, least: float = -math.inf) -> float | None:
+        """Return the number of a key, None where it is absent. Raises InputError where it is none, or below `least`."""
+        value = self.values.get(key)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < least:
+            bound = "" if least == -math.inf else f" of at least {least:g}"
+            raise InputError(f"{self.file}: {self.name} {key} should be a number{bound}, not {shown(value)}")
+        return float(value)
+
+    def path(self, key: str, folder: Path) -> Path:
+        """Return the file that a key names. Raises InputError where it is none, or not in the folder."""
+        text = self.text(key)
+        if text is None:
+            raise InputError(f"{self.file}: {self.name} {key} is missing")
+        path = folder / text
+        real = real_path(path)
+        if real is None:
+            raise InputError(f'{self.file}: {self.name} {key} = "{text[:200]}" is no path that can be followed')
+        if not real.is_relative_to(folder.resolve()):
+            raise InputError(
+                f'{self.file}: {self.name} {key} = "{text}" leads out of the data set; copy the file into it'
+            )
+        if not real.is_file():
+            raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
+        return path
+
+
+def real_path(path: Path) -> Path | None:
+    """Return where a path leads; None where its links go round in a circle or a name is too long."""
+    try:
+        real = path.resolve()
+        real.is_file()
+        return real
+    except (OSError, RuntimeError):  # Python 3.13 has the former for a circle, those before the latter
+        return None
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """Read a data set's dataset.toml. Raises InputError, naming the file, on what is no TOML or beyond bounds."""
+    real = real_path(file)
+    if real is None or not real.exists():
+        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
+    content = read_input(file, _LARGEST)
+    try:
+        document = tomllib.loads(content.decode())
+    except ValueError as error:  # an integer of thousands of digits is no TOMLDecodeError
+        raise InputError(f"{file}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{file}: not valid TOML: nested too deeply") from error
+    _check_values(document, file, "", 0)
+    return document
+
+
+def _check_values(value: Any, file: Path, name: str, depth: int) -> None:
+    """Raise on numbers beyond a float, null characters, which neither paths nor databases take, and deep nesting."""
+    if depth > _DEEPEST:
+        raise InputError(f"{file}: not valid TOML: nested too deeply")
+    if isinstance(value, int) and not -_GREATEST <= value <= _GREATEST:
+        raise InputError(f"{file}: {name} is a number beyond {_GREATEST:g}")
+    if isinstance(value, str) and "\0" in value:
+        raise InputError(f"{file}: {name} has a null character in it")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_values(key, file, f"a key of {name}", depth)
+            _check_values(inner, file, f"{name}.{key}".removeprefix("."), depth + 1)
+    if isinstance(value, list):
+        for inner in value:
+            _check_values(inner, file, name, depth + 1)
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: its beginning where it is long."""
+    text = repr(value)
+    return text if len(text) < 60 else f"{text[:60]}..."
+
+
+def take(document: dict[str, Any], key: str, kind: type, file: Path, name: str) -> Any:
+    """Return a part of a document. Raises InputError where it is absent, empty or of another kind."""
+    value = document.get(key)
+    if not isinstance(value, kind) or not value:
+        raise InputError(f"{file}: {name} is missing")
+    return value

@@ -1,0 +1,67 @@
+"""A case: a data set, how it is spoilt, and the commands that are tried on it. Kept as JSON, it is a test."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from typing import Any
+
+from hypothesis import strategies as st
+from logs import DataPlan, RunPlan, data_sets
+from robots import Axis, RobotPlan
+from spoil import spoils
+from streams import StreamPlan, streams
+
+ALONE = ("diagnose", "predict")
+WITH_WORKSPACE = ("run", "query", "export", "live", "diagnose into workspace", "query")
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is tried, in order."""
+
+    data: DataPlan
+    spoils: tuple[tuple[str, int], ...] = ()
+    commands: tuple[str, ...] = ALONE
+    stream: StreamPlan = field(default_factory=StreamPlan)
+
+    def to_json(self) -> str:
+        """Return the case as text; the inverse of `read_case`."""
+        return json.dumps(_plain(self), indent=1, ensure_ascii=False) + "\n"
+
+
+def read_case(text: str) -> Case:
+    """Read a case that was kept."""
+    said = _tuples(json.loads(text))
+    data = said.pop("data")
+    robot = data.pop("robot")
+    axes = tuple(Axis(**axis) for axis in robot.pop("axes"))
+    runs = tuple(RunPlan(**run) for run in data.pop("runs"))
+    stream = StreamPlan(**said.pop("stream", {}))
+    return Case(DataPlan(RobotPlan(axes, **robot), runs, **data), stream=stream, **said)
+
+
+def _plain(value: Any) -> Any:
+    """Return a plan as JSON has it, without what is at its default."""
+    if is_dataclass(value):
+        return {
+            it.name: _plain(own)
+            for it in fields(value)
+            if (own := getattr(value, it.name))
+            != (it.default_factory() if it.default_factory is not MISSING else it.default)
+        }
+    return list(map(_plain, value)) if isinstance(value, tuple) else value
+
+
+def _tuples(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _tuples(inner) for key, inner in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> Case:
+    """Draw a case; one in three data sets is spoilt, one in eight goes into a workspace."""
+    spoilt = draw(spoils()) if draw(st.integers(0, 2)) == 0 else ()
+    commands = draw(st.sampled_from((ALONE,) * 6 + (WITH_WORKSPACE, ("excite",))))
+    return Case(draw(data_sets()), spoilt, commands, draw(streams()))

@@ -1,0 +1,207 @@
+"""The commands on a case, each in a child with little time and memory, and what counts as a fault."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import select
+import signal
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import logs
+import pyarrow.parquet
+import spoil
+import streams
+from case import Case
+
+import irtwin.cli
+import irtwin.watch
+import irtwin.workflow  # here, once, not in each child
+
+SECONDS = 60
+MEGABYTES = 2000  # beside what the libraries take
+_EXCITING = 4.0  # s until Ctrl-C: the best motion so far is kept
+LONGEST_LINE = 2000  # characters of an error
+_STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
+_WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
+
+
+@dataclass(frozen=True)
+class Done:
+    """What became of a command: its status (negative: the signal), what it printed, s, MB beside the libraries."""
+
+    status: int
+    out: str
+    err: str
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A command that failed as none may; `kind` is the same for the same fault."""
+
+    command: str
+    kind: str
+    said: str
+
+
+def try_case(case: Case) -> Fault | None:
+    """Try the commands of a case, one after the other; return the first fault."""
+    with tempfile.TemporaryDirectory(prefix="irtwin-fuzz-") as name:
+        folder = Path(name)
+        made = in_child(lambda: _make(case, folder / "data"), folder)
+        if made.status:
+            raise AssertionError(f"the harness cannot make the data set of this case:\n{made.err}\n{case.to_json()}")
+        for place, command in enumerate(case.commands):
+            arguments, writes = _arguments(command, folder)
+            if arguments is None:
+                continue
+            stdin = folder / "stdin"
+            stdin.write_bytes(_stream(case, folder) if command == "live" else b"")
+            for file in writes:
+                file.unlink(missing_ok=True)
+            patience = _EXCITING if command == "excite" else None
+            done = in_child(partial(_main, arguments), folder, stdin, patience)
+            kind = _fault(done, writes)
+            if kind is not None:
+                return Fault(f"{place + 1}: {command}", f"{command}: {kind}", done.err[-6000:])
+            if done.status:
+                break
+    return None
+
+
+def _make(case: Case, folder: Path) -> None:
+    logs.write(case.data, folder)
+    for way, seed in case.spoils:
+        spoil.spoil(folder, way, seed)
+
+
+def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]]:
+    """Return a command's arguments, None where there is nothing to try it on, and the files it is to write."""
+    data, workspace, twin = folder / "data", folder / "workspace", folder / "twin.json"
+    out = {name: folder / name for name in ("gap.json", "gap.html", "predicted.parquet", "motion.csv", "all.owl")}
+    diagnose = ["diagnose", data, "--json", out["gap.json"]]
+    run = next((data / "runs").iterdir())
+    words, writes = {
+        "diagnose": ([*diagnose, "--report", out["gap.html"], "--save-twin", twin], [out["gap.json"], out["gap.html"]]),
+        "diagnose into workspace": ([*diagnose, "--workspace", workspace], [out["gap.json"]]),
+        "predict": (["predict", twin, run, "--out", out["predicted.parquet"]], [out["predicted.parquet"]]),
+        "excite": (
+            ["excite", data / "robot.urdf", "--seconds", "2", "--out", out["motion.csv"]],
+            [out["motion.csv"]],
+        ),
+        "run": (["run", data, "--workspace", workspace, "--repair"], []),
+        "query": (["query", "energy_per_joint", "--workspace", workspace], []),
+        "export": (["export", "--owl", out["all.owl"], "--workspace", workspace], [out["all.owl"]]),
+        "live": (["live", "--workspace", workspace], []),
+    }[command]
+    if command == "predict" and not twin.exists():
+        return None, []
+    return list(map(str, words)), writes
+
+
+def _stream(case: Case, folder: Path) -> bytes:
+    moving = sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
+    pages = sorted((folder / "workspace" / "reports").glob("*.html"))
+    return streams.lines(case.stream, pages[0].stem if pages else "arm", moving)
+
+
+def _main(arguments: list[str]) -> None:
+    sys.argv = ["irtwin", *arguments]
+    irtwin.cli.main()
+
+
+def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, patience: float | None = None) -> Done:
+    """Do some work in a child process with little time and memory; Ctrl-C comes after `patience` s."""
+    out, err = folder / "stdout", folder / "stderr"
+    child = os.fork()
+    if child == 0:
+        _child(work, stdin or Path(os.devnull), out, err)
+    end = os.pidfd_open(child)
+    try:
+        if patience is not None and not select.select([end], [], [], patience)[0]:
+            os.kill(child, signal.SIGINT)
+        if not select.select([end], [], [], SECONDS)[0]:
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+    finally:
+        os.close(end)
+    said = (file.read_bytes().decode(errors="replace") for file in (out, err))
+    return Done(os.waitstatus_to_exitcode(status), *said)
+
+
+def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
+    status = 1
+    try:
+        for number, file, flags in ((0, stdin, os.O_RDONLY), (1, out, os.O_WRONLY), (2, err, os.O_WRONLY)):
+            os.dup2(os.open(file, flags | (os.O_CREAT | os.O_TRUNC if flags else 0), 0o600), number)
+        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w")  # noqa: SIM115
+        warnings.resetwarnings()
+        for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+            warnings.simplefilter("ignore", kind)
+        warnings.showwarning = lambda said, kind, file, line, *_: print(
+            f"{file}:{line}: {kind.__name__}: {said}", file=sys.stderr
+        )
+        pages = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_DATA, (pages + (MEGABYTES << 20),) * 2)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        work()
+        status = 0
+    except SystemExit as stop:
+        status = stop.code if isinstance(stop.code, int) else 0 if stop.code is None else 1
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(status)
+
+
+def _fault(done: Done, writes: list[Path]) -> str | None:
+    """Say what is wrong with how a command ended; None where nothing is."""
+    if done.status == -signal.SIGKILL:
+        return f"hang of {SECONDS} s"
+    if "Traceback (most recent call last)" in done.err:
+        return _where(done.err)
+    if done.status not in (0, 2, 3):
+        return f"exit status {done.status}"
+    if found := _WARNING.search(done.err):
+        return re.sub(r"^.*/(src|site-packages)/", "", found[0])[:200]
+    if done.status:
+        lines = [line for line in done.err.splitlines() if line.strip() and not _STEP.match(line)]
+        if len(lines) != 1:
+            return f"{len(lines)} lines of error"
+        if len(lines[0]) > LONGEST_LINE:
+            return "an error of many characters"
+        return next((f"{file.name} written beside an error" for file in writes if file.exists()), None)
+    return next((f"{file.name} is not whole" for file in writes if not _whole(file)), None)
+
+
+def _where(err: str) -> str:
+    """Return the last line of irtwin's in a traceback, and the error's kind: what tells two faults apart."""
+    places = re.findall(r'File "[^"]*/src/(irtwin/[^"]*)", line (\d+), in (\S+)', err)
+    ends = re.findall(r"^(\w[\w.]*(?:Error|Exception|Interrupt|Exit|Warning)\w*|[a-z_]+\.\w+)\b", err, re.M)
+    place = f"{places[-1][0]} in {places[-1][2]}" if places else "?"
+    return f"{ends[-1] if ends else 'error'} at {place}"
+
+
+def _whole(file: Path) -> bool:
+    if not file.exists():
+        return False
+    if file.suffix == ".json":
+        json.loads(file.read_text(), parse_constant=_no_constant)
+    if file.suffix == ".parquet":
+        pyarrow.parquet.read_table(file)
+    return file.stat().st_size > 0
+
+
+def _no_constant(text: str) -> None:
+    raise AssertionError(f"{text} is no JSON")

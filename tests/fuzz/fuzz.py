@@ -1,0 +1,83 @@
+"""Draws cases for FUZZ_SECONDS (600 by default), and keeps the smallest case of each fault in `kept/`, as a test.
+
+`make fuzz`; FUZZ_SEED repeats a session. Exit status 1 where a fault was found.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import sys
+import time
+from pathlib import Path
+
+from case import Case, cases
+from commands import Fault, try_case
+from hypothesis import HealthCheck, Phase, given, seed, settings
+
+KEPT = Path(__file__).parent / "kept"
+_ROUND = 200  # draws by one seed
+
+
+class Session:
+    """Draws until the time is over; `faults` counts each kind."""
+
+    def __init__(self, seconds: float) -> None:
+        self.faults: dict[str, int] = {}
+        self.draws = 0
+        self._end = time.monotonic() + seconds
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is over."""
+        return time.monotonic() >= self._end
+
+    def take(self, case: Case) -> None:
+        """Try a case, keep it where it shows a fault that none smaller shows."""
+        if self.over:
+            return
+        self.draws += 1
+        fault = try_case(case)
+        if fault is None:
+            return
+        self.faults[fault.kind] = self.faults.get(fault.kind, 0) + 1
+        if self.faults[fault.kind] == 1:
+            print(f"draw {self.draws}, {fault.kind}\n{fault.said}", flush=True)
+        _keep(case, fault)
+
+
+def _keep(case: Case, fault: Fault) -> None:
+    words = re.sub(r"[^a-z]+", "-", fault.kind.lower()).strip("-")[:60]
+    file = KEPT / f"{words}-{hashlib.sha256(fault.kind.encode()).hexdigest()[:6]}.json"
+    text = case.to_json()
+    if not file.exists() or len(text) < len(file.read_text()):
+        KEPT.mkdir(exist_ok=True)
+        file.write_text(text)
+
+
+def main() -> None:
+    """Run a session."""
+    number = int(os.environ.get("FUZZ_SEED", time.time_ns() % 1_000_000))
+    seconds = float(os.environ.get("FUZZ_SECONDS", "600"))
+    session, began = Session(seconds), time.monotonic()
+    print(f"FUZZ_SEED={number}", flush=True)
+    while not session.over:
+        drawn = settings(
+            max_examples=_ROUND,
+            deadline=None,
+            database=None,
+            phases=[Phase.generate],
+            suppress_health_check=[*HealthCheck],
+        )
+        drawn(seed(number)(given(cases())(session.take)))()
+        number += 1
+    minutes = (time.monotonic() - began) / 60
+    print(f"{session.draws} draws, {session.draws / minutes:.0f} a minute; {len(session.faults)} kinds of fault")
+    for kind, count in sorted(session.faults.items(), key=lambda entry: -entry[1]):
+        print(f"{count:6d}  {kind}")
+    sys.exit(bool(session.faults))
+
+
+if __name__ == "__main__":
+    main()

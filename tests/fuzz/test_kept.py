@@ -1,0 +1,17 @@
+"""Cases that once failed: each goes through its commands to an answer, or to one clear line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from case import read_case
+from commands import try_case
+
+KEPT = sorted((Path(__file__).parent / "kept").glob("*.json"))
+
+
+@pytest.mark.parametrize("file", KEPT, ids=lambda file: file.stem)
+def test_what_once_failed_comes_to_an_answer_or_to_one_line(file: Path):
+    fault = try_case(read_case(file.read_text(encoding="utf-8")))
+    assert fault is None, f"{fault.kind}\n{fault.said}"
