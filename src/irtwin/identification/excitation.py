@@ -17,6 +17,7 @@ from irtwin.identification.base_condition import BaseRegressor
 from irtwin.identification.descent import descend
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
+from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 
 Progress = Callable[[int, float, float], None]
@@ -67,6 +68,7 @@ class Excitation:
             raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
 
 
+@one_blas_thread()
 def excite(
     robot: Robot,
     seconds: float,

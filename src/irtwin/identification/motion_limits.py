@@ -121,7 +121,8 @@ class Workspace:
                 frame: pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
                 for frame in self._frames
             }
-            slope[row] = [wall.side * jacobians[wall.frame][wall.axis] for wall in self._walls]
+            for place, wall in enumerate(self._walls):
+                slope[row, place] = wall.side * jacobians[wall.frame][wall.axis]
         return value, slope
 
     def least_clearance(self, series: FourierSeries) -> float:
