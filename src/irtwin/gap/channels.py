@@ -10,6 +10,7 @@ import numpy as np
 from irtwin.effects.compliance import load_inertia, load_torque
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
 from irtwin.gap.candidates import Below, Candidates, candidate_pattern
 from irtwin.gap.headway import Tell, watched
 from irtwin.gap.hypotheses import candidate_columns
@@ -33,8 +34,13 @@ class Grouping:
         return len({self.label[run] for run in runs if run in self.observed}) < _FEWEST_GROUPS
 
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
-        """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""
+        """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time.
+
+        Raises InputError where none is.
+        """
         observed = np.array([block.run in self.observed for block in blocks])
+        if not observed.any():
+            raise InputError("no observed run is longer than the filter with a joint that moves; log longer ones")
         labels = [(block.run in self.observed, self.label[block.run]) for block in blocks]
         if self.few(block.run for block in blocks):
             labels = [(*label, k) for label, k in zip(labels, _stretches(blocks), strict=True)]  # type: ignore[misc]
