@@ -73,7 +73,7 @@ def torque_system(
 ) -> System:
     """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
 
-    `tell` is told how far that has come, where it takes long.
+    `tell` is told how far that has come, where it takes long. Raises InputError where too few samples are left.
     """
     robot = stack.robot
     columns = candidate_columns(robot, effects)
@@ -98,8 +98,7 @@ def torque_system(
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, watched(equations, motions, tell), pattern)
-    group, observed = grouping.of(blocks)
-    return System(stack.torque_terms, columns, pattern, tuple(blocks), group, observed)
+    return _judged(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
 
 
 def power_system(
@@ -132,5 +131,15 @@ def power_system(
         return Rows([joined], known[:, None], motion.power[:, None])
 
     blocks = accumulate(motions, watched(equations, motions, tell), pattern)
-    group, observed = grouping.of(blocks)
-    return System(free, columns, pattern, tuple(blocks), group, observed)
+    return _judged(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+
+
+def _judged(system: System) -> System:
+    """Return the system; raise InputError where its samples are so few that the twin would fit whatever they say."""
+    samples = int(system.rows.sum())
+    if samples <= system.base:
+        raise InputError(
+            f"{samples} samples are left of all runs to find {system.base} coefficients of the twin, which would fit "
+            "whatever they say; log longer runs"
+        )
+    return system
