@@ -13,7 +13,7 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.attribute import Attribution
 from irtwin.gap.cause import Cause
 from irtwin.gap.channels import Grouping, torque_system
-from irtwin.gap.experiment import ENOUGH, next_experiment
+from irtwin.gap.experiment import ENOUGH, Proposal, next_experiment
 from irtwin.gap.finding import Finding
 from irtwin.gap.hypotheses import MISSING, hypotheses
 from irtwin.gap.programme import programmes
@@ -22,6 +22,7 @@ from irtwin.gap.shrink import held_out
 from irtwin.gap.trial_ground import TrialGround
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
+from irtwin.report.gap_figures import experiment
 from synthetic import arm, measure, swing
 
 ROBOT = arm(2)
@@ -103,6 +104,15 @@ def test_joints_that_are_not_asked_for_stand_still(motions):
     ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
     assert np.ptp(ladder.motions[0].q[:, 0]) == 0
     assert set(ladder.settings["speeds"]) == {"joint_2"}
+
+
+def test_a_page_draws_the_joints_that_move(motions):
+    ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
+    proposal = Proposal("tell", (), ladder.joints, ROBOT, ladder, (), (), (), None)
+    assert proposal.curve["joints"] == ["joint_2"]
+    assert len(proposal.curve["q"]) == 1
+    assert np.ptp(proposal.curve["q"][0]) > 0
+    assert experiment(proposal.curve) is not None
 
 
 def test_without_limits_those_that_were_seen_are_kept(motions):
@@ -202,7 +212,7 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
     assert document["programme"]["joints"] == ["joint_2"] or document["programme"]["kind"] == "exciting_motion"
     assert document["expected_separation"] >= document["separation_now"]
     curve = proposal.curve
-    assert len(curve["q"]) == 2 and len(curve["q"][0]) == len(curve["time"]) <= 450
+    assert len(curve["q"]) == len(curve["joints"]) and len(curve["q"][0]) == len(curve["time"]) <= 450
 
 
 def test_nothing_to_ask(motions):

@@ -111,3 +111,29 @@ def test_a_fault_is_one_line_and_leaves_nothing(folder, tmp_path, fault):
     assert said.status == 2
     assert message in said.err
     assert [path.name for path in tmp_path.iterdir()] == ["run.parquet"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--payload-mass", "nan"], "a payload of nan kg: give 0 to 100000 kg"),
+        (["--payload-mass", "inf"], "a payload of inf kg: give 0 to 100000 kg"),
+        (["--payload-mass", "1e300"], "a payload of 1e+300 kg"),
+        (["--payload-mass", "-1"], "-1"),
+        (["--payload-com", "0", "nan", "0"], "a payload at 0, nan, 0 m: give its place in the flange frame"),
+        (["--payload-com", "0", "0", "-inf"], "a payload at 0, 0, -inf m"),
+    ],
+)
+def test_a_payload_that_cannot_be_is_refused(folder, tmp_path, options, message):
+    said = irtwin("predict", folder / "twin.json", folder / "data/runs/bare.parquet", "--out", tmp_path / "o", *options)
+    assert said.status == 2
+    assert message in said.err.splitlines()[-1]
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_motion_of_another_robot_is_refused(folder, tmp_path):
+    run = pq.read_table(folder / "data/runs/bare.parquet")
+    pq.write_table(run.drop_columns(["q_joint_2", "tau_joint_2"]), tmp_path / "short.parquet")
+    said = irtwin("predict", folder / "twin.json", tmp_path / "short.parquet", "--out", tmp_path / "o")
+    assert said.status == 2
+    assert "short.parquet: column q_joint_2 is missing" in said.err.splitlines()[-1]

@@ -7,8 +7,9 @@ import pytest
 
 from irtwin.effects.effect import BASELINE
 from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
 from irtwin.identification import accumulate as room
-from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.identification.accumulate import Rows, accumulate, accumulate_any
 from irtwin.identification.estimators import combine
 from irtwin.signals.filter import decimate, decimation, kernel
 from synthetic import arm, measure, swing
@@ -89,7 +90,19 @@ def test_undecided_samples_are_left_out():
 def test_a_run_shorter_than_the_filter_gives_nothing():
     motion = replace(measure(ROBOT, swing(ROBOT, 5, seconds=0.5)), cutoff=1.0)
     assert reduced([measure(ROBOT, swing(ROBOT, 5)), motion])[0][-1].run == "swing_5"
-    assert accumulate([motion], equations, STACK.pattern) == []
+    assert accumulate_any([motion], equations, STACK.pattern) == []
+    with pytest.raises(InputError, match=r'longer than the filter, 3\.01 s; the longest, "swing_5", has 0\.49 s'):
+        accumulate([motion], equations, STACK.pattern)
+
+
+def test_runs_in_which_nothing_is_decided_are_refused():
+    motion = replace(measure(ROBOT, swing(ROBOT, 5)), cutoff=10.0)
+
+    def nowhere(piece):
+        return replace(equations(piece), undecided=np.ones((len(piece.time), 3), dtype=bool))
+
+    with pytest.raises(InputError, match=r'in no run does a joint move for as long .* in "swing_5"'):
+        accumulate([motion], nowhere, STACK.pattern)
 
 
 @pytest.mark.parametrize("count", [1, 3])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from irtwin.effects.effect import Term
-from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.estimators import combine, estimate
 from irtwin.identification.uncertainty import half_widths
@@ -32,9 +31,13 @@ def test_known_truth_is_found():
     np.testing.assert_allclose(found.values, truth, rtol=1e-5)
 
 
-def test_nothing_to_fit():
-    with pytest.raises(InputError, match="every run is shorter than the filter's kernel; log longer runs"):
-        estimate([], np.ones((1, 1), dtype=bool), [Term("a", "")])
+@pytest.mark.parametrize("measured", [0.0, 5e-324, 1e-300])
+def test_a_dead_signal_gives_finite_numbers(measured):
+    columns = 1e4 * np.random.default_rng(0).standard_normal((500, 2))
+    terms = [Term("a", "", expected=3.0, spread=50.0), Term("b", "", spread=15.0, lowest=0.0)]
+    found = estimate(blocks_of(columns, np.full(500, measured)), all_used(columns), terms)
+    np.testing.assert_allclose(found.values, 0.0, atol=1e-6)
+    assert np.isfinite(found.covariance).all()
 
 
 def test_noisy_equations_count_less():

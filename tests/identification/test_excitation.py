@@ -1,4 +1,5 @@
 import csv
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import CLEARANCE, FULL_SPEED_AFTER, Box
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
+from irtwin.robot.urdf import parse_urdf
+from synthetic import arm
 
 KR6 = kr6()
 TWO = two_joints()
@@ -222,3 +225,50 @@ def test_a_rate_must_be_sensible() -> None:
 def test_a_box_out_of_reach_is_told(box: Box, message: str) -> None:
     with pytest.raises(InputError, match=message):
         excite(TWO, 5.0, box=box)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("joints", [1, 2, 3])
+@pytest.mark.parametrize("slides", [(), (0, 1, 2)])
+def test_small_robots_are_excited(joints: int, slides: tuple[int, ...]) -> None:
+    robot = arm(joints, slides[:joints])
+    found = excite(robot, 5.0, iterations=5)
+    assert np.isfinite(found.condition_number)
+    assert found.clearance > 0
+    assert_limits_kept(robot, found)
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [
+        ('lower="-2" upper="2" velocity="1e300"', "has a speed limit of 1e+300, as no machine has; mend its <limit>"),
+        ('lower="-2" upper="2" velocity="1e-300"', "has a speed limit of 1e-300"),
+        ('lower="-1e300" upper="1e300" velocity="3"', "has a range of 2e+300"),
+        ('lower="0" upper="1e-9" velocity="3"', "has a range of 1e-09"),
+    ],
+)
+def test_limits_that_no_machine_has_are_refused(limit: str, message: str) -> None:
+    with pytest.raises(InputError, match=re.escape(f'two: joint "turn" {message}')):
+        excite(two_joints(f'<limit {limit} effort="9"/>'), 5.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_robot_that_reaches_to_the_stars_is_refused() -> None:
+    with pytest.raises(InputError, match="reaches inf m, as no robot does; mend the origins"):
+        excite(parse_urdf(TWO.urdf.replace("0.2 0 0", "1e300 0 0")), 5.0)
+
+
+def test_fast_joints_of_a_long_range_are_slowed_until_the_way_is_clear() -> None:
+    found = excite(two_joints('<limit lower="-2000" upper="2000" velocity="5000" effort="9"/>'), 5.0, iterations=1)
+    assert found.clearance > 0
+
+
+def test_a_motion_too_long_to_hold_is_refused() -> None:
+    with pytest.raises(InputError, match="are 36000000 samples of 2 joints; ask for at most 3125000"):
+        excite(TWO, 3600.0, rate=10_000.0)
+
+
+def test_without_a_box_only_the_floor_is_blamed() -> None:
+    low = parse_urdf(TWO.urdf.replace("0 0 0.5", "0 0 -3"))
+    with pytest.raises(InputError, match="with every link above the floor, z = 0 of the base frame; raise the first"):
+        excite(low, 5.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from irtwin.errors import InputError
 from irtwin.identification.torque_constants import torque_constants
 from synthetic import arm, swing
 
@@ -35,6 +36,18 @@ def test_a_joint_that_rests_keeps_the_common_value_and_no_certainty():
     np.testing.assert_allclose(found.constants[:2], KT[:2], rtol=0.02)
     assert 8 < found.constants[2] < 12
     assert found.estimate.covariance[2, 2] ** 0.5 == pytest.approx(found.constants[2], rel=1e-3)
+
+
+def test_a_balance_that_tells_nothing_is_refused():
+    dead = [replace(motion_of(seed), power=np.full(2000, 90.0)) for seed in (1, 2)]
+    with pytest.raises(InputError, match="power does not rise with current times speed"):
+        torque_constants(arm(3), dead)
+
+
+def test_without_losses_the_constants_are_found_all_the_same():
+    ideal = [replace(m, power=90 + (KT * m.current * m.dq).sum(axis=1)) for m in (motion_of(1), motion_of(2))]
+    found = torque_constants(arm(3), ideal)
+    np.testing.assert_allclose(found.constants, KT, rtol=0.02)
 
 
 def test_sliding_joints_have_force_constants():

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from irtwin.providers import identification
 from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
+from irtwin.twin.files import from_json
+from irtwin.twin.identify import identify
+from irtwin.twin.validate import validate
 from synthetic import arm, as_run, measure, swing, with_constants
 
 
@@ -30,3 +35,24 @@ def test_a_simulators_runs_stay_apart_from_the_robots_twin(tmp_path: Path) -> No
 
 def test_a_robot_known_by_its_simulator_alone_has_a_twin_of_that(tmp_path: Path) -> None:
     assert set(parts(tmp_path, ["simulated", "simulated"]).values()) == {"both"}
+
+
+def test_base_parameters_are_counted_that_the_bodies_have() -> None:
+    """An arm whose first axis is upright shows one of its first body, and seven of the second (Gautier and Khalil)."""
+    robot = arm(2)
+    twin = identify(robot, [measure(robot, swing(robot, 0, seconds=6.0))])
+    assert identification.body_combinations(twin) == 8 < len(twin.base_parameters)
+    assert identification.body_combinations(replace(twin, base_parameters=())) is None
+
+
+def test_a_run_that_takes_no_energy_has_no_relative_error(tmp_path: Path) -> None:
+    robot = with_constants(arm(1))
+    dead = [replace(measure(robot, swing(robot, k, seconds=6.0)), power=np.zeros(600)) for k in range(2)]
+    with Workspace(tmp_path) as workspace:
+        ingest(workspace, DataSet(Path(), robot, tuple(map(as_run, dead)), None, None, "mains", True, {}))
+        made = identification.provide(workspace, "arm_1")
+        assert all(np.isfinite(row.value) for row in made.rows if isinstance(row, schema.Parameter))
+    (twin,) = made.documents.values()
+    (fit,) = validate(from_json(twin.decode(), Path("twin.json")), dead[:1])
+    assert fit.measured_energy == 0
+    assert fit.energy_error is None

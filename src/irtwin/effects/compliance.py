@@ -61,7 +61,7 @@ def transmitted(
     """
     ahead, length = round(_WARM_UP * rate), max(1, round(_WINDOW * rate))
     starts = np.arange(-(start % length), len(load), length)
-    substeps = max(1, round(_STEPS / rate))
+    substeps = max(1, round(_STEPS / max(rate, 1 / _WINDOW)))
     step, last = 1 / (rate * substeps), len(load) - 1
     rows = np.clip(starts + np.arange(-ahead, length + 1)[:, None], 0, last)
     pushed = (load / inertia)[rows]

@@ -93,7 +93,41 @@ def model_of(robot: Robot, bodies: np.ndarray | None) -> pin.Model:
 def inverse_dynamics(model: pin.Model, motion: Motion) -> np.ndarray:
     """Return the (N, n) joint torque, N m, that the model's bodies take in the motion."""
     q, dq, ddq = (np.asfortranarray(each.T) for each in (motion.q, motion.dq, motion.ddq))
-    return np.ascontiguousarray(pin.rneaInParallel(1, pin.ModelPool(model, 1), q, dq, ddq).T)  # half the time of a loop
+    torque = np.ascontiguousarray(pin.rneaInParallel(1, pin.ModelPool(model, 1), q, dq, ddq).T)  # half a loop's time
+    return np.asarray(torque.reshape(motion.q.shape))  # of one joint it is a plain vector
+
+
+def torque_slope(robot: Robot, bodies: np.ndarray | None, motion: Motion) -> np.ndarray:
+    """Return (N, n, n) the slope of each joint's torque over each joint's position, by (10 n,) inertial parameters.
+
+    Pinocchio divides by the mass of all bodies beyond a joint. Where these have none, or less, ballast in every body
+    goes along and is taken off afterwards: torque is linear in the bodies.
+    """
+    model = model_of(robot, bodies)
+    ballast = np.zeros((model.nv, 10))
+    ballast[:, 0] = _ballast(model)
+    if not ballast.any():
+        return _slope(model, motion)
+    carried = np.concatenate([inertia.toDynamicParameters() for inertia in list(model.inertias)[1:]])
+    loaded, alone = model_of(robot, carried + ballast.ravel()), model_of(robot, ballast.ravel())
+    return np.asarray(_slope(loaded, motion) - _slope(alone, motion))
+
+
+def _ballast(model: pin.Model) -> float:
+    """Return the mass in every body, kg, with which there is some beyond each joint; 0 where there is already."""
+    masses = np.array([inertia.mass for inertia in model.inertias])
+    beyond = masses.copy()
+    for joint in range(model.njoints - 1, 0, -1):
+        beyond[model.parents[joint]] += beyond[joint]
+    return 0.0 if (beyond[1:] >= _LIGHT).all() else 1.0 + 2 * float(np.abs(masses).max())
+
+
+def _slope(model: pin.Model, motion: Motion) -> np.ndarray:
+    data = model.createData()
+    slope = np.empty((*motion.q.shape, model.nv))
+    for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        slope[row] = pin.computeRNEADerivatives(model, data, *state)[0]
+    return slope
 
 
 def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
@@ -103,7 +137,7 @@ def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
     first = 10 * (flange_frame(robot).parentJoint - 1)
     columns = np.empty((*motion.q.shape, 10))
     for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-        columns[row] = pin.computeJointTorqueRegressor(model, data, *state)[:, first : first + 10]
+        columns[row] = np.atleast_2d(pin.computeJointTorqueRegressor(model, data, *state))[:, first : first + 10]
     return columns
 
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import pinocchio as pin
 from scipy.signal import lfilter
 
 from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity
-from irtwin.effects.rigid_body import model_of
+from irtwin.effects.rigid_body import torque_slope
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -91,13 +90,8 @@ class EncoderOffset(Effect):
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, n, k) slopes of every joint's torque over the position of each acting one."""
-        model = model_of(robot, None if predicted is None else predicted.bodies)
-        data = model.createData()
         acting = [robot.index(joint.name) for joint in self.acting(robot)]
-        columns = np.empty((*motion.q.shape, len(acting)))
-        for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-            columns[row] = pin.computeRNEADerivatives(model, data, *state)[0][:, acting]
-        return columns
+        return torque_slope(robot, None if predicted is None else predicted.bodies, motion)[:, :, acting]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ _STILL = 1e-3  # rad (m): noise of a joint that stands still spans less
 def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     """Raise InputError, naming the file and what to do, where no diagnosis is possible; `motions` by name of the run.
 
-    There have to be observed runs, with torque or power, in which some joint moves; references that share a signal with
-    them; and no run twice, which would judge a fit on what it was fitted to.
+    There have to be observed runs, with torque or power that changes with the motion, in which some joint moves;
+    references that share a signal with them; and no run twice, which would judge a fit on what it was fitted to.
     """
     file = data_set.folder / "dataset.toml"
     observed = [run for run in data_set.runs if run.role == "observed"]
@@ -27,8 +27,9 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     seen = [motions[run.name] for run in observed]
     if not any(motion.torque is not None or motion.power is not None for motion in seen):
         raise InputError(f"{file}: {_nothing_measured(seen)}")
-    if not any(_moves(motion) for motion in seen):
+    if not any(_moving(motion).any() for motion in seen):
         raise InputError(f"{file}: no joint moves in any observed run; log runs in motion")
+    _check_dead([run for run in observed if _moving(motions[run.name]).any()], data_set.robot.joint_names, motions)
     others = [run for run in data_set.runs if run.role != "observed"]
     if others and not _overlap(seen, [motions[run.name] for run in others]):
         raise InputError(
@@ -47,8 +48,31 @@ def _nothing_measured(motions: Sequence[Motion]) -> str:
     return "neither torque nor power was measured in any observed run; log tau_, i_ or power"
 
 
-def _moves(motion: Motion) -> bool:
-    return bool(np.any((np.abs(motion.dq).max(axis=0) > _SLOW) & (np.ptp(motion.q, axis=0) > _STILL)))
+def _moving(motion: Motion) -> np.ndarray:
+    """Return (n,) which joints move."""
+    return np.asarray((np.abs(motion.dq).max(axis=0) > _SLOW) & (np.ptp(motion.q, axis=0) > _STILL))
+
+
+def _check_dead(runs: Sequence[Run], joints: Sequence[str], motions: Mapping[str, Motion]) -> None:
+    """Raise where the torque of a joint that moves, or power, is one and the same number throughout all runs.
+
+    A fit to it would be perfect, and say that there is no gap.
+    """
+    powers = [run.signals.power for run in runs if run.signals.power is not None]
+    if powers and all(np.ptp(power) == 0 for power in powers):
+        raise _dead(runs[0], "column power")
+    for joint, name in enumerate(joints):
+        moved = [run for run in runs if run.signals.torque is not None and _moving(motions[run.name])[joint]]
+        torques = [run.signals.torque[:, joint] for run in moved if run.signals.torque is not None]
+        if torques and all(np.ptp(torque) == 0 for torque in torques):
+            raise _dead(moved[0], f"the torque of {name}, by column tau_{name} or i_{name},")
+
+
+def _dead(run: Run, channel: str) -> InputError:
+    return InputError(
+        f"{run.file}: {channel} does not change, nor does it in any other run, though the robot moves: a dead channel; "
+        "mend what measures it, or leave it out"
+    )
 
 
 def _overlap(observed: Sequence[Motion], others: Sequence[Motion]) -> bool:

@@ -50,8 +50,8 @@ def attribute(
     episode by what its joints say of each other. With a `floor` (g,), RMS, some causes have to explain a part of it.
     """
     candidates = in_scope(candidates, both=system.both)
-    noise = np.maximum(system.residual_rms((), np.ones(len(system.pattern))), 1e-9)
-    noise = np.maximum(system.residual_rms((), noise), 1e-9)
+    noise = system.residual_rms((), np.ones(len(system.pattern)))
+    noise = system.residual_rms((), noise)
     moments = system.moments(noise)
     first = attempt(system, moments, (), [h.variants for h in candidates])
     search = _Search(system, candidates, seed, floor)
@@ -60,7 +60,7 @@ def attribute(
     moments = system.moments(noise)
     found = _backward(system, moments, found, search.matters(noise, [one.hypothesis for one in found]) / 2)
     named = causes(system, moments, candidates, found)
-    noise = np.maximum(system.residual_rms([k for cause in named for k in cause.columns], noise), 1e-9)
+    noise = system.residual_rms([k for cause in named for k in cause.columns], noise)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
 
 
@@ -87,7 +87,7 @@ class _Search:
 
     def noise(self, found: Sequence[Find], before: np.ndarray) -> np.ndarray:
         """Return what finds leave of each equation, (g,) RMS; `before` weighs the equations."""
-        return np.asarray(np.maximum(self.system.residual_rms(_columns(found), before), 1e-9))
+        return self.system.residual_rms(_columns(found), before)
 
     def forward(self, found: Sequence[Find], noise: np.ndarray) -> list[Find]:
         """Add to the finds, round by round, until nothing more is sure."""

@@ -10,6 +10,7 @@ import numpy as np
 from irtwin.effects.compliance import load_inertia, load_torque
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
 from irtwin.gap.candidates import Below, Candidates, candidate_pattern
 from irtwin.gap.headway import Tell, watched
 from irtwin.gap.hypotheses import candidate_columns
@@ -33,8 +34,13 @@ class Grouping:
         return len({self.label[run] for run in runs if run in self.observed}) < _FEWEST_GROUPS
 
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
-        """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""
+        """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time.
+
+        Raises InputError where none is.
+        """
         observed = np.array([block.run in self.observed for block in blocks])
+        if not observed.any():
+            raise InputError("no observed run is longer than the filter with a joint that moves; log longer ones")
         labels = [(block.run in self.observed, self.label[block.run]) for block in blocks]
         if self.few(block.run for block in blocks):
             labels = [(*label, k) for label, k in zip(labels, _stretches(blocks), strict=True)]  # type: ignore[misc]
@@ -67,7 +73,7 @@ def torque_system(
 ) -> System:
     """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
 
-    `tell` is told how far that has come, where it takes long.
+    `tell` is told how far that has come, where it takes long. Raises InputError where too few samples are left.
     """
     robot = stack.robot
     columns = candidate_columns(robot, effects)
@@ -92,8 +98,7 @@ def torque_system(
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, watched(equations, motions, tell), pattern)
-    group, observed = grouping.of(blocks)
-    return System(stack.torque_terms, columns, pattern, tuple(blocks), group, observed)
+    return _judged(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
 
 
 def power_system(
@@ -126,5 +131,15 @@ def power_system(
         return Rows([joined], known[:, None], motion.power[:, None])
 
     blocks = accumulate(motions, watched(equations, motions, tell), pattern)
-    group, observed = grouping.of(blocks)
-    return System(free, columns, pattern, tuple(blocks), group, observed)
+    return _judged(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+
+
+def _judged(system: System) -> System:
+    """Return the system; raise InputError where its samples are so few that the twin would fit whatever they say."""
+    samples = int(system.rows.sum())
+    if samples <= system.base:
+        raise InputError(
+            f"{samples} samples are left of all runs to find {system.base} coefficients of the twin, which would fit "
+            "whatever they say; log longer runs"
+        )
+    return system

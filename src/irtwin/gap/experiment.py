@@ -91,11 +91,15 @@ class Weight:
 
 @dataclass(frozen=True)
 class Proposal:
-    """The experiment that is proposed: the programme chosen (None where none helps), and what each would tell."""
+    """The experiment that is proposed: the programme chosen (None where none helps), and what each would tell.
+
+    `joints` of the `robot` are those that the question is about.
+    """
 
     purpose: str
     effects: tuple[str, ...]
     joints: tuple[str, ...]
+    robot: Robot
     programme: Programme | None
     weights: tuple[Weight, ...]
     considered: tuple[tuple[Programme, float], ...]
@@ -128,6 +132,7 @@ class Proposal:
         if self.programme is None:
             return None
         time, q, start = [], [], 0.0
+        moved = [self.robot.index(joint) for joint in self.programme.joints]
         for motion in self.programme.motions:
             every = -(-len(motion.time) * len(self.programme.motions) // _DRAWN)
             time.append(motion.time[::every] + start)
@@ -136,7 +141,7 @@ class Proposal:
         return {
             "time": np.concatenate(time).round(3).tolist(),
             "joints": list(self.programme.joints),
-            "q": np.concatenate(q).T.round(5).tolist(),
+            "q": np.concatenate(q).T[moved].round(5).tolist(),
         }
 
 
@@ -238,7 +243,7 @@ def next_experiment(
     if not any(weight.reached or weight.expected > _HELPS * weight.now for weight in weights):
         chosen, by_hand = None, by_hand or tuple(_BY_HAND[name] for name in names if name in _BY_HAND)
     considered = tuple((one, min(weight.expected for weight in of_one)) for one, of_one in weighed)
-    return Proposal(purpose, names, joints, chosen, tuple(weights), considered, by_hand, note)
+    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note)
 
 
 def _weigh(programme: Programme, questions: Sequence[_Question]) -> list[Weight]:

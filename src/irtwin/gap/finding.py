@@ -128,7 +128,7 @@ def find(
 
 def noise_before(system: System) -> np.ndarray:
     """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
-    return np.asarray(np.maximum(system.residual_rms((), np.ones(len(system.pattern))), _NO_NOISE))
+    return system.residual_rms((), np.ones(len(system.pattern)))
 
 
 def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from irtwin.signals.motion import Motion
 REPEATS, OUT_OF_BAND = "repeats", "out_of_band"
 _LONGEST_SHIFT = 1.0  # s, between the starts of a motion and its repeat
 _SAME = 0.1  # of the motion's size: repeats that differ by more are no repeats
+_LEAST = 1e-9  # N m or W: of a channel that repeats itself to the last bit
 _MARGIN = 1.05  # of the cutoff: where the filter's stop band begins in earnest
 
 
@@ -57,7 +58,7 @@ def _has_repeat(run: Run, runs: Sequence[Run]) -> bool:
 
 def _pooled(variances: Sequence[np.ndarray | None]) -> np.ndarray | None:
     known = [variance for variance in variances if variance is not None]
-    return np.sqrt(np.mean(known, axis=0)) if known else None
+    return np.maximum(np.sqrt(np.mean(known, axis=0)), _LEAST) if known else None
 
 
 def _difference(first: Motion, second: Motion, signal: str) -> np.ndarray | None:

@@ -166,7 +166,8 @@ def _concentration(seen: Map, share: np.ndarray, of_joint: np.ndarray) -> np.nda
 
 def standing_out(traces: Sequence[Trace], place: int, level: float) -> tuple[str, ...]:
     """Return the runs whose mean square stands out over a level, the worst first."""
-    means = {trace.motion.run: float(np.nanmean(trace.residual[:, place] ** 2)) for trace in traces}
+    squares = {trace.motion.run: trace.residual[:, place] ** 2 for trace in traces}
+    means = {run: float(np.nanmean(own)) for run, own in squares.items() if np.isfinite(own).any()}
     above = [run for run, mean in means.items() if mean > _STANDS_OUT * level]
     return tuple(sorted(above, key=lambda run: -means[run]))
 

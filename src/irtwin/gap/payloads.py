@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from irtwin.effects.effect import Effect
 from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import flange_frame, to_body
+from irtwin.gap.normal_equations import factored, solved
 from irtwin.gap.system import System
 from irtwin.robot.description import Robot
 
@@ -151,11 +151,11 @@ class _Fold:
         base = parts.base
         products = parts.products.sum(axis=1)
         total = products[inside].sum(axis=0)
-        factor = cho_factor(total[:base, :base] + np.eye(base))
+        factor = factored(total[:base, :base])
         used = np.isin(np.arange(len(products)), inside)[:, None, None]
-        self._twin = cho_solve(factor, total[:base, -1])
+        self._twin = solved(factor, total[:base, -1])
         self._beside = products[:, :base, base:-1] * used
-        self._imitated = np.stack([cho_solve(factor, one) for one in self._beside])
+        self._imitated = np.stack([solved(factor, one) for one in self._beside])
         self._own = products[:, base:-1, base:-1] * used
         self._right = (products[:, base:-1, -1] - np.einsum("rak,a->rk", self._beside, self._twin)) * used[:, 0]
 

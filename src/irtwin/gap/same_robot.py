@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.finding import noise_before
+from irtwin.gap.normal_equations import factored
 from irtwin.gap.system import System
 from irtwin.robot.description import Robot
 from irtwin.signals.log import Run
@@ -94,7 +95,7 @@ def _allowed(robot: Robot, system: System) -> np.ndarray:
 def _refitted(total: np.ndarray, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """Return what is added to coefficients `start` (D,) so that they fit best, each no farther than allowed (K,)."""
     free = np.flatnonzero(allowed > 0)
-    factor = cholesky(total[np.ix_(free, free)] + np.eye(len(free)))
+    factor = np.triu(factored(total[np.ix_(free, free)]))
     right = total[free, -1] - total[free, : len(start)] @ start
     found = lsq_linear(factor, solve_triangular(factor.T, right, lower=True), (-allowed[free], allowed[free]))
     added = np.zeros(len(start))

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
+from irtwin.gap.normal_equations import factored, solved
 from irtwin.gap.system import System, scores
 
 _LEAST = 1.0  # squares of a column in units of its prior: with less the prior decides
@@ -19,8 +19,7 @@ _LEAST = 1.0  # squares of a column in units of its prior: with less the prior d
 def projected(total: np.ndarray, inside: Sequence[int]) -> np.ndarray:
     """Return the products of what the columns `inside`, refitted, leave of all columns."""
     kept = np.array(inside, dtype=int)
-    normal = total[np.ix_(kept, kept)] + np.eye(len(kept))
-    return np.asarray(total - total[:, kept] @ cho_solve(cho_factor(normal), total[kept]))
+    return np.asarray(total - total[:, kept] @ solved(factored(total[np.ix_(kept, kept)]), total[kept]))
 
 
 def fitted(left: np.ndarray, own: Sequence[int]) -> np.ndarray:

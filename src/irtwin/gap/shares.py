@@ -8,9 +8,9 @@ from itertools import combinations
 from math import factorial
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from irtwin.gap.attribute import Attribution
+from irtwin.gap.normal_equations import factored, solved
 from irtwin.gap.system import System
 
 _EXACT = 8  # causes: 256 subsets
@@ -41,8 +41,8 @@ def shares(system: System, found: Attribution, seed: int) -> tuple[float, ...]:
         every = np.append(inside, len(total) - 1)
         left = 0.0
         for group, train in rest.items():
-            normal = train[np.ix_(inside, inside)] + np.eye(len(inside))
-            vector = np.append(-cho_solve(cho_factor(normal), train[inside, -1]), 1.0)
+            factor = factored(train[np.ix_(inside, inside)])
+            vector = np.append(-solved(factor, train[inside, -1]), 1.0)
             left += float(vector @ moments[group][np.ix_(every, every)] @ vector)
         return -left
 

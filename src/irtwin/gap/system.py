@@ -11,14 +11,15 @@ from dataclasses import dataclass
 from functools import cached_property, reduce
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from irtwin.effects.effect import Effect, Term
 from irtwin.gap.episodes import Episode, brief
 from irtwin.gap.hypotheses import Column, Variant, bounds
+from irtwin.gap.normal_equations import factored, solved
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
+_LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
 
 
@@ -78,6 +79,16 @@ class System:
         return counts
 
     @cached_property
+    def quietest(self) -> np.ndarray:
+        """(g,) the least noise that an equation is taken to have: exact or dead signals have finite weights, too."""
+        return np.array(
+            [
+                least_noise(np.sum([np.diag(products)[:-1].max(initial=0.0) for _, products in own]))
+                for own in zip(*self._products, strict=True)
+            ]
+        )
+
+    @cached_property
     def all_terms(self) -> tuple[Term, ...]:
         """The terms of every column, those of changes too: their expectation is no change, without bound."""
         first = [term for _, term in self.terms]
@@ -134,8 +145,8 @@ class System:
     def _weighted(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> np.ndarray:
         total = np.zeros((self._size + 1, self._size + 1))
         for group in groups:
-            for (places, products), level in zip(self._products[group], noise, strict=True):
-                total[np.ix_(places, places)] += products / max(float(level), _NO_NOISE) ** 2
+            for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
+                total[np.ix_(places, places)] += products / float(level) ** 2
         return total
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
@@ -144,7 +155,8 @@ class System:
         Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
         """
         found = self.rms(chosen, noise, range(self.groups), range(self.groups))
-        return np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
+        found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
+        return np.asarray(np.maximum(found, self.quietest))
 
     def rms(
         self,
@@ -161,9 +173,8 @@ class System:
     def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
         inside = np.append(np.arange(self.base), np.array(chosen, dtype=int))
-        normal = total[np.ix_(inside, inside)] + np.eye(len(inside))
         vector = np.zeros(self._size)
-        vector[inside] = cho_solve(cho_factor(normal), total[inside, -1])
+        vector[inside] = solved(factored(total[np.ix_(inside, inside)]), total[inside, -1])
         return vector
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
@@ -171,6 +182,11 @@ class System:
         weights = np.append(-vector, 1.0)
         left = [float(weights[places] @ products @ weights[places]) for places, products in self._products[group]]
         return np.maximum(left, 0.0)
+
+
+def least_noise(squares: float) -> float:
+    """Return the least noise of an equation whose largest column, in units of its prior, has such a sum of squares."""
+    return max(_LEAST_NOISE * float(np.sqrt(squares)), _NO_NOISE)
 
 
 @dataclass(frozen=True)
@@ -310,8 +326,7 @@ def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:
 def _weights(total: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the fitted columns' indices, and their weights in the fit of every column and of the measurement."""
     inside = np.append(np.arange(base), np.array(chosen, dtype=int))
-    normal = total[np.ix_(inside, inside)] + np.eye(len(inside))
-    return inside, cho_solve(cho_factor(normal), total[inside])
+    return inside, solved(factored(total[np.ix_(inside, inside)]), total[inside])
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from irtwin.gap.hypotheses import Column
 from irtwin.gap.programme import Programme
 from irtwin.gap.residuals import as_filtered
 from irtwin.gap.separation import dispersion, projected
-from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.gap.system import least_noise
+from irtwin.identification.accumulate import Rows, accumulate_any
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -147,12 +148,15 @@ class TrialGround:
             replace(motion, run=f"{programme.kind} {k} {' '.join(programme.joints)}")
             for k, motion in enumerate(programme.motions)
         ]
-        blocks = accumulate(motions, lambda part: self._equations(part, columns, programme.without), pattern)
+        blocks = accumulate_any(motions, lambda part: self._equations(part, columns, programme.without), pattern)
         scale = np.append([*system.scale[:base], *(column.term.spread for column in columns)], 0.0)
         found = np.zeros((len(scale), len(scale)))
+        places = [np.append(np.flatnonzero(row), len(scale) - 1) for row in pattern]
+        squares = np.sum([[_largest(b.factors[e] * scale[at]) for e, at in enumerate(places)] for b in blocks], axis=0)
+        least = [least_noise(each) for each in np.broadcast_to(squares, len(places))]
+        levels = np.maximum(self.finding.attribution.noise, least)
         for block in blocks:
-            for equation, level in enumerate(self.finding.attribution.noise):
-                used = np.append(np.flatnonzero(pattern[equation]), len(scale) - 1)
+            for equation, (used, level) in enumerate(zip(places, levels, strict=True)):
                 factor = block.factors[equation] * scale[used] / level
                 found[np.ix_(used, used)] += factor.T @ factor
         return found
@@ -189,6 +193,11 @@ class TrialGround:
         if self._last is None or self._last[0] is not whole:
             self._last = whole, self._predict(whole)
         return self._last[1]
+
+
+def _largest(factor: np.ndarray) -> float:
+    """Return the sum of squares of the largest column."""
+    return float((factor**2).sum(axis=0).max(initial=0.0))
 
 
 def trial_grounds(

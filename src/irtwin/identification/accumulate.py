@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
+from irtwin.errors import InputError
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
 
@@ -67,9 +68,17 @@ def accumulate(motions: Sequence[Motion], equations: Equations, pattern: np.ndar
 
     `pattern`: (g, K) which columns each equation has. What is computed from the motion passes the filter that its
     measurement went through (its `cutoff`), and both are then decimated to what lies below it. Half a kernel at
-    either end of a run is left out, where a filter knows only one side.
+    either end of a run is left out, where a filter knows only one side. Raises InputError where nothing is left.
     """
-    total = sum(float(motion.time[-1] - motion.time[0]) for motion in motions)
+    found = accumulate_any(motions, equations, pattern)
+    if not found:
+        raise _nothing_left(motions)
+    return found
+
+
+def accumulate_any(motions: Sequence[Motion], equations: Equations, pattern: np.ndarray) -> list[Block]:
+    """Do as `accumulate` does, and return no block where nothing is left."""
+    total = sum(_seconds(motion) for motion in motions)
     found = [_Growing(motion, *stretch, pattern) for motion in motions for stretch in _stretches(motion, total)]
     with ThreadPoolExecutor(1) as other:  # while the next part's columns are computed
         adding: Future[None] | None = None
@@ -83,6 +92,24 @@ def accumulate(motions: Sequence[Motion], equations: Equations, pattern: np.ndar
     return [one.block() for one in found if one.rows.any()]
 
 
+def _nothing_left(motions: Sequence[Motion]) -> InputError:
+    longest = max(motions, key=_seconds)
+    filtered = len(kernel(longest.rate, longest.cutoff)) / longest.rate if longest.cutoff else 0.0
+    if _seconds(longest) <= filtered:
+        return InputError(
+            f'no run is longer than the filter, {filtered:.3g} s; the longest, "{longest.run}", has '
+            f"{_seconds(longest):.3g} s: log longer runs"
+        )
+    return InputError(
+        f'in no run does a joint move for as long as the filter, {filtered:.3g} s, in "{longest.run}" neither; '
+        "log longer runs in motion"
+    )
+
+
+def _seconds(motion: Motion) -> float:
+    return float(motion.time[-1] - motion.time[0])
+
+
 def triangle(rows: np.ndarray) -> np.ndarray:
     """Return the triangular factor of rows (N, k): (min(N, k), k), with the same products of columns."""
     if not rows.size:
@@ -94,7 +121,7 @@ def triangle(rows: np.ndarray) -> np.ndarray:
 
 def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
     """Cut a motion into the sample ranges of its blocks, of equal length."""
-    seconds = float(motion.time[-1] - motion.time[0])
+    seconds = _seconds(motion)
     shortest = _SHORTEST / motion.cutoff if motion.cutoff else 0.0
     count = max(1, int(min(np.ceil(_BLOCKS * seconds / total), seconds / shortest if shortest else np.inf)))
     edges = np.linspace(0, len(motion.time), count + 1).astype(int)

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from irtwin.effects.effect import Term
-from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.uncertainty import covariance
 
 _REWEIGHTINGS = 4
-_LEAST_NOISE = 1e-6  # of the measurement's size: exact data still have finite weights
+_LEAST_NOISE = 1e-6  # of the measurement's size: exact data still have finite weights,
+_LEAST_SHOWN = 1e-10  # of a column as large as expected: dead data, too
 
 
 @dataclass(frozen=True)
@@ -37,21 +37,22 @@ def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]
     `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that
     they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). As samples
     depend on each other, they count against it by their design effect only. Bounds hold (`lowest`). The covariance
-    is explained in `uncertainty`. Raises InputError where there is no block at all.
+    is explained in `uncertainty`.
     """
-    if not blocks:
-        raise InputError("every run is shorter than the filter's kernel; log longer runs or take a higher cutoff")
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
     count = np.maximum(sum(block.rows for block in blocks), 1)
     expected = np.array([term.expected for term in terms])
     spread = np.array([term.spread for term in terms])
     lowest = np.array([term.lowest for term in terms])
-    least = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
-    noise = np.maximum(least, np.finfo(float).tiny)
+    size = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
+    shown = np.array([np.abs(factor[:, :-1] * spread).max(initial=0.0) for factor in factors])
+    dead = np.maximum(_LEAST_SHOWN * shown, np.finfo(float).tiny)
+    least = np.maximum(_LEAST_NOISE * size, dead)
+    noise = np.maximum(size, dead)
     for _ in range(_REWEIGHTINGS):
         values = _solve(factors, noise, expected, spread, lowest)
         residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
-        noise = np.maximum(residual / np.sqrt(count), np.maximum(_LEAST_NOISE * least, np.finfo(float).tiny))
+        noise = np.maximum(residual / np.sqrt(count), least)
     _, effect = covariance(blocks, pattern, factors, values, noise, spread)
     level = noise * np.sqrt(effect)
     values = _solve(factors, level, expected, spread, lowest)

@@ -17,6 +17,7 @@ from irtwin.identification.base_condition import BaseRegressor
 from irtwin.identification.descent import descend
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
+from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 
 Progress = Callable[[int, float, float], None]
@@ -27,6 +28,7 @@ _BARRIERS = (0.3, 0.1, 0.03, 0.01, 0.003)  # weights of the walls, falling: an i
 _RESERVE = 0.99  # share of the joint limits that is used: controllers round, too
 _STARTS = 10
 _POSTURES = 300
+_MOST = 100_000_000  # numbers that a motion is worked out from: 3600 s at 500 Hz of six joints, 0.8 GB
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Excitation:
             raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
 
 
+@one_blas_thread()
 def excite(
     robot: Robot,
     seconds: float,
@@ -88,6 +91,12 @@ def excite(
         raise InputError(f"an exciting motion of {seconds:g} s: ask for 0.5 to 3600 s")
     if not (math.isfinite(rate) and 1 <= rate <= 10_000):
         raise InputError(f"a rate of {rate:g} Hz: ask for 1 to 10000 Hz")
+    most = _MOST // (20 + 6 * len(robot.joints))
+    if seconds * rate > most:
+        raise InputError(
+            f"{seconds:g} s at {rate:g} Hz are {seconds * rate:.0f} samples of {len(robot.joints)} joints; ask for at "
+            f"most {most}: less time, or a lower rate"
+        )
     search = _Search(robot, seconds, box, np.random.default_rng(seed))
     began = monotonic()
     interrupted = False
@@ -118,6 +127,7 @@ class _Search:
         self._rest = RestSeries(period, min(10, max(5, math.ceil(period / 2))))
         factor = between_samples(self._rest.harmonics, len(self._rest.grid))
         self._ranges = tuple(_RESERVE * limit / factor for limit in self._limits.ranges)
+        self._box = box
         self._keep_off = 0.03 * self._workspace.reach  # from walls at the grid: for what happens in between
         self.best: FourierSeries | None = None
         self.best_condition = math.inf
@@ -208,8 +218,12 @@ class _Search:
         best = float(clearance.max())
         if best <= 4 * self._workspace.resolution:
             raise InputError(
-                f"{self._robot.name}: no posture within the joint limits was found with every link above the floor and "
-                "the flange inside the box; give a larger box, in metres in the base frame"
+                f"{self._robot.name}: no posture within the joint limits was found with every link above the floor"
+                + (
+                    ", z = 0 of the base frame; raise the first joint's origin in the URDF"
+                    if self._box is None
+                    else " and the flange inside the box; give a larger box, in metres in the base frame"
+                )
             )
         self._keep_off = min(self._keep_off, best / 3)
         return np.asarray(q[clearance >= 0.5 * best])

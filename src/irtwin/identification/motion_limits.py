@@ -13,6 +13,9 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.robot.kinematics import flange
 
 FULL_SPEED_AFTER = 0.3  # s: the acceleration limit of a joint whose maker gives none is speed / 0.3 s
+_SMALLEST, _LARGEST = 1e-6, 1e4  # rad, rad/s, m, m/s: of limits that a machine has
+_FARTHEST = 1e6  # m
+_MOST_POSES = 50_000  # for one proof of clearance
 CLEARANCE = 0.1  # m above the floor, or a tenth of the reach if that is less
 
 
@@ -77,6 +80,9 @@ def _limits(robot: str, joint: Joint) -> tuple[float, float, float, float]:
     acceleration = joint.velocity / FULL_SPEED_AFTER if joint.acceleration is None else joint.acceleration
     if not (np.isfinite(acceleration) and acceleration > 0):
         raise InputError(f"{where} has the acceleration limit {acceleration:g}; it must be positive")
+    for what, size in (("range", upper - lower), ("speed limit", joint.velocity), ("acceleration limit", acceleration)):
+        if not _SMALLEST <= size <= _LARGEST / FULL_SPEED_AFTER:
+            raise InputError(f"{where} has a {what} of {size:g}, as no machine has; mend its <limit> in the URDF")
     return lower, upper, joint.velocity, acceleration
 
 
@@ -96,8 +102,11 @@ class Workspace:
     def __init__(self, robot: Robot, limits: JointLimits, box: Box | None) -> None:
         self._model = robot.model
         self._data = robot.model.createData()
-        self._levers = _levers(robot, limits)
+        with np.errstate(over="ignore"):  # what is infinite is refused below
+            self._levers = _levers(robot, limits)
         self.reach = max(0.01, float(max(lever.max() for lever in self._levers)))  # m
+        if not self.reach <= _FARTHEST:
+            raise InputError(f"{robot.name}: reaches {self.reach:g} m, as no robot does; mend the origins in the URDF")
         self.resolution = self.reach / 1000  # m: what the proof of clearance gives away
         self._walls = self._floor(robot, limits) + self._box(robot, box)
         self._frames = sorted({wall.frame for wall in self._walls})
@@ -121,7 +130,8 @@ class Workspace:
                 frame: pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
                 for frame in self._frames
             }
-            slope[row] = [wall.side * jacobians[wall.frame][wall.axis] for wall in self._walls]
+            for place, wall in enumerate(self._walls):
+                slope[row, place] = wall.side * jacobians[wall.frame][wall.axis]
         return value, slope
 
     def least_clearance(self, series: FourierSeries) -> float:
@@ -130,14 +140,17 @@ class Workspace:
         Between two instants h apart a function lies within h^2 / 8 max|x''| of the straight line. With the speeds V
         and accelerations A that the series never passes, the acceleration of a point at most r_k from joint k is at
         most sum_k r_k A_k + sum_kl r_max(k,l) V_k V_l: the joint farther down the chain turns the shorter lever.
-        h is chosen so that `resolution` is given away.
+        h is chosen so that `resolution` is given away. Nothing bounds a motion that would take too many poses: -inf.
         """
         grid = series.grid()
         factor = between_samples(series.harmonics, len(grid))
         speed, acceleration = (factor * np.abs(v).max(axis=0) for v in series.motion(grid)[1:])
         farther = np.maximum.outer(np.arange(len(speed)), np.arange(len(speed)))
         worst = max(float(r @ acceleration + speed @ r[farther] @ speed) for r in self._levers)
-        count = max(len(grid), int(np.ceil(series.period * np.sqrt(worst / (8 * self.resolution)))))
+        poses = float(np.ceil(series.period * np.sqrt(worst / (8 * self.resolution))))
+        if not poses <= _MOST_POSES:
+            return -np.inf
+        count = max(len(grid), int(poses))
         q = series.motion(np.arange(count) * (series.period / count))[0]
         return float(self.clearance(q).min(initial=np.inf)) - self.resolution
 

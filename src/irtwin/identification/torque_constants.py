@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.effects.effect import Effect, Term, catalogue, force_unit
+from irtwin.errors import InputError
 from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.robot.description import Robot
@@ -28,18 +29,25 @@ def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants
 
     Linear in P0, kt and R, all of them positive. One common kt and R for all joints are found first; these are then
     what each joint's own are expected to be, give or take as much: a joint that hardly draws power keeps the common
-    value.
+    value. Raises InputError where power does not rise with current times speed.
     """
     joints = robot.joints
     standby = Term("P0", "W", spread=600.0, lowest=0.0)
     common = [standby, Term("kt", "N m/A", spread=50.0, lowest=0.0), Term("R", "ohm", spread=20.0, lowest=0.0)]
-    _, constant, resistance = _balance(motions, common, pooled=True).values
+    pooled = _balance(motions, common, pooled=True)
+    _, constant, resistance = pooled.values
+    if constant <= np.sqrt(pooled.covariance[1, 1]):
+        raise InputError(
+            "power does not rise with current times speed, so that the two do not tell the torque constants; "
+            "give torque_constant for each joint, or log tau_"
+        )
     units = [f"{force_unit(joint)}/A" for joint in joints]
     own = [
         Term("kt", unit, joint=joint.name, expected=constant, spread=constant, lowest=0.0)
         for joint, unit in zip(joints, units, strict=True)
     ]
-    heat = [Term("R", "ohm", joint=joint.name, expected=resistance, spread=resistance, lowest=0.0) for joint in joints]
+    wide = resistance or common[2].spread
+    heat = [Term("R", "ohm", joint=joint.name, expected=resistance, spread=wide, lowest=0.0) for joint in joints]
     found = _balance(motions, [standby, *own, *heat], pooled=False)
     index = slice(1, 1 + len(joints))
     mechanical = catalogue()["mechanical_power"]

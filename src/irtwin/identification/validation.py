@@ -81,6 +81,6 @@ def energy(time: np.ndarray, power: np.ndarray) -> float:
     return float(np.trapezoid(power, time))
 
 
-def energy_error(measured: float, modelled: float) -> float:
-    """Return the relative error in percent (Yan 2018, eq. 15)."""
-    return abs(modelled - measured) / abs(measured) * 100
+def energy_error(measured: float, modelled: float) -> float | None:
+    """Return the relative error in percent (Yan 2018, eq. 15); None where none was measured to be relative to."""
+    return abs(modelled - measured) / abs(measured) * 100 if measured else None

@@ -11,6 +11,8 @@ from datetime import UTC, datetime
 from sqlalchemy import select
 
 from irtwin.effects.effect import BASELINE
+from irtwin.effects.stack import Stack
+from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.provider import Made
 from irtwin.providers.records import load_robot, load_run, run_iri
@@ -59,7 +61,7 @@ def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> 
         sha256=checksum,
         cutoff_hz=twin.cutoff,
         condition_number=twin.condition_number,
-        base_parameter_count=len(twin.base_parameters) or None,
+        base_parameter_count=body_combinations(twin),
         split=parts.rule,
     )
     return Made(
@@ -75,6 +77,13 @@ def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> 
         ],
         documents={row.file: document},
     )
+
+
+def body_combinations(twin: Twin) -> int | None:
+    """Return how many combinations of the bodies' parameters torque tells apart; None where none was measured."""
+    if not twin.base_parameters or "rigid_body" not in twin.effect_ids:
+        return None
+    return len(base_parameters(Stack(twin.robot, ("rigid_body",))).independent)
 
 
 def _runs(twin_id: str, keys: dict[str, str], parts: Split) -> Iterator[schema.TwinRun]:

@@ -1,0 +1,47 @@
+"""The bodies' torque and its slope: one joint, and bodies without mass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from irtwin.effects.load import Payload
+from irtwin.effects.rigid_body import inverse_dynamics, last_body_columns, model_of, torque_slope
+from synthetic import arm, rigid_torque, swing
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_torque_has_a_column_for_each_joint(joints):
+    robot = arm(joints)
+    motion = swing(robot, 0, seconds=0.5)
+    np.testing.assert_allclose(inverse_dynamics(robot.model, motion), rigid_torque(robot, motion), atol=1e-12)
+    assert last_body_columns(robot, motion).shape == (*motion.q.shape, 10)
+    assert Payload().columns(robot, motion).shape[:2] == motion.q.shape
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1.0])
+def test_the_slope_of_torque_is_right_for_bodies_without_mass_too(size):
+    robot = arm(4)
+    bodies = size * np.random.default_rng(1).standard_normal(40)
+    bodies[::10] = size * np.array([-1.0, 1.0, -2.0, 2.0])  # beyond each joint none, or less
+    motion = swing(robot, 0, seconds=0.1)
+    model, step = model_of(robot, bodies), 1e-6
+    differences = [
+        inverse_dynamics(model, replace(motion, q=motion.q + step * one))
+        - inverse_dynamics(model, replace(motion, q=motion.q - step * one))
+        for one in np.eye(4)
+    ]
+    expected = np.stack(differences, axis=2) / (2 * step)
+    np.testing.assert_allclose(torque_slope(robot, bodies, motion), expected, atol=1e-6 * max(size, 1e-3))
+
+
+def test_the_slope_of_an_ordinary_arm_needs_no_ballast():
+    robot = arm(3)
+    motion = swing(robot, 0, seconds=0.1)
+    data = robot.model.createData()
+    states = zip(motion.q, motion.dq, motion.ddq, strict=True)
+    expected = [pin.computeRNEADerivatives(robot.model, data, *state)[0].copy() for state in states]
+    np.testing.assert_array_equal(torque_slope(robot, None, motion), expected)

@@ -1,0 +1,116 @@
+"""Robots and logs out of the ordinary: a diagnosis of finite numbers, or one clear line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irtwin.errors import InputError
+from irtwin.gap.diagnosis import diagnose
+from irtwin.report.gap import render_alone
+from irtwin.robot.description import Robot
+from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.log import DataSet, Run
+from irtwin.twin.files import from_json, to_json
+from synthetic import arm, as_run, measure, swing
+
+SLIDER = '<link name="{child}">{body}</link><joint name="{name}" type="prismatic"><parent link="{parent}"/>'
+SLIDER += '<child link="{child}"/><axis xyz="{axis}"/><limit lower="-2" upper="2" velocity="2" effort="500"/></joint>'
+BODY = '<inertial><mass value="4"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def gantry(body: str = BODY) -> Robot:
+    """Two level axes: neither gravity nor a floor has anything to say."""
+    links = [SLIDER.format(name=f"axis_{a}", parent=p, child=c, axis=x, body=body) for a, p, c, x in AXES]
+    return parse_urdf(f'<robot name="gantry"><link name="bed"/>{"".join(links)}</robot>')
+
+
+AXES = (("x", "bed", "bridge", "1 0 0"), ("y", "bridge", "head", "0 1 0"))
+
+
+def runs(robot: Robot, count: int = 4, seconds: float = 6.0, **changes) -> list[Run]:
+    """Runs of a robot; `changes` alter signals by their name."""
+    made = []
+    for seed in range(count):
+        motion = replace(measure(robot, swing(robot, seed, seconds), noise=0.2, seed=seed), run=f"run_{seed}")
+        run = as_run(replace(motion, current=None))
+        altered = {name: change(getattr(run.signals, name)) for name, change in changes.items()}
+        made.append(replace(run, signals=replace(run.signals, **altered)))
+    return made
+
+
+def data_set(robot: Robot, made: list[Run]) -> DataSet:
+    return DataSet(Path("odd"), robot, tuple(made), None, None, "mains", True, {})
+
+
+def checked(robot: Robot, made: list[Run], tmp_path: Path) -> str:
+    """Diagnose, and hold every number that leaves to be finite; return the verdict."""
+    data = data_set(robot, made)
+    found = diagnose(data)
+    document = found.to_json()
+    json.dumps([document, found.evidence], allow_nan=False)
+    assert found.twin is not None
+    from_json(to_json(found.twin), Path("twin.json"))
+    render_alone(data, document, found.evidence, tmp_path / "page.html")
+    return found.verdict
+
+
+def nothing(_values):
+    return None
+
+
+def one_stands(q):
+    still = q.copy()
+    still[:, -1] = 0.5
+    return still
+
+
+ROBOTS = {"one joint": arm(1), "two joints": arm(2), "a gantry": gantry(), "a gantry without masses": gantry("")}
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("lacking", ["power", "torque"])
+def test_small_robots_are_diagnosed(robot, lacking, tmp_path):
+    made = runs(ROBOTS[robot], **{lacking: nothing})
+    assert checked(ROBOTS[robot], made, tmp_path) in ("no_gap", "attributed", "ambiguous")
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"q": one_stands, "power": nothing},
+        {"torque": lambda torque: 1e-300 * torque, "power": nothing},
+        {"torque": lambda torque: np.clip(1e4 * torque, -1e6, 1e6), "power": nothing},
+        {"torque": lambda torque: 20 * np.round(torque / 20), "power": nothing},
+        {"torque": nothing, "power": lambda power: 1e-9 * power},
+        {"torque": nothing, "power": np.negative},
+    ],
+    ids=["a joint stands", "tiny torque", "huge torque", "coarse torque", "tiny power", "power of the other sign"],
+)
+def test_odd_signals_are_diagnosed(changes, tmp_path):
+    checked(arm(2), runs(arm(2), 2, **changes), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "seconds", "message"),
+    [
+        (
+            {"torque": np.zeros_like, "power": nothing},
+            6.0,
+            "run_0.csv: the torque of joint_1, by column tau_joint_1 or",
+        ),
+        ({"torque": lambda t: t * [1, 0], "power": nothing}, 6.0, "run_0.csv: the torque of joint_2, by column"),
+        ({"power": lambda power: np.full_like(power, 80.0)}, 6.0, "run_0.csv: column power does not change"),
+        ({"power": nothing}, 0.2, "samples are left of all runs to find 28 coefficients of the twin"),
+    ],
+    ids=["no torque", "a dead channel", "constant power", "short runs"],
+)
+def test_what_would_pass_for_no_gap_is_refused(changes, seconds, message):
+    with pytest.raises(InputError, match=message):
+        diagnose(data_set(arm(2), runs(arm(2), 1, seconds, **changes)))
