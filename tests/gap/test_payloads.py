@@ -9,9 +9,10 @@ import numpy as np
 from irtwin.effects.effect import BASELINE
 from irtwin.effects.load import Payload
 from irtwin.effects.stack import Stack
-from irtwin.gap.channels import Grouping, torque_system
-from irtwin.gap.finding import noise_before
-from irtwin.gap.payloads import carried
+from irtwin.gap.regression.channel_equations import torque_system
+from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.normal_equations import noise_before
+from irtwin.gap.screening.payloads import carried
 from synthetic import arm, measure, swing
 
 ROBOT = arm(4)

@@ -11,29 +11,30 @@ import numpy as np
 from irtwin.effects.effect import Effect, Predicted, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.gap import document
-from irtwin.gap.balance import filtered, refuted
-from irtwin.gap.candidates import Below
-from irtwin.gap.case import Case, case_of
-from irtwin.gap.cause import Cause
-from irtwin.gap.channels import Torque, power_system, torque_system
-from irtwin.gap.closure import closed_twin
+from irtwin.gap.closed_twin import closed_twin
+from irtwin.gap.data.case import Case, case_of
+from irtwin.gap.data.noise_floor import Floor, noise_floor
+from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
-from irtwin.gap.evidence import drawn
-from irtwin.gap.experiment import next_experiment
-from irtwin.gap.explained import Explained, ExplainedTorque, LeftOut, explained_power, twin_power
-from irtwin.gap.finding import Finding, find
-from irtwin.gap.floor import Floor, noise_floor
-from irtwin.gap.locate import Location
-from irtwin.gap.occasional import occasional
-from irtwin.gap.same_robot import check_same_robot
-from irtwin.gap.system import System
-from irtwin.gap.through_power import ThroughPower
-from irtwin.gap.trial_ground import trial_grounds
-from irtwin.gap.verdict import NO_GAP, verdict_of
-from irtwin.gap.visibility import Untestable, can_show, untestable
-from irtwin.gap.weighing import balances
-from irtwin.gap.where import left_over, places
-from irtwin.gap.yardstick import yardstick
+from irtwin.gap.experiment.flexible_regression import yardstick
+from irtwin.gap.experiment.next_experiment import next_experiment
+from irtwin.gap.experiment.planned_equations import trial_grounds
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
+from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
+from irtwin.gap.isolation.finding import Finding, find
+from irtwin.gap.isolation.power_consistency import filtered, refuted
+from irtwin.gap.isolation.power_evidence import balances
+from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
+from irtwin.gap.localisation.channel_residuals import left_over, places
+from irtwin.gap.localisation.evidence import drawn
+from irtwin.gap.localisation.locations import Location
+from irtwin.gap.regression.candidate_columns import Below
+from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.cross_fitted import LeftOut, twin_power
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.torque_from_power import ThroughPower
+from irtwin.gap.screening.screen import occasional
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet

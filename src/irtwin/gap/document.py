@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from irtwin.effects.effect import Quantity, Term
-from irtwin.gap.cause import Cause
-from irtwin.gap.confidence import confidence
+from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
-from irtwin.gap.finding import Finding, noise_before
-from irtwin.gap.floor import Floor
-from irtwin.gap.occasional import acting
-from irtwin.gap.shrink import closed_fraction, held_out, pooled_interval
-from irtwin.gap.verdict import UNEXPLAINED
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.verdict import UNEXPLAINED
+from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
+from irtwin.gap.regression.normal_equations import noise_before
+from irtwin.gap.screening.screen import acting
 from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.gap.finding import Finding
+from irtwin.gap.isolation.finding import Finding
 from irtwin.signals.motion import Motion
 
 _RESAMPLED = 1000
