@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.detectability import can_show

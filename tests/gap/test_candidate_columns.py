@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import Predicted, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Predicted
 from irtwin.gap.regression.candidate_columns import Candidates, candidate_pattern
 from irtwin.gap.regression.hypotheses import candidate_columns
 from synthetic import arm, swing

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE, Predicted, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.experiment.flexible_regression import Yardstick, yardstick
 from irtwin.gap.experiment.planned_equations import TrialGround

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from irtwin.effects.effect import Term, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Term
 from irtwin.gap.isolation.cause import between_groups
 from irtwin.gap.isolation.forward_selection import attribute
 from irtwin.gap.regression.cross_validation import canonical_correlation

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE, Predicted, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.experiment.next_experiment import ENOUGH, next_experiment
 from irtwin.gap.experiment.planned_equations import TrialGround

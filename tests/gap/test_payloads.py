@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import torque_system

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.power_consistency import Balance, filtered, kind_of, refuted

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import Term, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Term
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.forward_selection import Attribution
 from irtwin.gap.isolation.shares import shares

@@ -19,11 +19,11 @@ def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
     """
     added: list[Effect] = []
     for cause in causes:
-        if cause.effect in case.effects or (cause.effect == "payload" and cause.scope == CHANGED):
+        if cause.effect in case.effects or (cause.scope == CHANGED and cause.variants[0].effect.within_bodies):
             continue
         for variant in cause.variants:
             joint = variant.terms[0].joint if cause.joints else None
-            effect = variant.effect if joint is None or cause.effect == "joint_coupling" else variant.effect.on(joint)
+            effect = variant.effect if joint is None else variant.effect.on(joint)
             if not any(one.id == effect.id and one.joints == effect.joints for one in added):
                 added.append(effect)
     changed = any(cause.scope == CHANGED for cause in causes)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Predicted, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap import document
 from irtwin.gap.closed_twin import closed_twin
@@ -219,6 +220,6 @@ def _variants(case: Case, signal: str) -> list[Effect]:
     return [
         shape
         for effect in catalogue().values()
-        if effect.signal == signal and (effect.id != "rigid_body" or bodies) and can_show(effect, case.seen)
+        if effect.signal == signal and (bodies or not effect.bodies) and can_show(effect, case.seen)
         for shape in effect.candidates(case.robot)
     ]

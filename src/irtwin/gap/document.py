@@ -108,7 +108,7 @@ def parameters(robot: Robot, finding: Finding, one: Cause) -> list[Json]:
             stated += [_quantity(each) for each in quantities if np.isfinite(each.value)]
         else:
             stated += [_coefficient(variant.terms[k], found, place) for k, place in enumerate(places)]
-    if one.effect == "rigid_body":  # most of a body's numbers do not show: those that do
+    if one.of_bodies:  # most of a body's numbers do not show: those that do
         stated = [each for each in stated if each["interval95"] and each["interval95"][0] * each["interval95"][1] > 0]
     return stated
 

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import select
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.provider import Made
 from irtwin.providers.records import load_robot, load_run, run_iri

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from irtwin.effects.effect import BASELINE, Effect, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Effect
 from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -105,8 +106,8 @@ def twin_effects(data_set: DataSet, withhold: Sequence[str]) -> tuple[str, ...]:
             raise InputError(f"--withhold {effect}: there is no such effect; use some of {', '.join(known)}")
         if effect not in effects:
             raise InputError(f"--withhold {effect}: the twin does not have it; it has {', '.join(effects)}")
-        if effect == "rigid_body":
-            raise InputError("--withhold rigid_body: a twin without bodies explains nothing; withhold another effect")
+        if known[effect].bodies:
+            raise InputError(f"--withhold {effect}: a twin without bodies explains nothing; withhold another effect")
     return tuple(effect for effect in effects if effect not in withhold)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
+from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.regression.normal_equations import System, noise_before
@@ -72,7 +73,7 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -
         places = [
             k
             for k, (effect, term) in enumerate(system.terms)
-            if effect.id in ("coulomb_friction", "viscous_friction") and term.joint == joint
+            if effect.family == "friction" and effect.id in BASELINE and term.joint == joint
         ]
         seen = own[places] + system.expected[places] / system.scale[places]
         elsewhere = other[places] + system.expected[places] / system.scale[places]
@@ -82,7 +83,7 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -
 
 def _allowed(robot: Robot, system: System) -> np.ndarray:
     """Return how far each of the twin's terms (K,) may move, in units of its prior: bodies not, a load on the last."""
-    bodies = np.array([effect.id == "rigid_body" for effect, _ in system.terms], dtype=bool)
+    bodies = np.array([effect.bodies for effect, _ in system.terms], dtype=bool)
     weight = max(_HEAVIEST, sum(inertia.mass for inertia in robot.model.inertias) / 2)
     allowed = np.where(bodies, 0.0, np.inf)
     last = np.flatnonzero(bodies)[-len(_REACH) :]

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.gap.experiment.planned_equations import Products, TrialGround
-from irtwin.gap.experiment.programmes import TAKEN_OFF, Programme, programmes
+from irtwin.gap.experiment.programmes import Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
@@ -25,21 +26,6 @@ _HELPS = 1.1  # times the separation there is: less is not worth an experiment
 _FOREMOST = 4  # of a class of rivals
 _DRAWN = 400  # points of a curve on a page
 
-_BY_HAND = {
-    "copper_loss": "log power while holding loaded poses, then unloaded ones, brakes open",
-    "winding_temperature": "log power and temperatures from a cold start",
-    "iron_loss": "log power at constant speeds up to the limit in poses without load",
-    "inverter_loss": "log power while holding poses of rising load, brakes open",
-    "no_regeneration": "log power while lowering a payload fast, one joint at a time, then two against each other",
-    "bus_capacitor": "hard stops from full speed, power logged at 100 Hz or more",
-    "holding_brakes": "log power while standing with brakes closed, then open",
-    "meter_lag": "steps of power, logged together with the motion",
-    "meter_gain": "standing still with a load of known power on the same meter",
-    "time_delay": "sines of rising frequency, up to 5 Hz",
-    "torque_drift": "holding one pose for ten minutes",
-    "temperature_dependent_friction": "log joint temperatures, from a cold start",
-    "external_contact": "the same motion with free space around the arm",
-}
 
 Shape = tuple[int | Column, ...]
 Left = tuple[np.ndarray, np.ndarray]
@@ -227,16 +213,18 @@ def next_experiment(
     else:
         return None
     joints = tuple(joint for joint in robot.joint_names if any(joint in q.joints for q in questions))
-    warm, off = any("temperature" in name for name in names), [name for name in names if name in TAKEN_OFF]
+    effects = [catalogue()[name] for name in names]
+    warm = any("temperature" in effect.requires for effect in effects)
+    off = [effect for effect in effects if effect.taken_off]
     tried = programmes(robot, joints, seen, warm=warm, take_off=off) if questions else ()
     weighed = [(one, _weigh(one, questions)) for one in tried]
     note = _note([weights for _, weights in weighed])
     weighed = [(one, open_) for one, weights in weighed if (open_ := [w for w in weights if not w.known])]
     asked = {name for q in questions for name in q.effects}
-    by_hand = tuple(_BY_HAND[name] for name in names if name not in asked and name in _BY_HAND)
+    by_hand = _manual_tests([effect for effect in effects if effect.id not in asked])
     chosen, weights = _choose(weighed) if weighed else (None, [])
     if not any(weight.reached or weight.expected > _HELPS * weight.now for weight in weights):
-        chosen, by_hand = None, by_hand or tuple(_BY_HAND[name] for name in names if name in _BY_HAND)
+        chosen, by_hand = None, by_hand or _manual_tests(effects)
     considered = tuple((one, min(weight.expected for weight in of_one)) for one, of_one in weighed)
     return Proposal(purpose, names, joints, chosen, tuple(weights), considered, by_hand, note)
 
@@ -318,5 +306,5 @@ def _rounded(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def _advice(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(_BY_HAND[name] for name in names if name in _BY_HAND)
+def _manual_tests(effects: Sequence[Effect]) -> tuple[str, ...]:
+    return tuple(effect.manual_test for effect in effects if effect.manual_test)

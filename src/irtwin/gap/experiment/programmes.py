@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.identification.excitation import excite
 from irtwin.identification.motion_limits import JointLimits, Workspace
@@ -34,11 +35,6 @@ _CENTRE = (0.0, 0.0, 0.05)  # m, of the load, from the flange
 _SHRINK, _TRIES = 0.7, 6
 _CHECKED = 200  # poses on the way
 _RATE = 5.0  # samples a period of the cutoff: enough of what the filter lets through
-TAKEN_OFF = {
-    "payload": "with the tool off",
-    "cable_drag": "with the hose package off",
-    "external_contact": "in free space",
-}
 
 
 @dataclass(frozen=True)
@@ -81,12 +77,12 @@ class Programme:
 
 
 def programmes(
-    robot: Robot, joints: Sequence[str], seen: Sequence[Motion], *, warm: bool = False, take_off: Sequence[str] = ()
+    robot: Robot, joints: Sequence[str], seen: Sequence[Motion], *, warm: bool = False, take_off: Sequence[Effect] = ()
 ) -> Iterator[Programme]:
     """Yield the programmes that are worth weighing for some joints (none: all), the plain ones first.
 
     `seen`: motions of the robot, whose poses, filter and rate the programmes take over; `warm`: with a warm-up;
-    `take_off`: effects of TAKEN_OFF, to be removed for a run. Where the URDF gives no limits, those of `seen` are kept.
+    `take_off`: effects to be removed for a run. Where the URDF gives no limits, those of `seen` are kept.
     """
     yard = _Yard(robot, joints or robot.joint_names, seen)
     for build in (_ladder, _sweep, _reversals, _steps, _poses):
@@ -104,10 +100,10 @@ def programmes(
     for effect in take_off:
         yield replace(
             exciting,
-            kind=f"without_{effect}",
-            text=f"{exciting.text}, {TAKEN_OFF[effect]}",
+            kind=f"without_{effect.id}",
+            text=f"{exciting.text}, {effect.taken_off}",
             set_up=_SET_UP,
-            without=(effect,),
+            without=(effect.id,),
         )
 
 

@@ -45,6 +45,11 @@ class Cause:
     rival_correlations: dict[str, float] = field(default_factory=dict)
 
     @property
+    def of_bodies(self) -> bool:
+        """Whether it is the robot's bodies that differ."""
+        return self.variants[0].effect.bodies
+
+    @property
     def columns(self) -> tuple[int, ...]:
         """The indices of its columns."""
         return tuple(k for variant in self.variants for k in variant.columns)

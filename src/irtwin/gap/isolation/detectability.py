@@ -24,7 +24,8 @@ class Untestable:
 
 def can_show(effect: Effect, motions: Iterable[Motion]) -> bool:
     """Return whether what the effect depends on was measured in some motion."""
-    return "temperature" not in effect.id or any(motion.temperature is not None for motion in motions)
+    seen = list(motions)
+    return all(any(getattr(motion, signal) is not None for motion in seen) for signal in effect.requires)
 
 
 def untestable(
@@ -51,7 +52,7 @@ def untestable(
         if channel not in measured:
             reasons.append(Untestable(effect.id, f"no {channel} was measured"))
         elif not can_show(effect, motions):
-            reasons.append(Untestable(effect.id, "no temperature was measured"))
+            reasons.append(Untestable(effect.id, f"no {' and no '.join(sorted(effect.requires))} was measured"))
         elif effect.id not in visible or visible[effect.id] == 0:
             reasons.append(Untestable(effect.id, "nothing in these runs brings it about"))
         elif visible[effect.id] < _LEAST:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import catalogue
+from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import can_show

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE, Effect
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.ambiguity_groups import RIVAL, SAME, causes, told_apart
 from irtwin.gap.isolation.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.regression.cross_validation import Trial, attempt, scores
@@ -214,7 +215,7 @@ def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) ->
 
 def _sure(p: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
     """Return (H,) whether a hypothesis is beyond chance."""
-    bodies = np.array([one.effect == "rigid_body" for one in left])  # too many for a score by column
+    bodies = np.array([one.of_bodies for one in left])  # too many for a score by column
     return np.asarray((p <= np.where(gain >= _MUCH, _ALPHA_OF_MUCH, _ALPHA)) | bodies)
 
 
@@ -264,7 +265,7 @@ def _leader(
     behind = per_group[best] - per_group
     equal = [int(k) for k in plausible if behind[k].mean() <= told_apart(behind[k], float(gain[best]), _AT_MOST)]
     equal = [k for k in equal if left[k].scope == left[best].scope and _overlap(left[k], left[best])]
-    if left[best].effect == "rigid_body":  # a load imitates bodies that are off, but not all of it
+    if left[best].of_bodies:  # a load imitates bodies that are off, but not all of it
         equal = [k for k in equal if gain[k] >= (1 - SAME) * gain[best]]
     return min(equal, key=lambda k: (left[k].flexibility, -gain[k]), default=best)
 

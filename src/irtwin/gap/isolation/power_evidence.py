@@ -54,7 +54,7 @@ def _squares(case: Case, stack: Stack, torque: Torque) -> np.ndarray:
     def nothing(motion: Motion, taken: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(len(taken)), np.zeros(len(taken))
 
-    nuisance = () if "copper_loss" in stack.ids else (CopperLoss(),)
+    nuisance = () if CopperLoss.id in stack.ids else (CopperLoss(),)
     system = power_system(stack, case.with_power, case.grouping, nuisance, torque, nothing)
     chosen = range(system.base, system.base + len(system.columns))
     moments = system.moments(noise_before(system))

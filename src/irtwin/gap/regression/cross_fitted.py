@@ -57,7 +57,7 @@ def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torq
     values = np.array([term.expected for _, term in stack.power_terms])
     total = np.sum(system.moments(noise_before(system)), axis=0)
     values[~stack.fixed] = twin_values(system, system.solution((), total))
-    standing = np.array([effect.id == "standby_power" for effect, _ in stack.power_terms], dtype=bool)
+    standing = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
 
     def power_of(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         columns = stack.power_columns(motion, torque)

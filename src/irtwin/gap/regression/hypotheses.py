@@ -40,6 +40,11 @@ class Hypothesis:
         return len(self.variants[0].columns) + float(np.log2(len(self.variants)))
 
     @property
+    def of_bodies(self) -> bool:
+        """Whether it is the robot's bodies that differ."""
+        return self.variants[0].effect.bodies
+
+    @property
     def name(self) -> str:
         """Readable, unique within a diagnosis."""
         return f"{self.effect} {self.scope} at {self.joint or 'the robot'}"

@@ -182,7 +182,7 @@ def _payload_columns(robot: Robot, system: System) -> np.ndarray | None:
     """Return (K, 10) the payload's columns made of those of the body that carries the flange, in units of priors."""
     frame = flange_frame(robot)
     last = robot.model.names[frame.parentJoint]
-    bodies = [k for k, (effect, term) in enumerate(system.terms) if effect.id == "rigid_body" and term.joint == last]
+    bodies = [k for k, (effect, term) in enumerate(system.terms) if effect.bodies and term.joint == last]
     if len(bodies) != 10:
         return None
     spread = np.array([term.spread for term in Payload().terms(robot)])

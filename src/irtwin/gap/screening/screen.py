@@ -34,7 +34,9 @@ class Occasional:
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects to try with those found: a contact in its place only, the others there too."""
-        found: list[Effect] = [effect for effect in effects if not (self.contact and effect.id == "external_contact")]
+        found: list[Effect] = [
+            effect for effect in effects if not (self.contact and effect.id == self.contact.effect.id)
+        ]
         return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples]
 
 
