@@ -11,7 +11,7 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.load import ExternalContact, Payload
 from irtwin.gap.regression.candidate_columns import Candidates
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, in_scope
-from irtwin.gap.regression.transient import brief
+from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.signals.filter import low_pass
@@ -105,9 +105,9 @@ def test_candidates_are_zero_in_runs_in_which_they_do_not_act():
 
 
 def test_only_what_has_a_start_or_a_stop_is_brief():
-    assert brief(ExternalContact(3.0, 4.5))
-    assert not brief(ExternalContact())
-    assert not brief(Payload(runs=("run_1",)))
+    assert is_transient(ExternalContact(3.0, 4.5))
+    assert not is_transient(ExternalContact())
+    assert not is_transient(Payload(runs=("run_1",)))
 
 
 def test_beside_reference_runs_what_acts_in_some_runs_is_a_change():

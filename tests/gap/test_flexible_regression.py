@@ -11,8 +11,8 @@ import pytest
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
-from irtwin.gap.experiment.flexible_regression import Yardstick, yardstick
-from irtwin.gap.experiment.planned_equations import TrialGround
+from irtwin.gap.experiment.flexible_regression import FlexibleRegression, flexible_regression
+from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.isolation.finding import find
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
@@ -44,8 +44,8 @@ def of(motions, tried=("stribeck_friction",)):
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     case = SimpleNamespace(effects=BASELINE, robot=ROBOT, observed=grouping.observed)
     finding = find("torque", case, system, np.full(2, NOISE), 0)
-    ground = TrialGround(finding, stack, lambda motion: Predicted(predicted(motion)))
-    return finding, yardstick(ground, motions, 0)
+    channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)))
+    return finding, flexible_regression(channel, motions, 0)
 
 
 def on_second(function):
@@ -93,7 +93,7 @@ def test_one_short_run_has_none():
 
 
 def test_without_a_floor_shares_are_of_the_mean_square():
-    made = Yardstick(np.array([4.0]), np.array([1.0]), np.array([2.0]), np.array([1.0]), None)
+    made = FlexibleRegression(np.array([4.0]), np.array([1.0]), np.array([2.0]), np.array([1.0]), None)
     shares = made.shares()
     assert (shares["closeable"], shares["nameless"]) == (0.75, 0.25)
     assert "no floor" in shares["of"]
@@ -101,5 +101,5 @@ def test_without_a_floor_shares_are_of_the_mean_square():
 
 def test_without_a_gap_there_are_no_shares():
     one = np.array([1.0])
-    assert Yardstick(one, one, one, one, np.array([1.1])).shares()["closeable"] is None
-    assert Yardstick(one, one, one, one, np.array([0.98])).shares()["closeable_by_equation"] == [None]
+    assert FlexibleRegression(one, one, one, one, np.array([1.1])).shares()["closeable"] is None
+    assert FlexibleRegression(one, one, one, one, np.array([0.98])).shares()["closeable_by_equation"] == [None]

@@ -12,7 +12,7 @@ from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.experiment.next_experiment import ENOUGH, next_experiment
-from irtwin.gap.experiment.planned_equations import TrialGround
+from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.experiment.programmes import programmes
 from irtwin.gap.experiment.separation import fitted, projected, unimitated
 from irtwin.gap.isolation.cause import Cause
@@ -69,7 +69,7 @@ def ground_of(motions, tried, cause=None, rivals=()):
     finding = Finding(
         "torque", ROBOT.joint_names, observed, system, attribution, held_out(system, noise, noise, ()), None, nothing
     )
-    return TrialGround(finding, stack, lambda motion: Predicted(predicted(motion)))
+    return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)))
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def motions():
 
 def test_programmes_keep_the_limits_of_the_joints(motions):
     limits = JointLimits.of(ROBOT)
-    made = list(programmes(ROBOT, ["joint_2"], motions, warm=True, take_off=["payload"]))
+    made = list(programmes(ROBOT, ["joint_2"], motions, warm=True, take_off=[catalogue()["payload"]]))
     assert [one.kind for one in made][:2] == ["speed_ladder", "slow_sweep"]
     assert {"exciting_motion", "payload", "warm_up", "without_payload"} <= {one.kind for one in made}
     for one in made:
@@ -128,13 +128,13 @@ def test_what_one_column_leaves_of_another_is_its_part_across():
 
 def test_the_separation_expected_is_the_one_that_comes(motions):
     """Measure the programme, and compare the squares by which the rival fits worse."""
-    ground = ground_of(
+    channel = ground_of(
         motions,
         ["stribeck_friction", "nonlinear_viscous_friction"],
         "stribeck_friction",
         ["nonlinear_viscous_friction"],
     )
-    proposal = next_experiment(ROBOT, [ground], [], motions)
+    proposal = next_experiment(ROBOT, [channel], [], motions)
     (weight,) = proposal.weights
     assert proposal.programme is not None and weight.reached
     planned = [replace(m, run=f"new_{k}") for k, m in enumerate(proposal.programme.motions)]
@@ -144,60 +144,60 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
     total = projected(np.sum(again.moments(np.full(2, NOISE)), axis=0), [*range(again.base)])
     shapes = {
         one.effect: [list(v.columns) for v in one.variants]
-        for one in ground.finding.attribution.hypotheses
+        for one in channel.finding.attribution.hypotheses
         if one.joint == "joint_2"
     }
     gains = {effect: max(total[own, -1] @ fitted(total, own) for own in each) for effect, each in shapes.items()}
     squares = gains["stribeck_friction"] - gains["nonlinear_viscous_friction"]
     tried = [k for each in shapes.values() for own in each for k in own]
-    products = ground.products(proposal.programme, tried)
+    products = channel.products(proposal.programme, tried)
     now, then = products.left(())
     at = {effect: [[products.at[k] for k in own] for own in each] for effect, each in shapes.items()}
     true = max(at["stribeck_friction"], key=lambda own: now[own, -1] @ fitted(now, own))
     values = fitted(now, true)
     expected = min(unimitated(then, true, values, own) for own in at["nonlinear_viscous_friction"])
     assert np.sqrt(squares) == pytest.approx(np.sqrt(expected), rel=0.25)
-    assert np.sqrt(squares / ground.dispersion) > 0.9 * weight.expected > weight.now
+    assert np.sqrt(squares / channel.dispersion) > 0.9 * weight.expected > weight.now
 
 
 def test_of_two_names_for_one_thing_none_is_told(motions):
-    ground = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"])
-    proposal = next_experiment(ROBOT, [ground], [], motions)
+    channel = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"])
+    proposal = next_experiment(ROBOT, [channel], [], motions)
     assert proposal.programme is None
     assert "cannot be told apart" in proposal.note
     assert proposal.to_json()["expected_separation"] is None
 
 
 def test_a_payload_in_every_run_asks_for_runs_without(motions):
-    ground = ground_of(motions, ["payload"])
-    proposal = next_experiment(ROBOT, [ground], [catalogue()["payload"]], motions)
+    channel = ground_of(motions, ["payload"])
+    proposal = next_experiment(ROBOT, [channel], [catalogue()["payload"]], motions)
     assert proposal.programme.kind == "without_payload"
     (weight,) = proposal.weights
     assert weight.now < 1 < ENOUGH < weight.expected
 
 
 def test_temperature_that_nobody_logged_asks_for_a_warm_up(motions):
-    ground = ground_of(motions, ["payload"])
-    proposal = next_experiment(ROBOT, [ground], [catalogue()["temperature_dependent_friction"]], motions)
+    channel = ground_of(motions, ["payload"])
+    proposal = next_experiment(ROBOT, [channel], [catalogue()["temperature_dependent_friction"]], motions)
     assert proposal.programme.kind == "warm_up"
     assert proposal.to_json()["programme"]["temperatures"] == [25.0, 45.0]
 
 
 def test_what_no_signal_shows_is_said_in_words(motions):
-    ground = ground_of(motions, ["payload"])
-    document = next_experiment(ROBOT, [ground], [catalogue()["copper_loss"]], motions).to_json()
+    channel = ground_of(motions, ["payload"])
+    document = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions).to_json()
     assert document["programme"] is None
     assert "log power" in document["motions"][0]
 
 
 def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
-    ground = ground_of(
+    channel = ground_of(
         motions,
         ["stribeck_friction", "nonlinear_viscous_friction"],
         "stribeck_friction",
         ["nonlinear_viscous_friction"],
     )
-    proposal = next_experiment(ROBOT, [ground], [], motions)
+    proposal = next_experiment(ROBOT, [channel], [], motions)
     document = proposal.to_json()
     json.dumps(document, allow_nan=False)
     assert document["purpose"] == "tell stribeck_friction from nonlinear_viscous_friction"

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from irtwin.gap.regression import progress
-from irtwin.gap.regression.progress import watched
+from irtwin.gap.regression.progress import with_progress
 from irtwin.identification.accumulate import Rows
 from synthetic import arm, swing
 
@@ -18,7 +18,7 @@ def equations(motion):
 def said(motions, every, monkeypatch):
     monkeypatch.setattr(progress, "_EVERY", every)
     lines = []
-    asked = watched(equations, motions, lines.append)
+    asked = with_progress(equations, motions, lines.append)
     for motion in motions:
         for piece in motion.pieces(100):
             np.testing.assert_array_equal(asked(piece).measured, piece.q[:, :1])
@@ -33,4 +33,4 @@ def test_long_work_says_how_far_it_has_come(monkeypatch):
 
 def test_short_work_says_nothing(monkeypatch):
     assert said(MOTIONS, 60.0, monkeypatch) == []
-    assert watched(equations, MOTIONS, None) is equations
+    assert with_progress(equations, MOTIONS, None) is equations

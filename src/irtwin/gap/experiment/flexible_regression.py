@@ -1,4 +1,4 @@
-"""The yardstick: how much of the gap any function of the motion could close. It measures, and names nothing."""
+"""How much of the gap a flexible regression on the motion could close, a diagnosis' `yardstick`. It names nothing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
-from irtwin.gap.experiment.planned_equations import TrialGround
+from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.signals.filter import decimation, low_pass
 from irtwin.signals.motion import Motion
 
@@ -29,7 +29,7 @@ _MEMORY = (0.1, 0.5)  # s
 
 
 @dataclass(frozen=True)
-class Yardstick:
+class FlexibleRegression:
     """Mean squares of g equations on groups left out, (g,) each, in the units of the measurement.
 
     `plain`, `closed`: what the twin and the twin with its causes leave, refitted to all runs; `plain_regressed` and
@@ -71,14 +71,14 @@ class Yardstick:
         }
 
 
-def yardstick(ground: TrialGround, motions: Sequence[Motion], seed: int) -> Yardstick | None:
+def flexible_regression(channel: PlannedEquations, motions: Sequence[Motion], seed: int) -> FlexibleRegression | None:
     """Regress what the twin leaves on what the motion is, groups of runs left out in turn.
 
     motions: the observed ones. A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed,
     acceleration, load, temperature, time and what went before, of the joint and of its neighbours, each also times the
     direction, as friction jumps with it. None where there are fewer than two groups or too few samples.
     """
-    parts = list(_parts(ground, motions))
+    parts = list(_parts(channel, motions))
     if not parts:
         return None
     group = np.concatenate([part.group for part in parts])
@@ -94,7 +94,7 @@ def yardstick(ground: TrialGround, motions: Sequence[Motion], seed: int) -> Yard
         residuals = np.column_stack([plain[:, equation], closed[:, equation]])
         sums.append(_regressed(features, residuals, group))
     plain_squares, plain_left, closed_squares, closed_left = np.array(sums).T
-    return Yardstick(plain_squares, plain_left, closed_squares, closed_left, ground.finding.floor)
+    return FlexibleRegression(plain_squares, plain_left, closed_squares, closed_left, channel.finding.floor)
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,9 @@ class _Part:
     group: np.ndarray
 
 
-def _parts(ground: TrialGround, motions: Sequence[Motion]) -> Iterator[_Part]:
+def _parts(channel: PlannedEquations, motions: Sequence[Motion]) -> Iterator[_Part]:
     """Yield stretches of the runs, thinned, with what the twin leaves of them."""
-    own = [m for m in motions if (m.torque if ground.finding.name == "torque" else m.power) is not None]
+    own = [m for m in motions if (m.torque if channel.finding.name == "torque" else m.power) is not None]
     share = max(1, _SAMPLES // max(len(own), 1))
     total = min(share * len(own), sum(len(motion.time) for motion in own))
     for motion in own:
@@ -117,22 +117,22 @@ def _parts(ground: TrialGround, motions: Sequence[Motion]) -> Iterator[_Part]:
         starts = np.linspace(0, len(motion.time) - length // count, count).astype(int)
         for start in starts:
             part = motion.part(int(start), int(start) + length // count)
-            yield from _part(ground, part, max(1, total // _ROWS))
+            yield from _part(channel, part, max(1, total // _ROWS))
 
 
-def _part(ground: TrialGround, part: Motion, thinned: int) -> Iterator[_Part]:
-    plain, closed, undecided = ground.residuals(part)
+def _part(channel: PlannedEquations, part: Motion, thinned: int) -> Iterator[_Part]:
+    plain, closed, undecided = channel.residuals(part)
     if part.cutoff:
         undecided = np.abs(low_pass(undecided.astype(float), part.rate, part.cutoff)) > 0.1
     step = max(thinned, decimation(part.rate, part.cutoff) if part.cutoff else 1)
-    group = ground.groups(part.run, part.time)
+    group = channel.groups(part.run, part.time)
     kept = np.zeros(len(group), dtype=bool)
     kept[::step] = True
     kept &= (group >= 0) & np.isfinite(plain).all(axis=1)
     if not kept.any():
         return
-    torque = ground.finding.name == "torque"
-    variables = _of_joints(ground, part) if torque else [_of_power(ground, part)]
+    torque = channel.finding.name == "torque"
+    variables = _of_joints(channel, part) if torque else [_of_power(channel, part)]
     speeds = part.dq if torque else np.zeros((len(part.time), 1))
     signs = np.where(np.abs(speeds) < _STANDSTILL, 0.0, np.sign(speeds))
     decided = np.where(undecided, np.nan, 1.0)[kept]
@@ -141,11 +141,11 @@ def _part(ground: TrialGround, part: Motion, thinned: int) -> Iterator[_Part]:
     )
 
 
-def _of_joints(ground: TrialGround, part: Motion) -> list[np.ndarray]:
+def _of_joints(channel: PlannedEquations, part: Motion) -> list[np.ndarray]:
     """Return each joint's variables, (N, v)."""
     signs = np.where(np.abs(part.dq) < _STANDSTILL, 0.0, np.sign(part.dq))
     before = [_remembered(signs, part.rate, seconds) for seconds in _MEMORY]
-    load, time = ground.load(part), (part.time - (part.whole or part).time[0])[:, None]
+    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
     found = []
     for joint in range(part.dq.shape[1]):
         near = [k for k in (joint - 1, joint + 1) if 0 <= k < part.dq.shape[1]]
@@ -157,9 +157,9 @@ def _of_joints(ground: TrialGround, part: Motion) -> list[np.ndarray]:
     return found
 
 
-def _of_power(ground: TrialGround, part: Motion) -> np.ndarray:
+def _of_power(channel: PlannedEquations, part: Motion) -> np.ndarray:
     """Return the variables of power, (N, v)."""
-    load, time = ground.load(part), (part.time - (part.whole or part).time[0])[:, None]
+    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
     work = load * part.dq
     total = work.sum(axis=1, keepdims=True)
     slow = [_remembered(total, part.rate, seconds) for seconds in _MEMORY]

@@ -10,7 +10,7 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
-from irtwin.gap.experiment.planned_equations import Products, TrialGround
+from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
 from irtwin.gap.experiment.programmes import Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.cause import Cause
@@ -134,7 +134,7 @@ class _Question:
     other causes.
     """
 
-    ground: TrialGround
+    channel: PlannedEquations
     effects: tuple[str, ...]
     joints: tuple[str, ...]
     places: tuple[tuple[tuple[Shape, ...], ...], ...]
@@ -166,15 +166,15 @@ class _Question:
         values = fitted(left[0], own)
         squares = [unimitated(each, own, values, _imitating(each, own, values, taken)) for each in left]
         sizes = [max(unimitated(each, own, values, ()), 1e-30) for each in left]
-        now, then = (float(np.sqrt(square / self.ground.dispersion)) for square in squares)
+        now, then = (float(np.sqrt(square / self.channel.dispersion)) for square in squares)
         share = max(squares[1] - squares[0], 0.0) / max(sizes[1] - sizes[0], 1e-30)
         return now, max(now, then), squares[0] / sizes[0], min(share, 1.0)
 
     def _visible(self, left: Left, places: Sequence[Sequence[list[int]]], seconds: float) -> Weight:
         """Return how far an effect of the size that is expected would stand out, at the place where it does best."""
         squares = [max(float(np.diag(each)[shapes[0]].sum()) for shapes in places) for each in left]
-        now, then = (float(np.sqrt(max(square, 0.0) / self.ground.dispersion)) for square in squares)
-        rows = self.ground.rows, self.ground.rows + seconds * self.ground.per_second
+        now, then = (float(np.sqrt(max(square, 0.0) / self.channel.dispersion)) for square in squares)
+        rows = self.channel.rows, self.channel.rows + seconds * self.channel.per_second
         share_now, share = (max(square, 0.0) / count for square, count in zip(squares, rows, strict=True))
         return Weight(self.effects, now, max(now, then), share_now, share)
 
@@ -194,20 +194,20 @@ def _gain(left: np.ndarray, own: list[int]) -> float:
 
 
 def next_experiment(
-    robot: Robot, grounds: Sequence[TrialGround], lacking: Sequence[Effect], seen: Sequence[Motion]
+    robot: Robot, channels: Sequence[PlannedEquations], lacking: Sequence[Effect], seen: Sequence[Motion]
 ) -> Proposal | None:
     """Design what tells the causes' rivals apart; where there are none, what shows the effects `lacking`.
 
-    `grounds`: each channel's; `seen`: the motions that were judged. Of the programmes that reach a separation of ENOUGH
-    in every question the one that takes the least time is chosen, else the one that answers the most. None where there
-    is nothing to ask.
+    `channels`: planned equations of each; `seen`: the motions that were judged. Of the programmes that reach a
+    separation of ENOUGH in every question the one that takes the least time is chosen, else the one that answers the
+    most. None where there is nothing to ask.
     """
-    questions = [q for ground in grounds for cause in ground.finding.causes if (q := _rivals(ground, cause))]
+    questions = [q for channel in channels for cause in channel.finding.causes if (q := _rivals(channel, cause))]
     if questions:
         purpose = "; ".join(f"tell {q.effects[0]} from {', '.join(q.effects[1:])}" for q in questions)
         names = tuple(dict.fromkeys(name for q in questions for name in q.effects))
     elif lacking:
-        questions = [q for effect in lacking if (q := _unseen(robot, grounds, effect))]
+        questions = [q for effect in lacking if (q := _unseen(robot, channels, effect))]
         names = tuple(effect.id for effect in lacking)
         purpose = f"show {', '.join(names)}"
     else:
@@ -231,11 +231,11 @@ def next_experiment(
 
 def _weigh(programme: Programme, questions: Sequence[_Question]) -> list[Weight]:
     products: dict[str, Products] = {}
-    for ground in {q.ground.finding.name: q.ground for q in questions}.values():
-        name = ground.finding.name
-        tried = set().union(*(q.tried for q in questions if q.ground.finding.name == name))
-        products[name] = ground.products(programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))))
-    return [w for q in questions for w in q.weigh(products[q.ground.finding.name], programme.seconds)]
+    for channel in {q.channel.finding.name: q.channel for q in questions}.values():
+        name = channel.finding.name
+        tried = set().union(*(q.tried for q in questions if q.channel.finding.name == name))
+        products[name] = channel.products(programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))))
+    return [w for q in questions for w in q.weigh(products[q.channel.finding.name], programme.seconds)]
 
 
 def _choose(weighed: Sequence[tuple[Programme, list[Weight]]]) -> tuple[Programme, list[Weight]]:
@@ -262,14 +262,14 @@ def _note(weighed: Sequence[Sequence[Weight]]) -> str | None:
     return "; ".join(said) or None
 
 
-def _rivals(ground: TrialGround, cause: Cause) -> _Question | None:
+def _rivals(channel: PlannedEquations, cause: Cause) -> _Question | None:
     """Return the question which of a cause and its foremost rivals it is."""
     known: dict[tuple[str, str], dict[str | None, tuple[Shape, ...]]] = {}
-    for one in ground.finding.attribution.hypotheses:
+    for one in channel.finding.attribution.hypotheses:
         known.setdefault((one.effect, one.scope), {})[one.joint] = tuple(v.columns for v in one.variants)
     effects = [cause.effect]
     places: list[tuple[tuple[Shape, ...], ...]] = [tuple((variant.columns,) for variant in cause.variants)]
-    others = tuple(k for k in ground.finding.chosen if k not in cause.columns)
+    others = tuple(k for k in channel.finding.chosen if k not in cause.columns)
     for rival in cause.rivals[: _FOREMOST - 1]:
         of_rival = known.get((rival, cause.scope)) or known.get((rival, _other(cause.scope))) or {}
         found = tuple(of_rival[joint] for joint in cause.joints if joint in of_rival)
@@ -278,23 +278,23 @@ def _rivals(ground: TrialGround, cause: Cause) -> _Question | None:
         if found and not any(set(shape) & set(others) for shapes in found for shape in shapes):
             effects.append(rival)
             places.append(found)
-    joints = cause.joints or ground.robot.joint_names
-    return _Question(ground, tuple(effects), joints, tuple(places), others) if len(effects) > 1 else None
+    joints = cause.joints or channel.robot.joint_names
+    return _Question(channel, tuple(effects), joints, tuple(places), others) if len(effects) > 1 else None
 
 
-def _unseen(robot: Robot, grounds: Sequence[TrialGround], effect: Effect) -> _Question | None:
+def _unseen(robot: Robot, channels: Sequence[PlannedEquations], effect: Effect) -> _Question | None:
     """Return the question whether an effect is there; None where nothing measures it."""
-    for ground in grounds:
-        if ground.finding.name == effect.signal:
-            found = [h for h in ground.finding.attribution.hypotheses if h.effect == effect.id]
+    for channel in channels:
+        if channel.finding.name == effect.signal:
+            found = [h for h in channel.finding.attribution.hypotheses if h.effect == effect.id]
             scope = "missing" if any(h.scope == "missing" for h in found) else "changed"
             places = [(h.variants[len(h.variants) // 2].columns,) for h in found if h.scope == scope]
             joints: dict[str | None, list[Column]] = {}
             for column in () if places else candidate_columns(robot, [effect]):
                 joints.setdefault(column.term.joint, []).append(column)
             shapes: tuple[tuple[Shape, ...], ...] = (*places, *((tuple(columns),) for columns in joints.values()))
-            chosen = tuple(ground.finding.chosen)
-            return _Question(ground, (effect.id,), robot.joint_names, (shapes,), chosen) if shapes else None
+            chosen = tuple(channel.finding.chosen)
+            return _Question(channel, (effect.id,), robot.joint_names, (shapes,), chosen) if shapes else None
     return None
 
 

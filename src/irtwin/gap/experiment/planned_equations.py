@@ -1,4 +1,4 @@
-"""The trial ground: what one channel's equations would say of motions that nobody has made yet."""
+"""Planned equations: what one channel's equations would say of motions that nobody has made yet."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Products:
         return projected(self.existing, fitted), projected(self.total, fitted)
 
 
-class TrialGround:
+class PlannedEquations:
     """The equations of one channel, with what was found in it, on motions of one's choice."""
 
     def __init__(self, finding: Finding, stack: Stack, below: Callable[[Motion], Predicted]):
@@ -191,14 +191,14 @@ class TrialGround:
         return self._last[1]
 
 
-def trial_grounds(
+def planned_equations(
     case: Case,
     stacks: tuple[Stack, Stack],
     findings: Sequence[Finding],
     below: Below,
     torque: Torque,
-) -> tuple[TrialGround, ...]:
-    """Return each channel's trial ground.
+) -> tuple[PlannedEquations, ...]:
+    """Return the planned equations of each channel.
 
     stacks: the effects that explain torque and power; `below` is what candidates for torque are built on, `torque` the
     joint torque for those of power.
@@ -213,8 +213,8 @@ def trial_grounds(
         return Predicted(real, *power()(whole, real))
 
     return tuple(
-        TrialGround(finding, stacks[0], below)
+        PlannedEquations(finding, stacks[0], below)
         if finding.name == "torque"
-        else TrialGround(finding, stacks[1], below_power)
+        else PlannedEquations(finding, stacks[1], below_power)
         for finding in findings
     )

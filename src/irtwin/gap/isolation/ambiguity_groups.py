@@ -1,4 +1,4 @@
-"""Rivals: the causes that finds make together, and which effects would explain them as well."""
+"""Ambiguity groups: the causes that selected hypotheses make together, and which effects would explain them as well."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from irtwin.gap.isolation.cause import Cause, Find, between_groups, gains, judge
 from irtwin.gap.regression.cross_validation import attempt, canonical_correlation
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.transient import brief
+from irtwin.gap.regression.transient import is_transient
 
 RIVAL = 0.8  # of the cause's gain a rival explains
 _APART = 2.0  # standard errors between groups that tell rivals apart
@@ -61,7 +61,7 @@ def _cause(
             continue
         if mean[k] > known.get(name, -np.inf):
             known[name], correlations[name] = float(mean[k]), float(alike[k])
-        if mean[0] - mean[k] < told_apart(gain[0] - gain[k], float(mean[0]), 1 - RIVAL):
+        if mean[0] - mean[k] < indistinguishable_below(gain[0] - gain[k], float(mean[0]), 1 - RIVAL):
             equal.append(name)
     return Cause(
         effect=effect,
@@ -69,7 +69,9 @@ def _cause(
         joints=tuple(one.hypothesis.joint for one in members if one.hypothesis.joint),
         variants=mine,
         gain=float(mean[0]),
-        t=members[0].t if brief(mine[0].effect) else between_groups(gain[0], said),  # an episode's is between joints
+        t=members[0].t
+        if is_transient(mine[0].effect)
+        else between_groups(gain[0], said),  # an episode's is between joints
         p=max(one.p for one in members),
         rivals=tuple(dict.fromkeys(sorted(equal, key=lambda name: -known[name]))),
         rival_gains=known,
@@ -77,7 +79,7 @@ def _cause(
     )
 
 
-def told_apart(behind: np.ndarray, gain: float, most: float) -> float:
+def indistinguishable_below(behind: np.ndarray, gain: float, most: float) -> float:
     """Return by how much an effect must be behind a better one to be told from it.
 
     behind: (G,) it is in each group, of the better one's `gain`; more than `most` of that always tells.

@@ -13,7 +13,7 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.forward_selection import Attribution, attribute
-from irtwin.gap.isolation.power_consistency import Balance
+from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.isolation.shares import shares
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
@@ -29,7 +29,7 @@ class Finding:
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
-    part of what they close together, none where they close nothing; `balances`: what power says of each.
+    part of what they close together, none where they close nothing; `power_balances`: what power says of each.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Finding:
     floor: np.ndarray | None
     estimate: Estimate
     shares: tuple[float, ...] = ()
-    balances: tuple[Balance, ...] = ()
+    power_balances: tuple[PowerBalance, ...] = ()
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -52,9 +52,9 @@ class Finding:
         """Return a cause's part of what all close together, None where they close nothing."""
         return self.shares[self.causes.index(cause)] if self.shares else None
 
-    def balance(self, cause: Cause) -> Balance | None:
+    def balance(self, cause: Cause) -> PowerBalance | None:
         """Return what power says of a cause, None where it was not asked."""
-        return self.balances[self.causes.index(cause)] if self.balances else None
+        return self.power_balances[self.causes.index(cause)] if self.power_balances else None
 
     @property
     def chosen(self) -> list[int]:

@@ -9,13 +9,13 @@ import numpy as np
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
-from irtwin.gap.isolation.ambiguity_groups import RIVAL, SAME, causes, told_apart
+from irtwin.gap.isolation.ambiguity_groups import RIVAL, SAME, causes, indistinguishable_below
 from irtwin.gap.isolation.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.regression.cross_validation import Trial, attempt, scores
 from irtwin.gap.regression.hypotheses import MISSING, Hypothesis, in_scope
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.significance import p_values
-from irtwin.gap.regression.transient import brief
+from irtwin.gap.regression.transient import is_transient
 
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
@@ -111,16 +111,16 @@ class _Search:
             return []
         trial = attempt(self.system, moments, chosen, [h.variants for h in left])
         gain, t, speaks = _judged(self.system, trial, left)
-        episode = self.system.episode
-        short = [k for k, one in enumerate(left) if episode and any(brief(v.effect) for v in one.variants)]
-        t[short] = episode.t if episode else 0.0
+        transient = self.system.transient
+        short = [k for k, one in enumerate(left) if transient and any(is_transient(v.effect) for v in one.variants)]
+        t[short] = transient.t if transient else 0.0
         alone = _far_ahead(gain, speaks <= _FEW, left)
         plausible = (gain >= self.matters(noise, left)) & ((t >= _LEAST_T) | alone)
         if not plausible.any():
             return []
         block_scores, products = scores(self.system, moments, noise, chosen)
         p = p_values(block_scores, products, left, self.seed)
-        p[short] = episode.p if episode else 1.0
+        p[short] = transient.p if transient else 1.0
         sure = np.flatnonzero(plausible & (_sure(p, gain, left) | alone))
         if not len(sure):
             return []
@@ -263,7 +263,9 @@ def _leader(
     if known and (nearest := max(known, key=lambda k: gain[k])) != best and gain[nearest] >= RIVAL * gain[best]:
         return nearest
     behind = per_group[best] - per_group
-    equal = [int(k) for k in plausible if behind[k].mean() <= told_apart(behind[k], float(gain[best]), _AT_MOST)]
+    equal = [
+        int(k) for k in plausible if behind[k].mean() <= indistinguishable_below(behind[k], float(gain[best]), _AT_MOST)
+    ]
     equal = [k for k in equal if left[k].scope == left[best].scope and _overlap(left[k], left[best])]
     if left[best].of_bodies:  # a load imitates bodies that are off, but not all of it
         equal = [k for k in equal if gain[k] >= (1 - SAME) * gain[best]]

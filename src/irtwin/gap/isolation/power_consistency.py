@@ -19,7 +19,7 @@ _CHANNELS = {"torque": MECHANICAL, "measurement": SENSOR}
 
 
 @dataclass(frozen=True)
-class Balance:
+class PowerBalance:
     """What power says of a cause of torque.
 
     `gain`: logarithm of the held-out mean square of power where only the sensor shows the cause's torque, over that
@@ -37,7 +37,7 @@ class Balance:
         return MECHANICAL if self.gain > 0 else SENSOR
 
 
-def filtered(cause: Cause, balance: Balance, known: Mapping[str, Effect]) -> Cause:
+def filtered(cause: Cause, balance: PowerBalance, known: Mapping[str, Effect]) -> Cause:
     """Return the cause without the rivals that power refutes: those of another kind than it says, where it decides.
 
     A cause that power itself refutes keeps its rivals.
@@ -47,7 +47,7 @@ def filtered(cause: Cause, balance: Balance, known: Mapping[str, Effect]) -> Cau
     return replace(cause, rivals=tuple(rival for rival in cause.rivals if kind_of(known[rival]) == balance.kind))
 
 
-def refuted(causes: Sequence[Cause], weighed: Sequence[Balance], known: Mapping[str, Effect]) -> frozenset[str]:
+def refuted(causes: Sequence[Cause], weighed: Sequence[PowerBalance], known: Mapping[str, Effect]) -> frozenset[str]:
     """Return the effects of causes that power refutes, and that have a rival which it does not."""
     return frozenset(
         cause.effect

@@ -9,24 +9,24 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import ExplainedTorque
-from irtwin.gap.isolation.power_consistency import Balance
+from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.regression.channel_equations import Torque, power_system
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.signals.motion import Motion
 
 
-def balances(case: Case, stack: Stack, explained: ExplainedTorque) -> tuple[Balance, ...]:
+def power_balances(case: Case, stack: Stack, explained: ExplainedTorque) -> tuple[PowerBalance, ...]:
     """Weigh each cause of torque by the power that was measured; `stack` holds the effects that explain power."""
     return tuple(_weigh(case, stack, explained, cause) for cause in explained.finding.causes)
 
 
-def _weigh(case: Case, stack: Stack, explained: ExplainedTorque, cause: Cause) -> Balance:
+def _weigh(case: Case, stack: Stack, explained: ExplainedTorque, cause: Cause) -> PowerBalance:
     shown = _squares(case, stack, _taken(explained, cause, carried=False))
     carried = _squares(case, stack, _taken(explained, cause, carried=True))
     gain = np.log(shown / carried)
     error = float(np.std(gain, ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
     mean = float(gain.mean())
-    return Balance(mean, float(mean / max(error, np.finfo(float).tiny)))
+    return PowerBalance(mean, float(mean / max(error, np.finfo(float).tiny)))
 
 
 def _taken(explained: ExplainedTorque, cause: Cause, *, carried: bool) -> Torque:

@@ -21,7 +21,7 @@ from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_tr
 
 
 @dataclass(frozen=True)
-class Left:
+class ChannelResidual:
     """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
     `before`, `after`: traces without and with the causes, `after` None where there is none, and `seen`, `explained` the
@@ -41,7 +41,7 @@ class Left:
     level: np.ndarray
 
 
-def left_over(case: Case, explained: Explained, torque: Torque) -> Left:
+def channel_residual(case: Case, explained: Explained, torque: Torque) -> ChannelResidual:
     """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes)."""
     finding = explained.finding
     power = finding.name == "power"
@@ -60,7 +60,9 @@ def left_over(case: Case, explained: Explained, torque: Torque) -> Left:
     maps = (robot_maps if power else joint_maps)((before, after or [], acting, others), case.grouping.label)
     seen, closed, acts, known = maps
     assert seen is not None
-    return Left(finding, before, after, added, seen, closed, acts, known, level_of(finding.floor, seen, known))
+    return ChannelResidual(
+        finding, before, after, added, seen, closed, acts, known, level_of(finding.floor, seen, known)
+    )
 
 
 def against_reference(finding: Finding) -> bool:
@@ -68,18 +70,18 @@ def against_reference(finding: Finding) -> bool:
     return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
 
 
-def places(left: Sequence[Left], seed: int) -> list[Location]:
+def places(left: Sequence[ChannelResidual], seed: int) -> list[Location]:
     """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess."""
     found = [(one, _places(one, seed)) for one in left]
 
-    def order(pair: tuple[Left, list[Location]]) -> tuple[float, float]:
+    def order(pair: tuple[ChannelResidual, list[Location]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
         return -gain, -max((place.excess for place in pair[1]), default=0.0)
 
     return [place for _, own in sorted(found, key=order) for place in own]
 
 
-def cause_curves(left: Sequence[Left]) -> list[dict[str, Any]]:
+def cause_curves(left: Sequence[ChannelResidual]) -> list[dict[str, Any]]:
     """Return each cause's curve, on the residual that all the others leave."""
     lines = []
     for one in left:
@@ -96,7 +98,7 @@ def cause_curves(left: Sequence[Left]) -> list[dict[str, Any]]:
     return lines
 
 
-def unnamed_curves(left: Sequence[Left], located: Sequence[Location], most: int) -> list[dict[str, Any]]:
+def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[Location], most: int) -> list[dict[str, Any]]:
     """Return the residual against what it follows, at the foremost places on which no cause acts."""
     lines: list[dict[str, Any]] = []
     for one in left:
@@ -109,7 +111,7 @@ def unnamed_curves(left: Sequence[Left], located: Sequence[Location], most: int)
     return lines
 
 
-def _line(left: Left, joint: str | None) -> dict[str, Any]:
+def _line(left: ChannelResidual, joint: str | None) -> dict[str, Any]:
     return {"channel": left.finding.name, "joint": joint}
 
 
@@ -126,7 +128,7 @@ def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.nda
     return found
 
 
-def _places(left: Left, seed: int) -> list[Location]:
+def _places(left: ChannelResidual, seed: int) -> list[Location]:
     names = left.finding.places
     best = [followed(left.before, k, joint) for k, joint in enumerate(names)]
     acting = np.array(
@@ -147,7 +149,7 @@ def _places(left: Left, seed: int) -> list[Location]:
     return [replace(place, runs=_standing_out(left, place)) for place in located]
 
 
-def _standing_out(left: Left, place: Location) -> tuple[str, ...]:
+def _standing_out(left: ChannelResidual, place: Location) -> tuple[str, ...]:
     k = left.finding.places.index(place.joint)
     return standing_out(left.before, k, float(left.level[k].min()))
 

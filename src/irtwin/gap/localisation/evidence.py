@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.localisation.channel_residuals import Left, cause_curves, unnamed_curves
+from irtwin.gap.localisation.channel_residuals import ChannelResidual, cause_curves, unnamed_curves
 from irtwin.gap.localisation.excess_map import heat_map
 from irtwin.gap.localisation.locations import Location
 
 _UNNAMED = 3  # places that no cause explains, drawn
 
 
-def drawn(left: Sequence[Left], located: Sequence[Location]) -> dict[str, Any]:
+def drawn(left: Sequence[ChannelResidual], located: Sequence[Location]) -> dict[str, Any]:
     """Return the arrays that a page draws of what the twin left of each channel, and of where that lies."""
     found: dict[str, Any] = {
         "follows": cause_curves(left) + unnamed_curves(left, located, _UNNAMED),

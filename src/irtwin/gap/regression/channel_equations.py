@@ -14,7 +14,7 @@ from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.progress import Tell, watched
+from irtwin.gap.regression.progress import Tell, with_progress
 from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.signals.motion import Motion
 
@@ -55,7 +55,7 @@ def torque_system(
         ]
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
-    blocks = accumulate(motions, watched(equations, motions, tell), pattern)
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     group, observed = grouping.of(blocks)
     return System(stack.torque_terms, columns, pattern, tuple(blocks), group, observed)
 
@@ -89,6 +89,6 @@ def power_system(
         joined = np.concatenate([own[:, ~stack.fixed], *candidates.part(motion)], axis=1)
         return Rows([joined], known[:, None], motion.power[:, None])
 
-    blocks = accumulate(motions, watched(equations, motions, tell), pattern)
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     group, observed = grouping.of(blocks)
     return System(free, columns, pattern, tuple(blocks), group, observed)

@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from irtwin.gap.regression.hypotheses import Variant, bounds
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.transient import brief
+from irtwin.gap.regression.transient import is_transient
 
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
 
@@ -65,7 +65,7 @@ def attempt(
         start[group] = test.squares
         inner, left_out, added, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
-            if brief(variant.effect):
+            if is_transient(variant.effect):
                 left_out[place] = _left(test, variant.columns, values[place])
         best = _best(inner, owner, len(candidates))
         loss[:, group], said[:, group] = left_out[best], added[best]

@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from irtwin.effects.effect import Effect, Term
 from irtwin.gap.regression.hypotheses import Column
-from irtwin.gap.regression.transient import Episode
+from irtwin.gap.regression.transient import Transient
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
@@ -27,7 +27,7 @@ class System:
 
     `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
     whether the block belongs to an observed run. With any that does not, each candidate column stands there twice: as
-    it is, and (from index K + M) zero in all but observed runs. `episode`: what joints say of a brief candidate.
+    it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of a brief candidate.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -36,7 +36,7 @@ class System:
     blocks: tuple[Block, ...]
     group: np.ndarray
     observed: np.ndarray
-    episode: Episode | None = None
+    transient: Transient | None = None
 
     @property
     def base(self) -> int:

@@ -13,7 +13,7 @@ Tell = Callable[[str], None]
 _EVERY = 5.0  # s between two lines: short work says none
 
 
-def watched(equations: Equations, motions: Sequence[Motion], tell: Tell | None) -> Equations:
+def with_progress(equations: Equations, motions: Sequence[Motion], tell: Tell | None) -> Equations:
     """Return the equations, with a line every few seconds of how much of the motions they have been asked for."""
     if tell is None:
         return equations

@@ -11,7 +11,7 @@ from irtwin.effects.load import ExternalContact
 
 
 @dataclass(frozen=True)
-class Episode:
+class Transient:
     """A contact: `effect` has its runs, start and stop.
 
     gain: squares explained in a joint, in units of the noise's, predicted from the other joints, over the runs (R, n);
@@ -24,6 +24,6 @@ class Episode:
     p: float
 
 
-def brief(effect: Effect) -> bool:
+def is_transient(effect: Effect) -> bool:
     """Return whether an effect has a start or a stop, so that joints have to agree on it, not runs."""
     return isinstance(effect, ExternalContact) and bool(np.isfinite([effect.start, effect.stop]).any())

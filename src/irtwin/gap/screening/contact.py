@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.load import ExternalContact
-from irtwin.gap.regression.transient import Episode
+from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.robot.description import Robot
 
@@ -40,7 +40,7 @@ Clock = tuple[float, float]
 """Start and stop of the run's clock, s."""
 
 
-def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> Episode | None:
+def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> Transient | None:
     """Return the clearest contact, in all observed runs that show its force at its clock; None where none stands out.
 
     noise: (n,) RMS of each joint's residual, N m. Of an arm of one or two joints nothing is said: hardly any agree.
@@ -50,16 +50,16 @@ def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> Episo
     return _contact([_Run(one, ExternalContact().columns(robot, one.motion), noise) for one in left])
 
 
-def _contact(runs: Sequence[_Run]) -> Episode | None:
+def _contact(runs: Sequence[_Run]) -> Transient | None:
     found = _leader(runs)
     if found is None:
         return None
     run, gain, clock = found
     quiet = [one for one in runs if one.judged(*one.samples(clock))[0].sum() < _QUIET * gain]
     chance = _Chance.of(quiet or runs, clock)
-    episode = _episode(runs, run, clock, chance, chance.p(gain, chance.count))
-    worse, better = -episode.gain.clip(max=0.0).sum(), episode.gain.clip(min=0.0).sum()
-    return episode if episode.p <= _ALPHA and worse <= _HARM * better else None
+    transient = _episode(runs, run, clock, chance, chance.p(gain, chance.count))
+    worse, better = -transient.gain.clip(max=0.0).sum(), transient.gain.clip(min=0.0).sum()
+    return transient if transient.p <= _ALPHA and worse <= _HARM * better else None
 
 
 def _leader(runs: Sequence[_Run]) -> tuple[_Run, float, Clock] | None:
@@ -74,7 +74,7 @@ def _leader(runs: Sequence[_Run]) -> tuple[_Run, float, Clock] | None:
     return found
 
 
-def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p: float) -> Episode:
+def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p: float) -> Transient:
     """Join the runs that show the first one's force at its clock, and place start and stop by all of them.
 
     p: of the first; each further motion makes chance as much less likely, of however many runs it was one.
@@ -94,7 +94,7 @@ def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p
     share = gain / np.concatenate([run.squares(*run.samples(clock)) for run in members])
     felt = np.any(gain != 0, axis=0)
     t = max(_t(gain[:, felt]), _t(share[:, felt]))
-    return Episode(ExternalContact(*clock, runs=tuple(sorted(run.name for run in members))), gain, t, p)
+    return Transient(ExternalContact(*clock, runs=tuple(sorted(run.name for run in members))), gain, t, p)
 
 
 def _placed(members: Sequence[_Run], clock: Clock) -> Clock:
@@ -182,7 +182,7 @@ class _Run:
 
     @cached_property
     def sudden(self) -> np.ndarray:
-        """(W,) whether one force over the whole run explains much less: a payload or a tilted base is no episode."""
+        """(W,) whether one force over the whole run explains much less: a payload or a tilted base is no transient."""
         whole = float(self.judged(np.array([0]), np.array([len(self.time)]))[0].sum())
         return np.asarray(whole <= _STEADY * self.gain)
 

@@ -25,7 +25,7 @@ _SWEEPS = 10
 
 
 @dataclass(frozen=True)
-class Carried:
+class UntoldPayload:
     """A payload in some runs: `effect` has the `runs`.
 
     gain: mean square that it explains, of joints by which it was not told which runs carry it, without the runs' group;
@@ -38,7 +38,7 @@ class Carried:
     p: float
 
 
-def carried(robot: Robot, system: System, noise: np.ndarray, seed: int) -> Carried | None:
+def untold_payload(robot: Robot, system: System, noise: np.ndarray, seed: int) -> UntoldPayload | None:
     """Return the payload that some observed runs carry and others do not; None where none shows.
 
     system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m.
@@ -56,7 +56,7 @@ def carried(robot: Robot, system: System, noise: np.ndarray, seed: int) -> Carri
     if mean < _MATTERS or p > _ALPHA:
         return None
     runs = tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries)
-    return Carried(Payload(runs=runs), mean, t, p)
+    return UntoldPayload(Payload(runs=runs), mean, t, p)
 
 
 @dataclass(frozen=True)

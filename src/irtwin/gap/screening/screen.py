@@ -15,9 +15,9 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.gap.regression.residuals import torque_residual
-from irtwin.gap.regression.transient import Episode, brief
+from irtwin.gap.regression.transient import Transient, is_transient
 from irtwin.gap.screening.contact import contact
-from irtwin.gap.screening.payloads import Carried, carried
+from irtwin.gap.screening.payloads import UntoldPayload, untold_payload
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.screening.ripples import fast_ripples
 from irtwin.signals.filter import decimation
@@ -25,11 +25,11 @@ from irtwin.signals.motion import Motion
 
 
 @dataclass(frozen=True)
-class Occasional:
+class Screened:
     """A contact, and a payload in some of the runs (None where none stands out); joints' fast ripples."""
 
-    contact: Episode | None = None
-    payload: Carried | None = None
+    contact: Transient | None = None
+    payload: UntoldPayload | None = None
     ripples: tuple[TorqueRipple, ...] = ()
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
@@ -40,7 +40,7 @@ class Occasional:
         return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples]
 
 
-def occasional(case: Case, stack: Stack, system: System, seed: int) -> Occasional:
+def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
     """Search the runs' torque; system: its equations, with the terms of the twin at least."""
     noise = noise_before(system)
     values = twin_values(system, system.solution((), np.sum(system.moments(noise), axis=0)))
@@ -51,7 +51,7 @@ def occasional(case: Case, stack: Stack, system: System, seed: int) -> Occasiona
         observed = motion.run in case.observed
         left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
     ripples = fast_ripples(case.robot, left)
-    return Occasional(contact(case.robot, left, noise), carried(case.robot, system, noise, seed), tuple(ripples))
+    return Screened(contact(case.robot, left, noise), untold_payload(case.robot, system, noise, seed), tuple(ripples))
 
 
 def acting(variants: Sequence[Variant]) -> dict[str, Any]:
@@ -60,7 +60,10 @@ def acting(variants: Sequence[Variant]) -> dict[str, Any]:
     if not effects:
         return {}
     runs = sorted({run for effect in effects for run in effect.runs or ()})
-    return {"runs": runs, "window": next(([e.shape["start"], e.shape["stop"]] for e in effects if brief(e)), None)}
+    return {
+        "runs": runs,
+        "window": next(([e.shape["start"], e.shape["stop"]] for e in effects if is_transient(e)), None),
+    }
 
 
 def _every(motion: Motion, step: int) -> Motion:
