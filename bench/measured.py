@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.identification.validation import split
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, read_data_set

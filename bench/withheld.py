@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from blind.score import wilson
-from irtwin.effects.effect import BASELINE, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, read_data_set

@@ -22,8 +22,8 @@ from scipy.special import expit
 from scipy.stats import f as fisher
 
 from blind.library import Explained, Library, power_library, swept, torque_library
-from irtwin.gap.case import Case, case_of
-from irtwin.gap.hypotheses import Hypothesis, Variant, bounds
+from irtwin.gap.data.case import Case, case_of
+from irtwin.gap.regression.hypotheses import Hypothesis, Variant, bounds
 from irtwin.signals.log import read_data_set
 
 STEPS = 20  # of forward selection, at most

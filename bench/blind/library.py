@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
-from irtwin.gap.case import Case
-from irtwin.gap.channels import Torque, power_system, torque_system
-from irtwin.gap.explained import LeftOut, twin_power
-from irtwin.gap.finding import noise_before, twin_values
-from irtwin.gap.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
-from irtwin.gap.system import System
-from irtwin.gap.visibility import can_show
+from irtwin.gap.data.case import Case
+from irtwin.gap.isolation.detectability import can_show
+from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.cross_fitted import LeftOut, twin_power
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
+from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.signals.motion import Motion
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from blind.baselines import THRESHOLD, answers, majority, thresholded
 from blind.compare import table
-from irtwin.gap.case import case_of
+from irtwin.gap.data.case import case_of
 from irtwin.signals.log import DataSet
 from synthetic import arm, as_run, measure, swing
 

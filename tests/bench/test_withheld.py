@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import gap_cases
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import rdflib
 
-from irtwin.effects.effect import BASELINE, Predicted, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Predicted
 from irtwin.effects.rigid_body import NAMES
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -74,6 +75,7 @@ def test_effects_are_as_the_ontology_says():
     for name, effect in catalogue().items():
         one = individuals[name]
         assert str(graph.value(one, irt.has_Channel)).rpartition("/")[2] == effect.channel
+        assert str(graph.value(one, irt.Effect_Family)) == effect.family
         stated = {
             str(graph.value(parameter, irt.Parameter_Name)): QUDT_UNITS[
                 str(graph.value(parameter, unit_of)).rpartition("/")[2]

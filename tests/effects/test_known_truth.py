@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from irtwin.effects import compliance, drive, friction, load, sensing, supply, transmission
-from irtwin.effects.effect import BASELINE, Effect, Predicted, catalogue
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.robot.urdf import parse_urdf
 from irtwin.twin.files import load as load_twin

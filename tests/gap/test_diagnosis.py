@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet

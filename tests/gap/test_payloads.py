@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import Payload
 from irtwin.effects.stack import Stack
-from irtwin.gap.channels import Grouping, torque_system
-from irtwin.gap.finding import noise_before
-from irtwin.gap.payloads import carried
+from irtwin.gap.regression.channel_equations import torque_system
+from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.normal_equations import noise_before
+from irtwin.gap.screening.payloads import untold_payload
 from synthetic import arm, measure, swing
 
 ROBOT = arm(4)
@@ -28,7 +29,7 @@ def search(loaded, observed=range(8), added=None):
         motions.append(replace(shown, torque=shown.torque + extra))
     grouping = Grouping({m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed))
     system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
-    return carried(ROBOT, system, noise_before(system), seed=0)
+    return untold_payload(ROBOT, system, noise_before(system), seed=0)
 
 
 def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from irtwin.gap.regimes import JOINT_PARTS, JOINT_REGIMES, ROBOT_PARTS, ROBOT_REGIMES, joint_regimes, robot_regimes
+from irtwin.gap.localisation.regimes import (
+    JOINT_PARTS,
+    JOINT_REGIMES,
+    ROBOT_PARTS,
+    ROBOT_REGIMES,
+    joint_regimes,
+    robot_regimes,
+)
 from irtwin.signals.motion import Motion
 
 RATE = 100.0

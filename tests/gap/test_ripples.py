@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from irtwin.gap.episodes import Remainder
-from irtwin.gap.ripples import fast_ripples
+from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.ripples import fast_ripples
 from synthetic import arm, swing
 
 ROBOT = arm(3)

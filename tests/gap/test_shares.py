@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import Term, catalogue
-from irtwin.gap.attribute import Attribution
-from irtwin.gap.cause import Cause
-from irtwin.gap.hypotheses import MISSING, Column, Variant
-from irtwin.gap.shares import shares
-from irtwin.gap.system import System
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Term
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.isolation.shares import shares
+from irtwin.gap.regression.hypotheses import MISSING, Column, Variant
+from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 400, 5

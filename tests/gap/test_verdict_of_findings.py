@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from irtwin.gap.floor import OUT_OF_BAND, REPEATS, Floor
-from irtwin.gap.verdict import AMBIGUOUS, ATTRIBUTED, NO_GAP, UNEXPLAINED, verdict_of
+from irtwin.gap.data.noise_floor import OUT_OF_BAND, REPEATS, Floor
+from irtwin.gap.isolation.verdict import AMBIGUOUS, ATTRIBUTED, NO_GAP, UNEXPLAINED, verdict_of
 
 CAUSE = SimpleNamespace(rivals=())
 

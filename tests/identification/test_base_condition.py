@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from arms import kr6, two_joints
 
+from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_condition import BaseRegressor
 from irtwin.signals.motion import Motion
@@ -19,7 +20,7 @@ def test_a_six_axis_arm_has_its_known_number_of_base_columns() -> None:
 
 def test_its_columns_are_those_of_the_effects() -> None:
     robot = kr6()
-    regressor, stack = BaseRegressor(robot), Stack(robot, BaseRegressor.EFFECTS)
+    regressor, stack = BaseRegressor(robot), Stack(robot, EXCITED)
     q, dq, ddq = motion(6)
     columns = stack.torque_columns(Motion("run", np.arange(len(q)), q, dq, ddq))[:, :, regressor.columns]
     np.testing.assert_allclose(regressor.matrix(q, dq, ddq), columns.reshape(-1, len(regressor.columns)), atol=1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from arms import kr6
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters, condition_number
 from irtwin.robot.urdf import parse_urdf

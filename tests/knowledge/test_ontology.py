@@ -150,8 +150,8 @@ def test_kr6_sheet_says_what_the_shipped_data_set_says() -> None:
 
 
 def test_every_implemented_effect_has_an_individual(ontology: rdflib.Graph) -> None:
-    effect = pytest.importorskip("irtwin.effects.effect")
+    catalogue = pytest.importorskip("irtwin.effects.catalogue")
     ids = {str(one).removeprefix(EFFECT) for one in ontology.subjects(RDF.type, IRT.Effect)}
-    assert set(effect.catalogue()) <= ids
+    assert set(catalogue.catalogue()) <= ids
     baseline = {str(one).removeprefix(EFFECT) for one in ontology.subjects(IRT.Baseline, rdflib.Literal(True))}
-    assert set(effect.BASELINE) == baseline
+    assert set(catalogue.BASELINE) == baseline

@@ -194,7 +194,7 @@ def test_damaged_parquet_is_said_to_be(folder):
 
 
 def test_a_run_in_pieces_is_no_copy_of_itself(tmp_path):
-    from irtwin.gap.admission import admit
+    from irtwin.gap.data.admission import admit
     from irtwin.signals.conditioning import condition
 
     whole = as_run(measure(ROBOT, swing(ROBOT, 1, 6.0)))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
 from irtwin.signals.conditioning import condition
 from irtwin.twin.identify import identify

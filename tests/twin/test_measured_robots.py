@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.identification.validation import split
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import read_data_set

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.twin import twin as room
 from irtwin.twin.identify import identify
 from synthetic import arm, measure, swing, with_constants

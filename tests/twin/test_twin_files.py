@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from irtwin.effects.effect import BASELINE
+from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
 from irtwin.twin.files import load, save

@@ -121,6 +121,7 @@ class Backlash(_Compliance):
     """
 
     id: ClassVar[str] = "backlash"
+    family: ClassVar[str] = "transmission"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"b": (3e-4, 3e-3)}
 
     b: float = 1e-3  # rad
@@ -168,6 +169,7 @@ class JointElasticity(_Compliance):
     """
 
     id: ClassVar[str] = "joint_elasticity"
+    family: ClassVar[str] = "transmission"
 
     frequency: float = 0.0
 

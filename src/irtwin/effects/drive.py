@@ -38,6 +38,7 @@ class RotorInertia(JointEffect):
     """Ia ddq: rotor and gear, reflected to the joint."""
 
     id: ClassVar[str] = "rotor_inertia"
+    family: ClassVar[str] = "bodies"
     channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -58,6 +59,9 @@ class CopperLoss(JointEffect):
     """
 
     id: ClassVar[str] = "copper_loss"
+    family: ClassVar[str] = "drive"
+    electrical_loss: ClassVar[bool] = True
+    manual_test: ClassVar[str | None] = "log power while holding loaded poses, then unloaded ones, brakes open"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
@@ -83,6 +87,10 @@ class WindingTemperature(JointEffect):
     """
 
     id: ClassVar[str] = "winding_temperature"
+    family: ClassVar[str] = "drive"
+    requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
+    electrical_loss: ClassVar[bool] = True
+    manual_test: ClassVar[str | None] = "log power and temperatures from a cold start"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
@@ -117,6 +125,9 @@ class IronLoss(JointEffect):
     """k1 |w| + k2 w^2: hysteresis and eddy currents; w is the motor's speed, the joint's where no gear is known."""
 
     id: ClassVar[str] = "iron_loss"
+    family: ClassVar[str] = "drive"
+    electrical_loss: ClassVar[bool] = True
+    manual_test: ClassVar[str | None] = "log power at constant speeds up to the limit in poses without load"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
 
@@ -139,6 +150,9 @@ class InverterLoss(JointEffect):
     """V0 |i|: the voltage that transistors and diodes drop."""
 
     id: ClassVar[str] = "inverter_loss"
+    family: ClassVar[str] = "drive"
+    electrical_loss: ClassVar[bool] = True
+    manual_test: ClassVar[str | None] = "log power while holding poses of rising load, brakes open"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"

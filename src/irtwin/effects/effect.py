@@ -95,10 +95,15 @@ class Effect(ABC):
     so many seconds on either side. What is `rare` shows in some motions alone, and in these strongly.
     What is `imitated` looks like what friction leaves, where joints turn back, if its form is not the twin's.
 
+    `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
+    `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
+    `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, and what is
+    `drawn_at_rest` does not depend on the motion. `manual_test` is what a person can do to show it where no motion
+    does; `taken_off` says how a run without it is made.
+
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
-    it acts (None: all). To teach the twin a new effect, write a
-    class and list it in `catalogue`.
+    it acts (None: all). To teach the twin a new effect, write a class and list it in `irtwin.effects.catalogue`.
     """
 
     id: ClassVar[str]
@@ -110,6 +115,15 @@ class Effect(ABC):
     reach: ClassVar[float | None] = None
     rare: ClassVar[bool] = False
     imitated: ClassVar[bool] = False
+    family: ClassVar[str]
+    requires: ClassVar[frozenset[str]] = frozenset()
+    bodies: ClassVar[bool] = False
+    within_bodies: ClassVar[bool] = False
+    carries_torque: ClassVar[bool] = False
+    electrical_loss: ClassVar[bool] = False
+    drawn_at_rest: ClassVar[bool] = False
+    manual_test: ClassVar[str | None] = None
+    taken_off: ClassVar[str | None] = None
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)
@@ -260,59 +274,3 @@ def force_unit(joint: Joint) -> str:
 def inertia_unit(joint: Joint) -> str:
     """Return the unit of effort per acceleration of the joint."""
     return "kg" if joint.kind == "prismatic" else "kg m^2"
-
-
-BASELINE = (
-    "rigid_body",
-    "rotor_inertia",
-    "coulomb_friction",
-    "viscous_friction",
-    "torque_offset",
-    "mechanical_power",
-    "standby_power",
-)
-
-
-def catalogue() -> dict[str, Effect]:
-    """Return every effect that the twin knows, by id, in its default shape."""
-    from irtwin.effects import compliance, drive, friction, load, rigid_body, sensing, supply, transmission
-
-    effects: tuple[Effect, ...] = (
-        rigid_body.RigidBody(),
-        drive.RotorInertia(),
-        friction.CoulombFriction(),
-        friction.ViscousFriction(),
-        sensing.TorqueOffset(),
-        supply.MechanicalPower(),
-        supply.StandbyPower(),
-        friction.StribeckFriction(),
-        friction.NonlinearViscousFriction(),
-        friction.AsymmetricFriction(),
-        friction.LoadDependentFriction(),
-        friction.TemperatureDependentFriction(),
-        friction.PreslidingHysteresis(),
-        compliance.Backlash(),
-        compliance.JointElasticity(),
-        transmission.TorqueRipple(),
-        friction.PositionDependentFriction(),
-        transmission.JointCoupling(),
-        load.CableDrag(),
-        load.GravityCompensation(),
-        load.Payload(),
-        load.BaseTilt(),
-        load.ExternalContact(),
-        sensing.TorqueConstantError(),
-        sensing.TorqueDrift(),
-        sensing.EncoderOffset(),
-        sensing.TimeDelay(),
-        drive.CopperLoss(),
-        drive.WindingTemperature(),
-        drive.IronLoss(),
-        drive.InverterLoss(),
-        supply.NoRegeneration(),
-        supply.BusCapacitor(),
-        supply.HoldingBrakes(),
-        sensing.MeterLag(),
-        sensing.MeterGain(),
-    )
-    return {effect.id: effect for effect in effects}

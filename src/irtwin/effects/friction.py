@@ -23,6 +23,7 @@ class CoulombFriction(JointEffect):
     """Fc sign(dq). At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none."""
 
     id: ClassVar[str] = "coulomb_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -44,6 +45,7 @@ class ViscousFriction(JointEffect):
     """Fv dq."""
 
     id: ClassVar[str] = "viscous_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -60,6 +62,7 @@ class StribeckFriction(JointEffect):
     """Fs s exp(-(|dq|/vs)^d): what sticks more while it is slow."""
 
     id: ClassVar[str] = "stribeck_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
     imitated: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"vs": (0.005, 0.2), "d": (0.5, 2.0)}
@@ -102,6 +105,7 @@ class NonlinearViscousFriction(JointEffect):
     """k s |dq|^d: viscous friction that thins (d < 1) or stirs (d > 1)."""
 
     id: ClassVar[str] = "nonlinear_viscous_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (0.2, 3.0)}
 
@@ -132,6 +136,7 @@ class AsymmetricFriction(JointEffect):
     """a |s| + b |dq|: friction that differs by direction."""
 
     id: ClassVar[str] = "asymmetric_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -149,6 +154,7 @@ class LoadDependentFriction(JointEffect):
     """mu |tau| s: gear teeth rub more under load; one coefficient where the joint is driven, one where it drives."""
 
     id: ClassVar[str] = "load_dependent_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
@@ -176,6 +182,9 @@ class TemperatureDependentFriction(JointEffect):
     """
 
     id: ClassVar[str] = "temperature_dependent_friction"
+    family: ClassVar[str] = "friction"
+    requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
+    manual_test: ClassVar[str | None] = "log joint temperatures, from a cold start"
     channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
 
@@ -216,6 +225,7 @@ class PreslidingHysteresis(JointEffect):
     """
 
     id: ClassVar[str] = "presliding_hysteresis"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
     imitated: ClassVar[bool] = True
     memory: ClassVar[bool] = True
@@ -263,6 +273,7 @@ class PositionDependentFriction(JointEffect):
     """Fc (a cos q + b sin q) s: a bent shaft or a worn sector. The coefficients are Fc a and Fc b."""
 
     id: ClassVar[str] = "position_dependent_friction"
+    family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -41,6 +41,8 @@ class CableDrag(JointEffect):
     """k (q - q0): a hose package that pulls. Its constant part shows as a torque offset."""
 
     id: ClassVar[str] = "cable_drag"
+    family: ClassVar[str] = "load"
+    taken_off: ClassVar[str | None] = "with the hose package off"
     channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -57,6 +59,7 @@ class GravityCompensation(JointEffect):
     """k (L(q) - L0) dL/dq: a spring or a cylinder beside the joint; its first two orders in the angle."""
 
     id: ClassVar[str] = "gravity_compensation"
+    family: ClassVar[str] = "load"
     channel: ClassVar[str] = "torque"
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
@@ -92,6 +95,9 @@ class Payload(Effect):
     """Y_n(q, dq, ddq) (m, m c, I): a load at the flange that nobody told; c from the flange frame's origin."""
 
     id: ClassVar[str] = "payload"
+    family: ClassVar[str] = "load"
+    within_bodies: ClassVar[bool] = True
+    taken_off: ClassVar[str | None] = "with the tool off"
     channel: ClassVar[str] = "torque"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
@@ -124,6 +130,7 @@ class BaseTilt(Effect):
     """Gravity turned by small angles about the base's x and y axes, in rad."""
 
     id: ClassVar[str] = "base_tilt"
+    family: ClassVar[str] = "environment"
     channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
@@ -160,6 +167,9 @@ class ExternalContact(Effect):
     """
 
     id: ClassVar[str] = "external_contact"
+    family: ClassVar[str] = "environment"
+    manual_test: ClassVar[str | None] = "the same motion with free space around the arm"
+    taken_off: ClassVar[str | None] = "in free space"
     channel: ClassVar[str] = "torque"
 
     start: float = -np.inf  # s

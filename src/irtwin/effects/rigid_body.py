@@ -25,6 +25,8 @@ class RigidBody(Effect):
     """M(q) ddq + C(q, dq) dq + G(q): linear in ten inertial parameters per moving body (Yan 2018, eqs. 1, 2)."""
 
     id: ClassVar[str] = "rigid_body"
+    family: ClassVar[str] = "bodies"
+    bodies: ClassVar[bool] = True
     channel: ClassVar[str] = "torque"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:

@@ -19,6 +19,7 @@ class TorqueOffset(JointEffect):
     """c: the reading where there is no torque."""
 
     id: ClassVar[str] = "torque_offset"
+    family: ClassVar[str] = "sensing"
     channel: ClassVar[str] = "measurement"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -35,6 +36,8 @@ class TorqueDrift(JointEffect):
     """r t: a reading that drifts from the start of each run."""
 
     id: ClassVar[str] = "torque_drift"
+    family: ClassVar[str] = "sensing"
+    manual_test: ClassVar[str | None] = "holding one pose for ten minutes"
     channel: ClassVar[str] = "measurement"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -52,6 +55,7 @@ class TorqueConstantError(JointEffect):
     """g tau: torque told from current by a wrong constant. The coefficient is g - 1."""
 
     id: ClassVar[str] = "torque_constant_error"
+    family: ClassVar[str] = "sensing"
     channel: ClassVar[str] = "measurement"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 2
@@ -80,6 +84,7 @@ class EncoderOffset(Effect):
     """(dG/dq) e: a position that is read e too small. Inertia and Coriolis torque change with it too."""
 
     id: ClassVar[str] = "encoder_offset"
+    family: ClassVar[str] = "sensing"
     channel: ClassVar[str] = "measurement"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
@@ -99,6 +104,8 @@ class TimeDelay(JointEffect):
     """tau(t - d). The column is the secant (tau(t - d) - tau(t))/d, its coefficient d again in the right shape."""
 
     id: ClassVar[str] = "time_delay"
+    family: ClassVar[str] = "sensing"
+    manual_test: ClassVar[str | None] = "sines of rising frequency, up to 5 Hz"
     channel: ClassVar[str] = "measurement"
     imitated: ClassVar[bool] = True
     needs: ClassVar[str | None] = "torque"
@@ -131,6 +138,8 @@ class MeterLag(Effect):
     """P/(T s + 1): a power meter that lags. The column is the secant (lagged - P)/T, as in `TimeDelay`."""
 
     id: ClassVar[str] = "meter_lag"
+    family: ClassVar[str] = "sensing"
+    manual_test: ClassVar[str | None] = "steps of power, logged together with the motion"
     channel: ClassVar[str] = "measurement"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "power"
@@ -162,6 +171,8 @@ class MeterGain(Effect):
     """g P: a power meter out of scale. The coefficient is g - 1."""
 
     id: ClassVar[str] = "meter_gain"
+    family: ClassVar[str] = "sensing"
+    manual_test: ClassVar[str | None] = "standing still with a load of known power on the same meter"
     channel: ClassVar[str] = "measurement"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "power"

@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Predicted, Term, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect, JointEffect, Predicted, Term
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion

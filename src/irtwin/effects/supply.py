@@ -20,6 +20,8 @@ class MechanicalPower(JointEffect):
     """sum_j tau_j dq_j (Yan 2018, eq. 7 and the sum in eq. 8): a coefficient of one in every joint."""
 
     id: ClassVar[str] = "mechanical_power"
+    family: ClassVar[str] = "supply"
+    carries_torque: ClassVar[bool] = True
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
@@ -39,6 +41,9 @@ class StandbyPower(Effect):
     """P0: controller, fans, brakes held open; Pconstant of Yan 2018, eq. 8."""
 
     id: ClassVar[str] = "standby_power"
+    family: ClassVar[str] = "supply"
+    drawn_at_rest: ClassVar[bool] = True
+    electrical_loss: ClassVar[bool] = True
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
 
@@ -59,6 +64,8 @@ class BusCapacitor(Effect):
     """
 
     id: ClassVar[str] = "bus_capacitor"
+    family: ClassVar[str] = "supply"
+    manual_test: ClassVar[str | None] = "hard stops from full speed, power logged at 100 Hz or more"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "power"
@@ -92,6 +99,10 @@ class NoRegeneration(Effect):
     """max(sum_j P_j, 0): the brake chopper burns what the axes give back. The coefficient is the burnt share."""
 
     id: ClassVar[str] = "no_regeneration"
+    family: ClassVar[str] = "supply"
+    manual_test: ClassVar[str | None] = (
+        "log power while lowering a payload fast, one joint at a time, then two against each other"
+    )
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "power"
@@ -119,6 +130,9 @@ class HoldingBrakes(Effect):
     """Pb while the brakes are released: as long as a joint moves, and `delay` longer."""
 
     id: ClassVar[str] = "holding_brakes"
+    family: ClassVar[str] = "supply"
+    electrical_loss: ClassVar[bool] = True
+    manual_test: ClassVar[str | None] = "log power while standing with brakes closed, then open"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     memory: ClassVar[bool] = True

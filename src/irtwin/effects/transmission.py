@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -31,6 +31,7 @@ class TorqueRipple(JointEffect):
     """A sin(N q + f): teeth, poles and cogging. A second order is a second effect, of another N."""
 
     id: ClassVar[str] = "torque_ripple"
+    family: ClassVar[str] = "transmission"
     channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"N": (1.0, 400.0)}
 
@@ -72,12 +73,17 @@ class JointCoupling(Effect):
     """
 
     id: ClassVar[str] = "joint_coupling"
+    family: ClassVar[str] = "transmission"
     channel: ClassVar[str] = "torque"
 
     def pair(self, robot: Robot) -> tuple[Joint, ...]:
         """Return the two joints; none on a robot of one."""
         acting = self.acting(robot)
         return acting[-2:] if len(acting) > 1 else ()
+
+    def on(self, *joints: str) -> Effect:
+        """Return the effect in a pair of joints; one joint alone leaves the pair as it is."""
+        return replace(self, joints=joints) if len(joints) > 1 else self
 
     def touched(self, robot: Robot, joint: str) -> tuple[str, ...]:
         """Return both joints of the pair."""

@@ -8,32 +8,34 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Predicted, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap import document
-from irtwin.gap.balance import filtered, refuted
-from irtwin.gap.candidates import Below
-from irtwin.gap.case import Case, case_of
-from irtwin.gap.cause import Cause
-from irtwin.gap.channels import Torque, power_system, torque_system
-from irtwin.gap.closure import closed_twin
+from irtwin.gap.closed_twin import closed_twin
+from irtwin.gap.data.case import Case, case_of
+from irtwin.gap.data.noise_floor import Floor, noise_floor
+from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
-from irtwin.gap.evidence import drawn
-from irtwin.gap.experiment import next_experiment
-from irtwin.gap.explained import Explained, ExplainedTorque, LeftOut, explained_power, twin_power
-from irtwin.gap.finding import Finding, find
-from irtwin.gap.floor import Floor, noise_floor
-from irtwin.gap.locate import Location
-from irtwin.gap.occasional import occasional
-from irtwin.gap.same_robot import check_same_robot
-from irtwin.gap.system import System
-from irtwin.gap.through_power import ThroughPower
-from irtwin.gap.trial_ground import trial_grounds
-from irtwin.gap.verdict import NO_GAP, verdict_of
-from irtwin.gap.visibility import Untestable, can_show, untestable
-from irtwin.gap.weighing import balances
-from irtwin.gap.where import left_over, places
-from irtwin.gap.yardstick import yardstick
+from irtwin.gap.experiment.flexible_regression import flexible_regression
+from irtwin.gap.experiment.next_experiment import next_experiment
+from irtwin.gap.experiment.planned_equations import planned_equations
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
+from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
+from irtwin.gap.isolation.finding import Finding, find
+from irtwin.gap.isolation.power_consistency import filtered, refuted
+from irtwin.gap.isolation.power_evidence import power_balances
+from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
+from irtwin.gap.localisation.channel_residuals import channel_residual, places
+from irtwin.gap.localisation.evidence import drawn
+from irtwin.gap.localisation.locations import Location
+from irtwin.gap.regression.candidate_columns import Below
+from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.cross_fitted import LeftOut, twin_power
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.torque_from_power import ThroughPower
+from irtwin.gap.screening.screen import screen
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
@@ -129,12 +131,12 @@ def diagnose(
     blamed = {cause.effect for cause in causes}
     silent = [effect for effect in catalogue().values() if effect.id not in blamed]
     lacking = untestable(silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen)
-    left = [left_over(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
+    left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
     located = places(left, seed)
     tell("Designing the next experiment")
-    grounds = trial_grounds(case, (stack, power_stack), findings, below, torque)
-    measures = {ground.finding.name: yardstick(ground, case.seen, seed) for ground in grounds}
-    proposal = next_experiment(case.robot, grounds, [catalogue()[one.effect] for one in lacking], case.seen)
+    planned = planned_equations(case, (stack, power_stack), findings, below, torque)
+    measures = {channel.finding.name: flexible_regression(channel, case.seen, seed) for channel in planned}
+    proposal = next_experiment(case.robot, planned, [catalogue()[one.effect] for one in lacking], case.seen)
     return Diagnosis(
         description=case.robot,
         verdict=verdict,
@@ -178,10 +180,10 @@ def _torque(
     seed: int,
     tell: Progress,
 ) -> Finding:
-    found = occasional(case, stack, plain, seed)
+    found = screen(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
     system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
-    system = replace(system, episode=found.contact)
+    system = replace(system, transient=found.contact)
     return find("torque", case, system, floor.torque, seed, without=unknown)
 
 
@@ -190,12 +192,12 @@ def _balanced(
 ) -> ExplainedTorque:
     """Let power speak: drop the rivals that it refutes, and try without causes that it does."""
     known, finding = catalogue(), explained.finding
-    weighed = balances(case, stack, explained)
+    weighed = power_balances(case, stack, explained)
     if wrong := refuted(finding.causes, weighed, known):
         finding = find("torque", case, finding.system, finding.floor, seed, without=wrong | unknown)
-        weighed = balances(case, stack, ExplainedTorque(explained.stack, finding, below))
+        weighed = power_balances(case, stack, ExplainedTorque(explained.stack, finding, below))
     causes = tuple(filtered(one, said, known) for one, said in zip(finding.causes, weighed, strict=True))
-    finding = replace(finding, attribution=replace(finding.attribution, causes=causes), balances=weighed)
+    finding = replace(finding, attribution=replace(finding.attribution, causes=causes), power_balances=weighed)
     return ExplainedTorque(explained.stack, finding, below)
 
 
@@ -218,6 +220,6 @@ def _variants(case: Case, signal: str) -> list[Effect]:
     return [
         shape
         for effect in catalogue().values()
-        if effect.signal == signal and (effect.id != "rigid_body" or bodies) and can_show(effect, case.seen)
+        if effect.signal == signal and (bodies or not effect.bodies) and can_show(effect, case.seen)
         for shape in effect.candidates(case.robot)
     ]

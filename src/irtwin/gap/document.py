@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from irtwin.effects.effect import Quantity, Term
-from irtwin.gap.cause import Cause
-from irtwin.gap.confidence import confidence
+from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
-from irtwin.gap.finding import Finding, noise_before
-from irtwin.gap.floor import Floor
-from irtwin.gap.occasional import acting
-from irtwin.gap.shrink import closed_fraction, held_out, pooled_interval
-from irtwin.gap.verdict import UNEXPLAINED
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.verdict import UNEXPLAINED
+from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
+from irtwin.gap.regression.normal_equations import noise_before
+from irtwin.gap.screening.screen import acting
 from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
 
@@ -107,7 +108,7 @@ def parameters(robot: Robot, finding: Finding, one: Cause) -> list[Json]:
             stated += [_quantity(each) for each in quantities if np.isfinite(each.value)]
         else:
             stated += [_coefficient(variant.terms[k], found, place) for k, place in enumerate(places)]
-    if one.effect == "rigid_body":  # most of a body's numbers do not show: those that do
+    if one.of_bodies:  # most of a body's numbers do not show: those that do
         stated = [each for each in stated if each["interval95"] and each["interval95"][0] * each["interval95"][1] > 0]
     return stated
 

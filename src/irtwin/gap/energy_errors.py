@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.gap.finding import Finding
+from irtwin.gap.isolation.finding import Finding
 from irtwin.signals.motion import Motion
 
 _RESAMPLED = 1000
@@ -43,7 +43,7 @@ class EnergyErrors:
 def energy_errors(finding: Finding, motions: Sequence[Motion]) -> EnergyErrors:
     """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones."""
     system = finding.system
-    ones = next(k for k, column in enumerate(system.columns) if column.effect.id == "standby_power") + system.base
+    ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
     mean = {m.run: float(np.mean(m.power)) for m in motions if m.power is not None}
     errors = []
     for columns, noise in (((), finding.rmse), (finding.chosen, finding.attribution.noise)):

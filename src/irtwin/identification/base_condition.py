@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.robot.description import Robot
@@ -30,13 +31,11 @@ class BaseRegressor:
     Rows and columns are those of `effects.stack`, here with their derivatives: 10 n of the rigid bodies, then n each.
     """
 
-    EFFECTS = ("rigid_body", "rotor_inertia", "viscous_friction", "coulomb_friction", "torque_offset")
-
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
         self._data = robot.model.createData()
         self._n = len(robot.joints)
-        self.columns = base_parameters(Stack(robot, self.EFFECTS)).independent
+        self.columns = base_parameters(Stack(robot, EXCITED)).independent
 
     def matrix(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the base regressor W of a motion, (N n, p): joint torque = W times base parameters."""

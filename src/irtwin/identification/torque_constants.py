@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Term, catalogue, force_unit
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect, Term, force_unit
 from irtwin.errors import InputError
 from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.identification.estimators import Estimate, estimate
@@ -50,7 +51,7 @@ def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants
     heat = [Term("R", "ohm", joint=joint.name, expected=resistance, spread=wide, lowest=0.0) for joint in joints]
     found = _balance(motions, [standby, *own, *heat], pooled=False)
     index = slice(1, 1 + len(joints))
-    mechanical = catalogue()["mechanical_power"]
+    mechanical = next(effect for effect in catalogue().values() if effect.carries_torque)
     kept = Estimate(found.values[index], found.covariance[index, index], found.noise, found.blocks)
     return TorqueConstants(found.values[index], tuple((mechanical, term) for term in own), kept)
 

@@ -1,13 +1,13 @@
 """SHACL rules, each run once over all its focus nodes instead of once for each of them.
 
-A rule becomes one CONSTRUCT whose `$this` is tied to the shape's targets and the rule's conditions. The result is what
+A rule becomes one CONSTRUCT whose `$this` is tied to the shape's targets. The result is what
 a SHACL engine gives that iterates its rules, in milliseconds where that takes minutes.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from functools import cache
@@ -22,7 +22,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.shapes import Node, Shapes
 from irtwin.knowledge.sparql_text import masked
-from irtwin.knowledge.vocabulary import GRAPH_SHACL, OWL, PREFIXES, RDF, RDFS, SH, shorten
+from irtwin.knowledge.vocabulary import GRAPH_SHACL, OWL, PREFIXES, RDF, RDFS, shorten
 from irtwin.resources import folder
 
 MOST_ROUNDS = 100
@@ -117,14 +117,12 @@ def _rule(shapes: Shapes, shape: Node, rule: Node) -> ShaclRule:
     named = rule if isinstance(rule, NamedNode) else shape
     name = named.value if isinstance(named, NamedNode | BlankNode) else str(named)
     focus = " UNION ".join(_targets(shapes, shape))
-    conditions = [f"FILTER({shapes.condition(it, '$this')})" for it in _conditions(shapes, rule)]
     constructs = shapes.values(rule, "construct")
-    if len(constructs) == 1 and isinstance(constructs[0], Literal):
-        construct = _set_wise(shapes, rule, constructs[0].value, " ".join([focus, *conditions]))
-    elif not constructs:
-        construct = _triple_rule(shapes, rule, " ".join([focus, *conditions]))
-    else:
-        raise shapes.fault(shape, "a rule has one sh:construct, a text")
+    if len(constructs) != 1 or not isinstance(constructs[0], Literal) or shapes.values(rule, "condition"):
+        raise shapes.fault(
+            shape, "a rule is a sh:SPARQLRule with one sh:construct and no sh:condition: write that in SPARQL"
+        )
+    construct = _set_wise(shapes, rule, constructs[0].value, focus)
     return ShaclRule(
         name=name,
         label=_text(shapes, named, "label") or shorten(name),
@@ -145,11 +143,6 @@ def _targets(shapes: Shapes, shape: Node) -> list[str]:
     return found
 
 
-def _conditions(shapes: Shapes, rule: Node) -> Iterator[Node]:
-    for condition in shapes.values(rule, "condition"):
-        yield from list(shapes.items(condition)) or [condition]
-
-
 def _set_wise(shapes: Shapes, rule: Node, construct: str, focus: str) -> str:
     body = _BODY.search(masked(construct))
     if body is None:
@@ -160,37 +153,6 @@ def _set_wise(shapes: Shapes, rule: Node, construct: str, focus: str) -> str:
         for it in shapes.values(ontology, "declare")
     )
     return f"{prefixes}{construct[: body.end()]} {focus} {construct[body.end() :]}"
-
-
-def _triple_rule(shapes: Shapes, rule: Node, focus: str) -> str:
-    parts = [shapes.value(rule, name) for name in ("subject", "predicate", "object")]
-    if None in parts:
-        raise shapes.fault(rule, "a rule has sh:construct, or sh:subject, sh:predicate and sh:object")
-    variables = ("?_subject", "?_predicate", "?_object")
-    pairs = zip(parts, variables, strict=True)
-    patterns = (_expression(shapes, focus, part, variable) for part, variable in pairs if part)
-    return f"CONSTRUCT {{ {' '.join(variables)} }} WHERE {{ {focus} {' '.join(patterns)} }}"
-
-
-def _expression(shapes: Shapes, focus: str, expression: Node, variable: str) -> str:
-    """Return the pattern that binds a variable to the values of a node expression, after the pattern of the focus."""
-    if isinstance(expression, NamedNode) and expression == NamedNode(SH + "this"):
-        return f"BIND($this AS {variable})"
-    if not isinstance(expression, BlankNode):
-        return f"BIND({expression} AS {variable})"
-    inner = shapes.value(expression, "nodes") or NamedNode(SH + "this")
-    for path in shapes.values(expression, "path"):
-        start = shapes.fresh()
-        return f"{_expression(shapes, focus, inner, start)} {start} {shapes.path(path)} {variable} ."
-    for shape in shapes.values(expression, "filterShape"):
-        return f"{_expression(shapes, focus, inner, variable)} FILTER({shapes.condition(shape, variable)})"
-    for parts in shapes.values(expression, "union"):
-        return " UNION ".join(
-            f"{{ {focus} {_expression(shapes, focus, part, variable)} }}" for part in shapes.items(parts)
-        )
-    for parts in shapes.values(expression, "intersection"):
-        return " ".join(f"{{ {focus} {_expression(shapes, focus, part, variable)} }}" for part in shapes.items(parts))
-    raise shapes.fault(expression, "is no node expression that is known here")
 
 
 def _construct(store: Store, rule: ShaclRule) -> set[Triple]:

@@ -21,15 +21,6 @@ from irtwin.twin.files import from_json
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate
 
-_ELECTRICAL_LOSSES = {
-    "standby_power",
-    "copper_loss",
-    "winding_temperature",
-    "iron_loss",
-    "inverter_loss",
-    "holding_brakes",
-}
-
 
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's energy, its ledger, and its modelled series."""
@@ -101,9 +92,9 @@ def _run_energy(
     start = int(np.argmax(held_out(role, motion)))
     judged = whole if start == 0 else validate(twin, [motion.part(start, len(motion.time))])[0]
     power = twin.power(motion) if motion.power is None else motion.power
-    standby = sum(entry.energy for entry in ledger if entry.effect == "standby_power")
-    has_standby = "standby_power" in twin.effect_ids
-    electrical = _ELECTRICAL_LOSSES.intersection(twin.effect_ids)
+    at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
+    standby = sum(entry.energy for entry in ledger if entry.effect in at_rest)
+    electrical = any(effect.electrical_loss for effect in twin.stack.effects)
     return schema.RunEnergy(
         run_id=run_id,
         twin_id=twin_id,
@@ -116,8 +107,8 @@ def _run_energy(
         modelled_energy_j=whole.modelled_energy,
         energy_error_percent=None if role.part == APART else judged.energy_error,
         power_rmse_w=None if role.part == APART else judged.power_rmse,
-        standby_energy_j=standby if has_standby else None,
-        standby_share=standby / whole.modelled_energy if has_standby and whole.modelled_energy > 0 else None,
+        standby_energy_j=standby if at_rest else None,
+        standby_share=standby / whole.modelled_energy if at_rest and whole.modelled_energy > 0 else None,
         returned_energy_j=returned_energy(twin, motion),
     )
 

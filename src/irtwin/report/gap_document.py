@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
 from irtwin.report.questions import Answers, Row
 
@@ -21,9 +22,6 @@ _KINDS = {
     "exciting_motion": "an exciting motion",
     "payload": "a motion without and with a payload",
     "warm_up": "a motion from cold and again warm",
-    "without_payload": "a motion with the tool off",
-    "without_cable_drag": "a motion with the hose package off",
-    "without_external_contact": "a motion in free space",
 }
 _NUMBERS = {
     "speeds": ("speeds of {}", "rad/s"),
@@ -111,7 +109,7 @@ def experiment(document: Document, names: Mapping[str, str]) -> dict[str, Any] |
         ],
         "considered": [
             {
-                "kind": _KINDS.get(one["kind"], one["kind"].replace("_", " ")),
+                "kind": _kind(one["kind"]),
                 "duration": _minutes(60.0 * one["minutes"]),
                 "separation": _separation(one["expected_separation"]),
                 "chosen": bool(programme) and one["kind"] == programme["kind"],
@@ -140,6 +138,14 @@ def _facts(programme: Document, joints: int) -> list[tuple[str, str]]:
 
 def _minutes(seconds: float) -> str:
     return f"{seconds / 60:.2g} min" if seconds else ""
+
+
+def _kind(kind: str) -> str:
+    """Return a kind of programme in words; one `without_` an effect says how that is taken off."""
+    effect = catalogue().get(kind.removeprefix("without_"))
+    if kind.startswith("without_") and effect is not None:
+        return f"a motion {effect.taken_off}"
+    return _KINDS.get(kind, kind.replace("_", " "))
 
 
 def _settings(programme: Document) -> list[tuple[str, str]]:

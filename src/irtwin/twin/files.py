@@ -8,7 +8,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from irtwin.effects.effect import Effect, catalogue
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot

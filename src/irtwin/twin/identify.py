@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from irtwin.effects.effect import BASELINE, Effect, JointEffect, Term
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import Effect, JointEffect, Term
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
@@ -93,7 +94,7 @@ def _visible(robot: Robot, effects: Sequence[str | Effect], *, torque: bool, pow
     """Return the effects that can be told from what was measured, or that hold nothing to be told."""
     whole = Stack(robot, effects)
     seen = {effect.id for effect, term in whole.power_terms if power or term.fixed}
-    carried = "mechanical_power" in whole.ids
+    carried = any(effect.carries_torque for effect in whole.effects)
     seen |= {effect.id for effect, _ in whole.torque_terms if torque or (carried and effect.channel == "torque")}
     return Stack(robot, [effect for effect in whole.effects if effect.id in seen])
 

@@ -130,9 +130,9 @@ class Twin:
             columns = self.stack.torque_columns(piece, self._torque_values)
             watts = weights @ self._power_columns(piece) * self._power_values  # (L,)
             for value, (effect, term) in zip(watts, self.stack.power_terms, strict=True):
-                if effect.id != "mechanical_power":
+                if not effect.carries_torque:
                     enter(effect.id, term.joint, float(value))
-            if "mechanical_power" in self.effect_ids:
+            if any(effect.carries_torque for effect in self.stack.effects):
                 work = np.einsum("t,tj,tjk->jk", weights, piece.dq, columns) * values
                 for joint, index in zip(*np.nonzero(self.stack.pattern & self.stack.real), strict=True):
                     effect, _ = self.stack.torque_terms[index]

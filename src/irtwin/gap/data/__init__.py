@@ -1,0 +1,1 @@
+"""What is diagnosed: the case, whether it can be, its noise floor, whether its runs are of one robot."""

@@ -1,0 +1,142 @@
+"""The case: what a data set asks to be diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Effect
+from irtwin.effects.sensing import TorqueOffset
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.gap.data.admission import admit
+from irtwin.gap.regression.groups import Grouping
+from irtwin.identification.torque_constants import torque_constants
+from irtwin.robot.description import Robot
+from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.log import DataSet, Run
+from irtwin.signals.motion import Motion
+
+
+@dataclass(frozen=True)
+class Case:
+    """The robot, the ids of its twin's effects, and each run's motion by name, all filtered alike.
+
+    `robot` has the torque constants that a balance of power told where nobody knew them, and `motions` the torque that
+    follows; `given` are the robot and the motions without.
+    """
+
+    robot: Robot
+    effects: tuple[str, ...]
+    runs: tuple[Run, ...]
+    motions: dict[str, Motion]
+    given: tuple[Robot, dict[str, Motion]]
+
+    @property
+    def observed(self) -> frozenset[str]:
+        """The names of the runs whose gap is to be diagnosed."""
+        return frozenset(run.name for run in self.runs if run.role == "observed")
+
+    @property
+    def grouping(self) -> Grouping:
+        """Which runs are left out together: those of one programmed motion."""
+        return Grouping(_labels(self.runs), self.observed)
+
+    @property
+    def seen(self) -> list[Motion]:
+        """The observed runs' motions."""
+        return [motion for run, motion in self.motions.items() if run in self.observed]
+
+    @property
+    def others(self) -> list[Motion]:
+        """The motions of the runs that observed ones are held against: reference and simulated."""
+        return [motion for run, motion in self.motions.items() if run not in self.observed]
+
+    @property
+    def against(self) -> str | None:
+        """The role of the runs that the observed ones are held against: "reference", "simulated" or none."""
+        roles = {run.role for run in self.runs}
+        return next((role for role in ("reference", "simulated") if role in roles), None)
+
+    @property
+    def with_torque(self) -> list[Motion]:
+        """The motions whose torque is known."""
+        return [motion for motion in self.motions.values() if motion.torque is not None]
+
+    @property
+    def with_power(self) -> list[Motion]:
+        """The motions whose power was measured."""
+        return [motion for motion in self.motions.values() if motion.power is not None]
+
+    @property
+    def run_offsets(self) -> list[Effect]:
+        """What the torque of each run but the first is off by, where the runs are few.
+
+        Two runs differ in the mean of many things; no other run tells which of these is an effect.
+        """
+        runs = [motion.run for motion in self.with_torque]
+        return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
+
+    def shows(self, signal: str) -> bool:
+        """Return whether some observed run has the signal: "torque" or "power"."""
+        return any(getattr(motion, signal) is not None for motion in self.seen)
+
+
+def case_of(data_set: DataSet, withhold: Sequence[str]) -> Case:
+    """Prepare a data set; `withhold` takes effects out of the twin.
+
+    Raises InputError on an effect that the catalogue lacks or the twin has not, and where `admit` does.
+    """
+    effects = twin_effects(data_set, withhold)
+    cutoff = choose_cutoff(data_set.runs)
+    given = {run.name: condition(run, data_set.robot, cutoff) for run in data_set.runs}
+    robot, motions = _torque_from_current(data_set.robot, given)
+    admit(data_set, motions)
+    return Case(robot, effects, data_set.runs, motions, (data_set.robot, given))
+
+
+def twin_effects(data_set: DataSet, withhold: Sequence[str]) -> tuple[str, ...]:
+    """Return the ids of the twin's effects, less those withheld; InputError on one that cannot be."""
+    effects = data_set.effects or BASELINE
+    Stack(data_set.robot, effects)
+    known = catalogue()
+    for effect in withhold:
+        if effect not in known:
+            raise InputError(f"--withhold {effect}: there is no such effect; use some of {', '.join(known)}")
+        if effect not in effects:
+            raise InputError(f"--withhold {effect}: the twin does not have it; it has {', '.join(effects)}")
+        if known[effect].bodies:
+            raise InputError(f"--withhold {effect}: a twin without bodies explains nothing; withhold another effect")
+    return tuple(effect for effect in effects if effect not in withhold)
+
+
+def _torque_from_current(robot: Robot, motions: dict[str, Motion]) -> tuple[Robot, dict[str, Motion]]:
+    """Where there is no torque but current and power: let their balance tell the torque constants."""
+    if any(motion.torque is not None for motion in motions.values()):
+        return robot, motions
+    telling = [motion for motion in motions.values() if motion.current is not None and motion.power is not None]
+    if not telling:
+        return robot, motions
+    constants = torque_constants(robot, telling).constants
+    joints = tuple(
+        replace(joint, torque_constant=float(value)) for joint, value in zip(robot.joints, constants, strict=True)
+    )
+    found = {
+        name: motion if motion.current is None else replace(motion, torque=motion.current * constants)
+        for name, motion in motions.items()
+    }
+    return replace(robot, joints=joints), found
+
+
+def _labels(runs: Sequence[Run]) -> dict[str, str]:
+    """Return each run's programmed motion: the run that it repeats, directly or not."""
+    repeats = {run.name: run.repeat_of for run in runs}
+    labels = {}
+    for run in runs:
+        first, seen = run.name, {run.name}
+        while (before := repeats.get(first)) and before not in seen:
+            first = before
+            seen.add(first)
+        labels[run.name] = first
+    return labels

@@ -1,0 +1,103 @@
+"""Whether reference runs are of the robot whose gap is to be diagnosed: one whose torque is nothing like it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.gap.regression.cholesky import factored
+from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.robot.description import Robot
+from irtwin.signals.log import Run
+
+# of a joint's mean square, left by the bodies of the other runs: twice what gains of 0.7 or 1.4 on two joints leave;
+# a simulator's masses may be off by tens of percent
+_FOREIGN = {"reference": 0.06, "simulated": 0.3}
+_JOINTS = 2
+_OPPOSED = 0.3  # of the observed friction, with the other sign
+_HALF = 0.5  # of the joints
+_HEAVIEST = 20.0  # kg, of a load that came or went; half of what the arm weighs where that is more
+_REACH = (1.0, 0.4, 0.4, 0.4, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)  # m, m^2: its first moments and inertia, per kg
+
+
+def check_same_robot(runs: Sequence[Run], stack: Stack, system: System) -> None:
+    """Raise InputError where the torque of the other runs (reference, simulated) is nothing like the observed.
+
+    `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or its bodies explain it no
+    better than those of the reference runs; another robot's bodies are wrong in several.
+    """
+    if not system.both:
+        return
+    others = [run for run in runs if run.role != "observed"]
+    moments = system.moments(noise_before(system))
+    seen = system.group_observed
+    other = system.solution((), np.sum([m for m, own in zip(moments, seen, strict=True) if not own], axis=0))
+    total = np.sum([m for m, own in zip(moments, seen, strict=True) if own], axis=0)
+    own = system.solution((), total)
+    foreign = _foreign_share(stack.robot, system, total, own, other) > _FOREIGN[others[0].role]
+    opposed = _opposed(stack.robot, system, own, other)
+    if foreign.sum() >= _JOINTS or opposed.mean() >= _HALF:
+        named = [name for k, name in enumerate(stack.robot.joint_names) if foreign[k] or opposed[k]]
+        raise InputError(
+            f"{others[0].file}: the torque of the {others[0].role} runs is nothing like that of the observed runs (on "
+            f"{', '.join(named)}), as of another robot, unit or sign; mend these runs, or leave them out"
+        )
+
+
+def _foreign_share(robot: Robot, system: System, total: np.ndarray, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return how much of each observed joint's mean square (n,) the bodies of the other runs leave.
+
+    Friction, offsets and rotors are refitted, and a load of a likely size may have come or gone; what the observed
+    runs' own bodies leave too is not counted. `own`, `other`: coefficients (D,) of either kind of run.
+    """
+    borrowed = other + _refitted(total, other, _allowed(robot, system))
+    nothing = np.zeros(len(other))
+    nothing[: system.base] = -system.expected / system.scale[: system.base]
+
+    def squares(vector: np.ndarray) -> np.ndarray:
+        groups = np.flatnonzero(system.group_observed)
+        return np.asarray(np.sum([system.squares(vector, int(group)) for group in groups], axis=0))
+
+    return np.asarray((squares(borrowed) - squares(own)) / np.maximum(squares(nothing), np.finfo(float).tiny))
+
+
+def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return on which joints (n,) all friction of the other runs drives where that of the observed runs brakes."""
+    opposed = []
+    for joint in robot.joint_names:
+        places = [
+            k
+            for k, (effect, term) in enumerate(system.terms)
+            if effect.family == "friction" and effect.id in BASELINE and term.joint == joint
+        ]
+        seen = own[places] + system.expected[places] / system.scale[places]
+        elsewhere = other[places] + system.expected[places] / system.scale[places]
+        opposed.append(bool(places) and bool(np.all(elsewhere * np.sign(seen) < -_OPPOSED * np.abs(seen))))
+    return np.array(opposed)
+
+
+def _allowed(robot: Robot, system: System) -> np.ndarray:
+    """Return how far each of the twin's terms (K,) may move, in units of its prior: bodies not, a load on the last."""
+    bodies = np.array([effect.bodies for effect, _ in system.terms], dtype=bool)
+    weight = max(_HEAVIEST, sum(inertia.mass for inertia in robot.model.inertias) / 2)
+    allowed = np.where(bodies, 0.0, np.inf)
+    last = np.flatnonzero(bodies)[-len(_REACH) :]
+    allowed[last] = (weight * np.array(_REACH) / system.scale[last])[: len(last)]
+    return allowed
+
+
+def _refitted(total: np.ndarray, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """Return what is added to coefficients `start` (D,) so that they fit best, each no farther than allowed (K,)."""
+    free = np.flatnonzero(allowed > 0)
+    factor = np.triu(factored(total[np.ix_(free, free)]))
+    right = total[free, -1] - total[free, : len(start)] @ start
+    found = lsq_linear(factor, solve_triangular(factor.T, right, lower=True), (-allowed[free], allowed[free]))
+    added = np.zeros(len(start))
+    added[free] = found.x
+    return added

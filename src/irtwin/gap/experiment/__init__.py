@@ -1,0 +1,1 @@
+"""What to measure next, so that effects which these data cannot tell apart can be told."""

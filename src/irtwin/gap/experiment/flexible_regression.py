@@ -1,0 +1,216 @@
+"""How much of the gap a flexible regression on the motion could close, a diagnosis' `yardstick`. It names nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import lfilter
+
+from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.signals.filter import decimation, low_pass
+from irtwin.signals.motion import Motion
+
+_SAMPLES = 24_000  # whose residual is computed
+_ROWS = 5_000  # that the regression sees
+_STRETCHES = 4  # of a run, where it has more samples than its share
+_FOLDS = 8
+_TENTS = 7  # over each variable
+_WAVES = 60  # random features
+_DIMENSIONS = 3  # at most, that one random feature depends on
+_SCALES = (0.25, 0.5, 1.0)  # waves over the range of a variable
+_RIDGES = (1e-3, 1e-2, 1e-1)  # of the mean square of a feature
+_LEAST_GAP = 0.1  # of the floor's mean square: less is no gap to part
+_STANDSTILL = 1e-3  # rad/s
+_MEMORY = (0.1, 0.5)  # s
+
+
+@dataclass(frozen=True)
+class FlexibleRegression:
+    """Mean squares of g equations on groups left out, (g,) each, in the units of the measurement.
+
+    `plain`, `closed`: what the twin and the twin with its causes leave, refitted to all runs; `plain_regressed` and
+    `closed_regressed`: what a regression of these on the motion leaves. `floor` (g,): RMS of the noise; None: unknown.
+    """
+
+    plain: np.ndarray
+    plain_regressed: np.ndarray
+    closed: np.ndarray
+    closed_regressed: np.ndarray
+    floor: np.ndarray | None
+
+    def shares(self) -> dict[str, Any]:
+        """Return which part of the gap above the floor could be closed, in all equations and in each.
+
+        `closed`: by the causes, refitted to all runs; `by_regression`: by a regression of what the plain twin leaves;
+        `nameless`: by a regression of what the causes leave, that is, without a name; `closeable`: by the better of the
+        two. Fractions are of the mean square where no floor is known, None where there is no gap.
+        """
+        floor = np.zeros_like(self.plain) if self.floor is None else self.floor**2
+        level = self.plain if self.floor is None else floor
+        gap = (self.plain - floor) / level
+        left = {
+            "closed": self.plain - self.closed.clip(floor),
+            "closeable": self.plain - np.minimum(self.plain_regressed, self.closed_regressed).clip(floor),
+            "by_regression": self.plain - self.plain_regressed.clip(floor),
+            "nameless": self.closed - self.closed_regressed.clip(floor),
+        }
+        parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
+        total = float(np.maximum(gap, 0.0).sum())
+        total = total if total > _LEAST_GAP * len(gap) else 0.0
+        shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
+        for name, part in parts.items():
+            shares[f"{name}_by_equation"] = [
+                _share(float(p), float(g) if g > _LEAST_GAP else 0.0) for p, g in zip(part, gap, strict=True)
+            ]
+        return shares | {
+            "of": "the mean square, as no floor is known" if self.floor is None else "the gap above the floor"
+        }
+
+
+def flexible_regression(channel: PlannedEquations, motions: Sequence[Motion], seed: int) -> FlexibleRegression | None:
+    """Regress what the twin leaves on what the motion is, groups of runs left out in turn.
+
+    motions: the observed ones. A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed,
+    acceleration, load, temperature, time and what went before, of the joint and of its neighbours, each also times the
+    direction, as friction jumps with it. None where there are fewer than two groups or too few samples.
+    """
+    parts = list(_parts(channel, motions))
+    if not parts:
+        return None
+    group = np.concatenate([part.group for part in parts])
+    if len(np.unique(group)) < 2 or len(group) < 10 * _FOLDS:
+        return None
+    plain, closed = (np.concatenate([getattr(part, name) for part in parts]) for name in ("plain", "closed"))
+    generator = np.random.default_rng(seed)
+    sums = []
+    for equation in range(plain.shape[1]):
+        variables = np.concatenate([part.variables[equation] for part in parts])
+        signs = np.concatenate([part.signs[:, equation] for part in parts])
+        features = _features(variables, signs, generator)
+        residuals = np.column_stack([plain[:, equation], closed[:, equation]])
+        sums.append(_regressed(features, residuals, group))
+    plain_squares, plain_left, closed_squares, closed_left = np.array(sums).T
+    return FlexibleRegression(plain_squares, plain_left, closed_squares, closed_left, channel.finding.floor)
+
+
+@dataclass(frozen=True)
+class _Part:
+    plain: np.ndarray
+    closed: np.ndarray
+    signs: np.ndarray
+    variables: list[np.ndarray]
+    group: np.ndarray
+
+
+def _parts(channel: PlannedEquations, motions: Sequence[Motion]) -> Iterator[_Part]:
+    """Yield stretches of the runs, thinned, with what the twin leaves of them."""
+    own = [m for m in motions if (m.torque if channel.finding.name == "torque" else m.power) is not None]
+    share = max(1, _SAMPLES // max(len(own), 1))
+    total = min(share * len(own), sum(len(motion.time) for motion in own))
+    for motion in own:
+        length = min(share, len(motion.time))
+        count = _STRETCHES if length < len(motion.time) else 1
+        starts = np.linspace(0, len(motion.time) - length // count, count).astype(int)
+        for start in starts:
+            part = motion.part(int(start), int(start) + length // count)
+            yield from _part(channel, part, max(1, total // _ROWS))
+
+
+def _part(channel: PlannedEquations, part: Motion, thinned: int) -> Iterator[_Part]:
+    plain, closed, undecided = channel.residuals(part)
+    if part.cutoff:
+        undecided = np.abs(low_pass(undecided.astype(float), part.rate, part.cutoff)) > 0.1
+    step = max(thinned, decimation(part.rate, part.cutoff) if part.cutoff else 1)
+    group = channel.groups(part.run, part.time)
+    kept = np.zeros(len(group), dtype=bool)
+    kept[::step] = True
+    kept &= (group >= 0) & np.isfinite(plain).all(axis=1)
+    if not kept.any():
+        return
+    torque = channel.finding.name == "torque"
+    variables = _of_joints(channel, part) if torque else [_of_power(channel, part)]
+    speeds = part.dq if torque else np.zeros((len(part.time), 1))
+    signs = np.where(np.abs(speeds) < _STANDSTILL, 0.0, np.sign(speeds))
+    decided = np.where(undecided, np.nan, 1.0)[kept]
+    yield _Part(
+        plain[kept] * decided, closed[kept] * decided, signs[kept], [one[kept] for one in variables], group[kept]
+    )
+
+
+def _of_joints(channel: PlannedEquations, part: Motion) -> list[np.ndarray]:
+    """Return each joint's variables, (N, v)."""
+    signs = np.where(np.abs(part.dq) < _STANDSTILL, 0.0, np.sign(part.dq))
+    before = [_remembered(signs, part.rate, seconds) for seconds in _MEMORY]
+    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
+    found = []
+    for joint in range(part.dq.shape[1]):
+        near = [k for k in (joint - 1, joint + 1) if 0 <= k < part.dq.shape[1]]
+        warm = [] if part.temperature is None else [part.temperature[:, [joint]]]
+        others = [values[:, [joint]] for values in (part.dq, part.ddq, load, *before)]
+        beside = [values[:, near] for values in (part.q, part.dq, part.ddq)]
+        speed = np.abs(part.dq[:, [joint]])
+        found.append(np.concatenate([part.q[:, [joint]], speed, *others, *beside, time, *warm], axis=1))
+    return found
+
+
+def _of_power(channel: PlannedEquations, part: Motion) -> np.ndarray:
+    """Return the variables of power, (N, v)."""
+    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
+    work = load * part.dq
+    total = work.sum(axis=1, keepdims=True)
+    slow = [_remembered(total, part.rate, seconds) for seconds in _MEMORY]
+    sums = [total, np.abs(work).sum(axis=1, keepdims=True), *slow, time]
+    warm = [] if part.temperature is None else [part.temperature]
+    return np.concatenate([work, load**2, np.abs(load), np.abs(part.dq), part.dq**2, *sums, *warm], axis=1)
+
+
+def _remembered(values: np.ndarray, rate: float, seconds: float) -> np.ndarray:
+    keep = np.exp(-1 / (rate * seconds))
+    return np.asarray(lfilter([1 - keep], [1.0, -keep], values, axis=0))
+
+
+def _features(variables: np.ndarray, signs: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    """Return (N, F): tents over each variable, random waves of a few of them each, and both times the direction."""
+    ranks = np.argsort(np.argsort(variables, axis=0), axis=0) / len(variables)  # detail where samples are
+    varied = np.ptp(variables, axis=0) > 1e-9
+    ranks = ranks[:, varied]
+    knots = np.linspace(0, 1, _TENTS)
+    tents = np.maximum(1 - np.abs(ranks[:, :, None] - knots) * (_TENTS - 1), 0.0).reshape(len(ranks), -1)
+    weights = np.zeros((ranks.shape[1], _WAVES))
+    for wave in range(_WAVES):
+        count = min(int(generator.integers(2, _DIMENSIONS + 1)), len(weights))
+        chosen = generator.choice(len(weights), count, replace=False)
+        weights[chosen, wave] = generator.standard_normal(len(chosen)) * _SCALES[wave % len(_SCALES)]
+    waves = np.cos(2 * np.pi * ranks @ weights + generator.uniform(0, 2 * np.pi, _WAVES))
+    both = np.column_stack([tents, waves])
+    return np.column_stack([both, both * signs[:, None]]) if signs.any() else both
+
+
+def _regressed(features: np.ndarray, residuals: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Return (4,) mean squares on groups left out: of the first residual, after its regression, of the second, ..."""
+    kept = np.isfinite(residuals).all(axis=1)
+    features, residuals, group = features[kept], residuals[kept], group[kept]
+    if len(group) < 2 * _FOLDS:
+        return np.zeros(4)
+    names = np.unique(group)
+    fold = np.searchsorted(names, group) % _FOLDS
+    folds = [fold == k for k in range(min(_FOLDS, len(names)))]
+    normals = [features[inside].T @ features[inside] for inside in folds]
+    rights = [features[inside].T @ residuals[inside] for inside in folds]
+    normal, right = np.sum(normals, axis=0), np.sum(rights, axis=0)
+    left = np.array([(residuals**2).sum(axis=0)] + [np.zeros(2)] * len(_RIDGES))
+    for inside, own, part in zip(folds, normals, rights, strict=True):
+        for place, ridge in enumerate(_RIDGES, start=1):
+            damped = normal - own + ridge * np.diag(np.diag(normal - own) + 1.0)
+            fitted = features[inside] @ cho_solve(cho_factor(damped), right - part)
+            left[place] += ((residuals[inside] - fitted) ** 2).sum(axis=0)
+    start, best = left[0] / len(group), left.min(axis=0) / len(group)
+    return np.array([start[0], best[0], start[1], best[1]])
+
+
+def _share(part: float, whole: float) -> float | None:
+    return float(np.clip(part / whole, 0.0, 1.0)) if whole > 0 else None

@@ -1,0 +1,315 @@
+"""What to measure next: the programme, of those that the robot's limits allow, that tells rivals apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect
+from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
+from irtwin.gap.experiment.programmes import Programme, programmes
+from irtwin.gap.experiment.separation import fitted, unimitated
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.regression.hypotheses import Column, candidate_columns
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+
+ENOUGH = 5.0  # standard deviations
+_LEAST_SHARE = 0.06  # of a cause that its rival must not imitate: twice of what counts as equally good
+_LEAST_VISIBLE = 0.05  # mean square in units of the noise's, as in `irtwin.gap.isolation.detectability`
+_IDENTICAL = 1e-3  # of it: less is the same in other words
+_HELPS = 1.1  # times the separation there is: less is not worth an experiment
+_FOREMOST = 4  # of a class of rivals
+_DRAWN = 400  # points of a curve on a page
+
+
+Shape = tuple[int | Column, ...]
+Left = tuple[np.ndarray, np.ndarray]
+Four = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What one question gains by a programme: `now` and `expected` separations, in standard deviations.
+
+    `share_now`, `share`: of two rivals, the part of one that the other cannot imitate, in the data and in the
+    programme; of an effect that cannot be tested, its mean square in units of the noise's, in the data and with both.
+    """
+
+    effects: tuple[str, ...]
+    now: float
+    expected: float
+    share_now: float
+    share: float
+
+    @property
+    def added(self) -> float:
+        """The separation that the programme brings by itself, in standard deviations."""
+        return float(np.sqrt(max(self.expected**2 - self.now**2, 0.0)))
+
+    @property
+    def known(self) -> bool:
+        """Whether the data show an effect already."""
+        return len(self.effects) == 1 and self.now >= ENOUGH and self.share_now >= _LEAST_VISIBLE
+
+    @property
+    def reached(self) -> bool:
+        """Whether the programme would answer the question; of rivals by itself, as the data there are do not."""
+        if len(self.effects) == 1:
+            return self.expected >= ENOUGH and self.share >= _LEAST_VISIBLE
+        return self.added >= ENOUGH and self.share >= _LEAST_SHARE
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers by name."""
+        kind = "not_imitated" if len(self.effects) > 1 else "visibility"
+        return {
+            "effects": list(self.effects),
+            "separation_now": _rounded(self.now),
+            "expected_separation": _rounded(self.expected),
+            f"{kind}_now": _rounded(self.share_now),
+            f"expected_{kind}": _rounded(self.share),
+        }
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The experiment that is proposed: the programme chosen (None where none helps), and what each would tell.
+
+    `joints` of the `robot` are those that the question is about.
+    """
+
+    purpose: str
+    effects: tuple[str, ...]
+    joints: tuple[str, ...]
+    robot: Robot
+    programme: Programme | None
+    weights: tuple[Weight, ...]
+    considered: tuple[tuple[Programme, float], ...]
+    by_hand: tuple[str, ...]
+    note: str | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return `next_experiment` of the contract: texts, numbers and the programme to run."""
+        chosen = self.programme
+        return {
+            "purpose": self.purpose,
+            "effects": list(self.effects),
+            "joints": list(self.joints),
+            "motions": [*([chosen.text] if chosen else []), *self.by_hand],
+            "expected_separation": min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
+            "separation_now": min((_rounded(w.now) for w in self.weights), default=None),
+            "separation_that_is_enough": ENOUGH,
+            "questions": [weight.to_json() for weight in self.weights],
+            "programme": chosen.to_json() if chosen else None,
+            "considered": [
+                {"kind": one.kind, "minutes": round(one.cost / 60, 1), "expected_separation": _rounded(worth)}
+                for one, worth in self.considered
+            ],
+            "note": self.note,
+        }
+
+    @property
+    def curve(self) -> dict[str, Any] | None:
+        """What a page draws of the programme: time (s) and each joint's position, thinned."""
+        if self.programme is None:
+            return None
+        time, q, start = [], [], 0.0
+        moved = [self.robot.index(joint) for joint in self.programme.joints]
+        for motion in self.programme.motions:
+            every = -(-len(motion.time) * len(self.programme.motions) // _DRAWN)
+            time.append(motion.time[::every] + start)
+            q.append(motion.q[::every])
+            start = float(time[-1][-1]) + every / motion.rate
+        return {
+            "time": np.concatenate(time).round(3).tolist(),
+            "joints": list(self.programme.joints),
+            "q": np.concatenate(q).T[moved].round(5).tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class _Question:
+    """Rivals in one channel, or one effect that its data cannot show: for each its places, for these the shapes.
+
+    A shape is a tuple of columns: their indices in the system, or those that the system lacks; `fitted`: columns of the
+    other causes.
+    """
+
+    channel: PlannedEquations
+    effects: tuple[str, ...]
+    joints: tuple[str, ...]
+    places: tuple[tuple[tuple[Shape, ...], ...], ...]
+    fitted: tuple[int, ...]
+
+    @property
+    def tried(self) -> set[int | Column]:
+        """The columns that it takes."""
+        own = {k for each in self.places for shapes in each for shape in shapes for k in shape}
+        return own | set(self.fitted)
+
+    def weigh(self, products: Products, seconds: float) -> list[Weight]:
+        """Return what a programme of this length would tell."""
+        left, at = products.left(self.fitted), products.at
+        placed = [[[[at[k] for k in shape] for shape in shapes] for shapes in each] for each in self.places]
+        if len(self.effects) == 1:
+            return [self._visible(left, placed[0], seconds)]
+        return [self._apart(left, placed, j, i) for i in range(len(placed)) for j in range(i)]
+
+    def _apart(self, left: Left, placed: Sequence[Sequence[Sequence[list[int]]]], one: int, other: int) -> Weight:
+        """Return how far two rivals lie apart, the worse of both ways round."""
+        ways = [self._distance(left, placed[a], placed[b]) for a, b in ((one, other), (other, one))]
+        now, expected, share_now, share = (float(min(values)) for values in zip(*ways, strict=True))
+        return Weight((self.effects[one], self.effects[other]), now, expected, share_now, share)
+
+    def _distance(self, left: Left, true: Sequence[Sequence[list[int]]], taken: Sequence[Sequence[list[int]]]) -> Four:
+        """Return separation and share, now and then, where the first is true and the second taken for it."""
+        own = [k for shapes in true for k in max(shapes, key=lambda shape: _gain(left[0], shape))]
+        values = fitted(left[0], own)
+        squares = [unimitated(each, own, values, _imitating(each, own, values, taken)) for each in left]
+        sizes = [max(unimitated(each, own, values, ()), 1e-30) for each in left]
+        now, then = (float(np.sqrt(square / self.channel.dispersion)) for square in squares)
+        share = max(squares[1] - squares[0], 0.0) / max(sizes[1] - sizes[0], 1e-30)
+        return now, max(now, then), squares[0] / sizes[0], min(share, 1.0)
+
+    def _visible(self, left: Left, places: Sequence[Sequence[list[int]]], seconds: float) -> Weight:
+        """Return how far an effect of the size that is expected would stand out, at the place where it does best."""
+        squares = [max(float(np.diag(each)[shapes[0]].sum()) for shapes in places) for each in left]
+        now, then = (float(np.sqrt(max(square, 0.0) / self.channel.dispersion)) for square in squares)
+        rows = self.channel.rows, self.channel.rows + seconds * self.channel.per_second
+        share_now, share = (max(square, 0.0) / count for square, count in zip(squares, rows, strict=True))
+        return Weight(self.effects, now, max(now, then), share_now, share)
+
+
+def _imitating(
+    left: np.ndarray, own: Sequence[int], values: np.ndarray, taken: Sequence[Sequence[list[int]]]
+) -> list[int]:
+    """Return the columns by which an effect imitates others best, its shape chosen place by place."""
+    by: list[int] = []
+    for shapes in taken:
+        by = min(([*by, *shape] for shape in shapes), key=lambda columns: unimitated(left, own, values, columns))
+    return by
+
+
+def _gain(left: np.ndarray, own: list[int]) -> float:
+    return float(left[own, -1] @ fitted(left, own))
+
+
+def next_experiment(
+    robot: Robot, channels: Sequence[PlannedEquations], lacking: Sequence[Effect], seen: Sequence[Motion]
+) -> Proposal | None:
+    """Design what tells the causes' rivals apart; where there are none, what shows the effects `lacking`.
+
+    `channels`: planned equations of each; `seen`: the motions that were judged. Of the programmes that reach a
+    separation of ENOUGH in every question the one that takes the least time is chosen, else the one that answers the
+    most. None where there is nothing to ask.
+    """
+    questions = [q for channel in channels for cause in channel.finding.causes if (q := _rivals(channel, cause))]
+    if questions:
+        purpose = "; ".join(f"tell {q.effects[0]} from {', '.join(q.effects[1:])}" for q in questions)
+        names = tuple(dict.fromkeys(name for q in questions for name in q.effects))
+    elif lacking:
+        questions = [q for effect in lacking if (q := _unseen(robot, channels, effect))]
+        names = tuple(effect.id for effect in lacking)
+        purpose = f"show {', '.join(names)}"
+    else:
+        return None
+    joints = tuple(joint for joint in robot.joint_names if any(joint in q.joints for q in questions))
+    effects = [catalogue()[name] for name in names]
+    warm = any("temperature" in effect.requires for effect in effects)
+    off = [effect for effect in effects if effect.taken_off]
+    tried = programmes(robot, joints, seen, warm=warm, take_off=off) if questions else ()
+    weighed = [(one, _weigh(one, questions)) for one in tried]
+    note = _note([weights for _, weights in weighed])
+    weighed = [(one, open_) for one, weights in weighed if (open_ := [w for w in weights if not w.known])]
+    asked = {name for q in questions for name in q.effects}
+    by_hand = _manual_tests([effect for effect in effects if effect.id not in asked])
+    chosen, weights = _choose(weighed) if weighed else (None, [])
+    if not any(weight.reached or weight.expected > _HELPS * weight.now for weight in weights):
+        chosen, by_hand = None, by_hand or _manual_tests(effects)
+    considered = tuple((one, min(weight.expected for weight in of_one)) for one, of_one in weighed)
+    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note)
+
+
+def _weigh(programme: Programme, questions: Sequence[_Question]) -> list[Weight]:
+    products: dict[str, Products] = {}
+    for channel in {q.channel.finding.name: q.channel for q in questions}.values():
+        name = channel.finding.name
+        tried = set().union(*(q.tried for q in questions if q.channel.finding.name == name))
+        products[name] = channel.products(programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))))
+    return [w for q in questions for w in q.weigh(products[q.channel.finding.name], programme.seconds)]
+
+
+def _choose(weighed: Sequence[tuple[Programme, list[Weight]]]) -> tuple[Programme, list[Weight]]:
+    most = max(sum(weight.reached for weight in weights) for _, weights in weighed)
+    best = [pair for pair in weighed if sum(weight.reached for weight in pair[1]) == most]
+    if most == len(best[0][1]):
+        return min(best, key=lambda pair: pair[0].cost)
+    return max(best, key=lambda pair: min(weight.expected for weight in pair[1] if not weight.reached))
+
+
+def _note(weighed: Sequence[Sequence[Weight]]) -> str | None:
+    """Say what no programme tells apart or shows."""
+    said = []
+    for chances in zip(*weighed, strict=True):
+        best = max(chances, key=lambda weight: weight.share)
+        if best.known:
+            said.append(f"{best.effects[0]} shows in these data once the causes are in the twin: adopt it, ask again")
+        elif len(best.effects) > 1 and best.share < _IDENTICAL:
+            said.append(f"{' and '.join(best.effects)} cannot be told apart: in every motion one is the other")
+        elif len(best.effects) == 1 and best.share < _IDENTICAL * _LEAST_VISIBLE:
+            said.append(f"{best.effects[0]} cannot be shown: in every motion the rest of the twin imitates it")
+        elif not any(weight.reached for weight in chances):
+            said.append(f"no programme that was weighed is enough for {' and '.join(best.effects)}")
+    return "; ".join(said) or None
+
+
+def _rivals(channel: PlannedEquations, cause: Cause) -> _Question | None:
+    """Return the question which of a cause and its foremost rivals it is."""
+    known: dict[tuple[str, str], dict[str | None, tuple[Shape, ...]]] = {}
+    for one in channel.finding.attribution.hypotheses:
+        known.setdefault((one.effect, one.scope), {})[one.joint] = tuple(v.columns for v in one.variants)
+    effects = [cause.effect]
+    places: list[tuple[tuple[Shape, ...], ...]] = [tuple((variant.columns,) for variant in cause.variants)]
+    others = tuple(k for k in channel.finding.chosen if k not in cause.columns)
+    for rival in cause.rivals[: _FOREMOST - 1]:
+        of_rival = known.get((rival, cause.scope)) or known.get((rival, _other(cause.scope))) or {}
+        found = tuple(of_rival[joint] for joint in cause.joints if joint in of_rival)
+        if not found or len(found) < len(cause.joints):
+            found = (of_rival[None],) if None in of_rival else ()
+        if found and not any(set(shape) & set(others) for shapes in found for shape in shapes):
+            effects.append(rival)
+            places.append(found)
+    joints = cause.joints or channel.robot.joint_names
+    return _Question(channel, tuple(effects), joints, tuple(places), others) if len(effects) > 1 else None
+
+
+def _unseen(robot: Robot, channels: Sequence[PlannedEquations], effect: Effect) -> _Question | None:
+    """Return the question whether an effect is there; None where nothing measures it."""
+    for channel in channels:
+        if channel.finding.name == effect.signal:
+            found = [h for h in channel.finding.attribution.hypotheses if h.effect == effect.id]
+            scope = "missing" if any(h.scope == "missing" for h in found) else "changed"
+            places = [(h.variants[len(h.variants) // 2].columns,) for h in found if h.scope == scope]
+            joints: dict[str | None, list[Column]] = {}
+            for column in () if places else candidate_columns(robot, [effect]):
+                joints.setdefault(column.term.joint, []).append(column)
+            shapes: tuple[tuple[Shape, ...], ...] = (*places, *((tuple(columns),) for columns in joints.values()))
+            chosen = tuple(channel.finding.chosen)
+            return _Question(channel, (effect.id,), robot.joint_names, (shapes,), chosen) if shapes else None
+    return None
+
+
+def _other(scope: str) -> str:
+    return "changed" if scope == "missing" else "missing"
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _manual_tests(effects: Sequence[Effect]) -> tuple[str, ...]:
+    return tuple(effect.manual_test for effect in effects if effect.manual_test)

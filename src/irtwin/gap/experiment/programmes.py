@@ -1,0 +1,346 @@
+"""Programmes: what a robot can be asked to do so that its effects show, within its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from irtwin.effects.effect import Effect
+from irtwin.errors import InputError
+from irtwin.identification.excitation import excite
+from irtwin.identification.motion_limits import JointLimits, Workspace
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+
+_RESERVE = 0.9  # of the limits of speed and acceleration
+_SLOWEST = 0.005  # rad/s
+_LEVELS = 8  # speeds of a ladder
+_LEG = 3.0  # s at each speed
+_SWEEP = 20.0  # s one way
+_TURN = 2 * np.pi  # rad: more repeats itself
+_POSES = 10
+_HOLD = 2.0  # s
+_SMALL = (3e-3, 0.01, 0.03)  # rad: half of the way between reversals
+_STEPS = (0.25, 0.5, 1.0)  # of the largest acceleration
+_EXCITING = 20.0  # s
+_ITERATIONS = 5  # enough to compare; `irtwin excite` goes on from there
+_SET_UP = 300.0  # s to put a load on or take something off
+_WARM_UP = 1800.0  # s
+_COLD, _WARM = 25.0, 45.0  # degC
+_PAYLOAD_SHARE = 1 / 8  # of the arm's mass: what arms of their class carry at least
+_CENTRE = (0.0, 0.0, 0.05)  # m, of the load, from the flange
+_SHRINK, _TRIES = 0.7, 6
+_CHECKED = 200  # poses on the way
+_RATE = 5.0  # samples a period of the cutoff: enough of what the filter lets through
+
+
+@dataclass(frozen=True)
+class Programme:
+    """One experiment: the motions that it takes (planned: q, dq, ddq over time), and how to run it.
+
+    `without`: effects that are taken off the robot in every one of its motions (the tool, the hose package);
+    `set_up`: s beside the motions themselves; `settings`: what to enter at the controller, as JSON.
+    """
+
+    kind: str
+    text: str
+    joints: tuple[str, ...]
+    motions: tuple[Motion, ...]
+    set_up: float = 0.0
+    without: tuple[str, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> float:
+        """How long its motions take, s."""
+        return float(sum(motion.time[-1] - motion.time[0] for motion in self.motions))
+
+    @property
+    def cost(self) -> float:
+        """How long all of it takes, s."""
+        return self.seconds + self.set_up
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what a user needs to run it."""
+        return {
+            "kind": self.kind,
+            "joints": list(self.joints),
+            "seconds": round(self.seconds, 1),
+            "set_up_seconds": self.set_up,
+            "payload_mass": [motion.payload_mass for motion in self.motions],
+            "taken_off": list(self.without),
+            **self.settings,
+        }
+
+
+def programmes(
+    robot: Robot, joints: Sequence[str], seen: Sequence[Motion], *, warm: bool = False, take_off: Sequence[Effect] = ()
+) -> Iterator[Programme]:
+    """Yield the programmes that are worth weighing for some joints (none: all), the plain ones first.
+
+    `seen`: motions of the robot, whose poses, filter and rate the programmes take over; `warm`: with a warm-up;
+    `take_off`: effects to be removed for a run. Where the URDF gives no limits, those of `seen` are kept.
+    """
+    yard = _Yard(robot, joints or robot.joint_names, seen)
+    for build in (_ladder, _sweep, _reversals, _steps, _poses):
+        made = yard.clear(build)
+        if made is not None:
+            yield made
+    exciting = _exciting(robot, yard)
+    if exciting is None:
+        return
+    yield exciting
+    if mass := _payload(robot):
+        yield _loaded(exciting, mass)
+    if warm:
+        yield _warmed(exciting)
+    for effect in take_off:
+        yield replace(
+            exciting,
+            kind=f"without_{effect.id}",
+            text=f"{exciting.text}, {effect.taken_off}",
+            set_up=_SET_UP,
+            without=(effect.id,),
+        )
+
+
+class _Yard:
+    """Where a robot may move: its limits, the pose that it works about, and the floor."""
+
+    def __init__(self, robot: Robot, joints: Sequence[str], seen: Sequence[Motion]):
+        self.robot, self.joints = robot, tuple(joints)
+        self.moved = np.isin(robot.joint_names, self.joints)
+        self.limits = _limits(robot, seen)
+        q = np.concatenate([motion.q for motion in seen])
+        width = self.limits.upper - self.limits.lower
+        inside = np.clip(np.median(q, axis=0), self.limits.lower + 0.3 * width, self.limits.upper - 0.3 * width)
+        self.pose = np.where(self.moved, inside, np.median(q, axis=0))
+        self.reach = 0.8 * np.minimum(self.pose - self.limits.lower, self.limits.upper - self.pose)
+        self.reach = np.minimum(self.reach, _TURN / 2) * self.moved
+        self.speed, self.acceleration = _RESERVE * self.limits.speed, _RESERVE * self.limits.acceleration
+        last = seen[-1]
+        self.cutoff = last.cutoff
+        self.rate = min(last.rate, _RATE * last.cutoff) if last.cutoff else min(last.rate, 100.0)
+        walls = Workspace(robot, self.limits, None)
+        every = max(1, len(q) // _CHECKED)
+        self._walls = walls if walls.clearance(q[::every]).min(initial=1.0) > 0 else None  # else the floor is elsewhere
+
+    def clear(self, build: Callable[[_Yard], Programme]) -> Programme | None:
+        """Return the programme about the pose, smaller where it would touch the floor; None where none is clear."""
+        whole = self.reach
+        for _ in range(_TRIES):
+            made = build(self)
+            q = np.concatenate([motion.q for motion in made.motions])
+            every = max(1, len(q) // _CHECKED)
+            if self._walls is None or self._walls.clearance(q[::every]).min(initial=1.0) > 0:
+                self.reach = whole
+                return made
+            self.reach = _SHRINK * self.reach
+        self.reach = whole
+        return None
+
+    def motion(self, stops: Sequence[np.ndarray], speeds: Sequence[np.ndarray], hold: float = 0.1) -> Motion:
+        """Move from stop to stop (n,) at most at `speeds` (n,) each, with a rest of `hold` s between them."""
+        return self.shaken(stops, speeds, [self.acceleration] * len(speeds), hold)
+
+    def shaken(
+        self,
+        stops: Sequence[np.ndarray],
+        speeds: Sequence[np.ndarray],
+        accelerations: Sequence[np.ndarray],
+        hold: float,
+    ) -> Motion:
+        """Do as `motion` does, with the acceleration of each move."""
+        rest = np.zeros((max(1, round(hold * self.rate)), len(self.pose)))
+        parts = [(stops[0] + rest, rest, rest)]
+        for start, stop, speed, acceleration in zip(stops, stops[1:], speeds, accelerations, strict=False):
+            parts += [_move(start, stop, speed, acceleration, self.rate), (stop + rest, rest, rest)]
+        q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return Motion("planned", np.arange(len(q)) / self.rate, q, dq, ddq, cutoff=self.cutoff)
+
+    def by_joint(self, values: np.ndarray) -> dict[str, list[float]]:
+        """Return (M, n) values of the joints that move, by name, to four digits."""
+        return {
+            name: [float(f"{value:.4g}") for value in np.atleast_2d(values)[:, self.robot.index(name)]]
+            for name in self.joints
+        }
+
+    @property
+    def named(self) -> str:
+        """Which joints move, in words."""
+        return "all joints" if self.moved.all() else ", ".join(self.joints)
+
+
+def _move(
+    start: np.ndarray, stop: np.ndarray, speed: np.ndarray, acceleration: np.ndarray, rate: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return q, dq, ddq (N, n) from rest to rest on a straight line in joint space, by a trapezoid of speed."""
+    way = stop - start
+    size = np.maximum(np.abs(way), 1e-12)
+    fast, sharp = float((speed / size).min()), float((acceleration / size).min())
+    fast = min(fast, sharp**0.5)
+    needed = 1 / fast + fast / sharp
+    count = int(np.ceil(needed * rate))
+    slower = needed * rate / count
+    fast, sharp = fast * slower, sharp * slower**2
+    time = np.arange(1, count + 1) / rate
+    left = count / rate - time
+    ramp = fast / sharp
+    s = np.where(time < ramp, sharp * time**2 / 2, fast * (time - ramp / 2))
+    s = np.where(left < ramp, 1 - sharp * left**2 / 2, s)
+    ds = np.minimum(np.minimum(sharp * time, sharp * left), fast)
+    dds = np.where(time < ramp, sharp, np.where(left < ramp, -sharp, 0.0))
+    return start + s[:, None] * way, ds[:, None] * way, dds[:, None] * way
+
+
+def _limits(robot: Robot, seen: Sequence[Motion]) -> JointLimits:
+    try:
+        return JointLimits.of(robot)
+    except InputError:
+        q, dq, ddq = (np.concatenate([getattr(m, name) for m in seen]) for name in ("q", "dq", "ddq"))
+        margin = np.maximum(np.ptp(q, axis=0), 1e-3) * 1e-3
+        return JointLimits(
+            q.min(axis=0) - margin,
+            q.max(axis=0) + margin,
+            np.maximum(np.abs(dq).max(axis=0), 1e-2),
+            np.maximum(np.abs(ddq).max(axis=0), 1e-1),
+        )
+
+
+def _ladder(yard: _Yard) -> Programme:
+    lowest = np.minimum(_SLOWEST / yard.speed, 0.5)
+    speeds = np.array([yard.speed * lowest ** (1 - k / (_LEVELS - 1)) for k in range(_LEVELS)])
+    seconds = [min(_LEG, float((2 * yard.reach / speed)[yard.moved].min())) for speed in speeds]
+    half = np.array([speed * length / 2 * yard.moved for speed, length in zip(speeds, seconds, strict=True)])
+    stops, rates = [yard.pose], []
+    for speed, way in zip(speeds, half, strict=True):
+        stops += [yard.pose - way, yard.pose + way, yard.pose - way]
+        rates += [speed] * 3
+    return Programme(
+        "speed_ladder",
+        f"{yard.named}: a ladder of {_LEVELS} constant speeds, each both ways, from "
+        f"{speeds[0][yard.moved].min():.2g} to {speeds[-1][yard.moved].max():.2g} rad/s",
+        yard.joints,
+        (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
+        settings={"pose": _pose(yard), "speeds": yard.by_joint(speeds), "amplitudes": yard.by_joint(half)},
+    )
+
+
+def _sweep(yard: _Yard) -> Programme:
+    speed = 2 * np.maximum(yard.reach, 1e-6) / _SWEEP
+    ends = yard.pose - yard.reach, yard.pose + yard.reach
+    return Programme(
+        "slow_sweep",
+        f"{yard.named}: one slow, constant speed both ways over {2 * yard.reach.max():.2g} rad",
+        yard.joints,
+        (
+            yard.motion(
+                [yard.pose, ends[0], ends[1], ends[0], yard.pose], [yard.speed / 2, speed, speed, yard.speed / 2]
+            ),
+        ),
+        settings={"pose": _pose(yard), "speeds": yard.by_joint(speed), "amplitudes": yard.by_joint(yard.reach)},
+    )
+
+
+def _reversals(yard: _Yard) -> Programme:
+    stops, rates = [yard.pose], []
+    for size in _SMALL:
+        way = np.minimum(size, yard.reach) * yard.moved
+        stops += [yard.pose + way, yard.pose - way] * 3
+        rates += [np.maximum(2 * way, 1e-6)] * 6
+    return Programme(
+        "small_reversals",
+        f"{yard.named}: slow reversals of {_SMALL[0]:g} to {_SMALL[-1]:g} rad about one pose, a second each way",
+        yard.joints,
+        (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
+        settings={"pose": _pose(yard), "amplitudes": {name: list(_SMALL) for name in yard.joints}},
+    )
+
+
+def _steps(yard: _Yard) -> Programme:
+    way = np.minimum(yard.reach, 0.25 * yard.speed) * yard.moved
+    stops, sharp = [yard.pose], []
+    for share in _STEPS:
+        stops += [yard.pose + way, yard.pose - way] * 4
+        sharp += [share * yard.acceleration] * 8
+    return Programme(
+        "acceleration_steps",
+        f"{yard.named}: short moves forth and back with {', '.join(f'{100 * s:g}' for s in _STEPS)} % of the largest "
+        "acceleration",
+        yard.joints,
+        (yard.shaken([*stops, yard.pose], [yard.speed] * 25, [*sharp, yard.acceleration], 0.1),),
+        settings={
+            "pose": _pose(yard),
+            "amplitudes": yard.by_joint(way),
+            "accelerations": yard.by_joint(np.outer(_STEPS, yard.acceleration)),
+        },
+    )
+
+
+def _poses(yard: _Yard) -> Programme:
+    spread = np.random.default_rng(0).uniform(-1, 1, (_POSES, len(yard.pose)))
+    stops = [yard.pose, *(yard.pose + spread * yard.reach)]
+    return Programme(
+        "holding_poses",
+        f"{yard.named}: holding {_POSES} poses for {_HOLD:g} s each",
+        yard.joints,
+        (yard.motion(stops, [yard.speed / 2] * _POSES, _HOLD),),
+        settings={"poses": yard.by_joint(np.array(stops)), "hold_seconds": _HOLD},
+    )
+
+
+def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
+    try:
+        found = excite(robot, _EXCITING, iterations=_ITERATIONS)
+    except InputError:
+        return None
+    time, q, dq, ddq = found.sample(yard.rate)
+    motion = Motion("planned", time, q, dq, ddq, cutoff=yard.cutoff)
+    return Programme(
+        "exciting_motion",
+        f"an exciting motion of all joints, {_EXCITING:g} s",
+        robot.joint_names,
+        (motion,),
+        settings={"command": f"irtwin excite {robot.name}.urdf --seconds {_EXCITING:g} --out motion.csv"},
+    )
+
+
+def _loaded(exciting: Programme, mass: float) -> Programme:
+    (plain,) = exciting.motions
+    return replace(
+        exciting,
+        kind="payload",
+        text=f"{exciting.text}, without and with a weighed payload of {mass:g} kg",
+        motions=(plain, replace(plain, run="planned, loaded", payload_mass=mass, payload_com=_CENTRE)),
+        set_up=_SET_UP,
+        settings={**exciting.settings, "payload_com": list(_CENTRE)},
+    )
+
+
+def _warmed(exciting: Programme) -> Programme:
+    (plain,) = exciting.motions
+    shape = plain.q.shape
+    return replace(
+        exciting,
+        kind="warm_up",
+        text=f"{exciting.text}, from cold and again after half an hour of work, joint temperatures logged",
+        motions=(
+            replace(plain, temperature=np.full(shape, _COLD)),
+            replace(plain, run="planned, warm", temperature=np.full(shape, _WARM)),
+        ),
+        set_up=_WARM_UP,
+        settings={**exciting.settings, "temperatures": [_COLD, _WARM]},
+    )
+
+
+def _payload(robot: Robot) -> float:
+    """Return a load that the arm surely carries, kg to one digit; a payload that it must not exceed is its maker's."""
+    arm = float(sum(link.mass for link in robot.links[1:]))
+    return float(f"{_PAYLOAD_SHARE * arm:.1g}")
+
+
+def _pose(yard: _Yard) -> dict[str, float]:
+    return {name: round(float(value), 4) for name, value in zip(yard.robot.joint_names, yard.pose, strict=True)}

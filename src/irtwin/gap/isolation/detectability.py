@@ -1,0 +1,61 @@
+"""What the data cannot show, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.effects.effect import Effect
+from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.signals.motion import Motion
+
+_LEAST = 0.05  # mean square in units of the noise's that an effect of expected size adds beyond the rest
+
+
+@dataclass(frozen=True)
+class Untestable:
+    """An effect that the data cannot show, and why."""
+
+    effect: str
+    why: str
+
+
+def can_show(effect: Effect, motions: Iterable[Motion]) -> bool:
+    """Return whether what the effect depends on was measured in some motion."""
+    seen = list(motions)
+    return all(any(getattr(motion, signal) is not None for motion in seen) for signal in effect.requires)
+
+
+def untestable(
+    known: Iterable[Effect],
+    inside: Sequence[str],
+    channels: Sequence[tuple[str, Attribution]],
+    motions: Iterable[Motion],
+) -> list[Untestable]:
+    """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
+    measured = {name for name, _ in channels}
+    motions = tuple(motions)
+    visible: dict[str, float] = {}
+    share: dict[str, float] = {}
+    for _, found in channels:
+        for k, hypothesis in enumerate(found.hypotheses):
+            name = hypothesis.effect
+            if found.visible[k] > visible.get(name, -np.inf):
+                visible[name], share[name] = float(found.visible[k]), float(found.share_visible[k])
+    reasons = []
+    for effect in known:
+        if effect.id in inside:
+            continue
+        channel = effect.signal
+        if channel not in measured:
+            reasons.append(Untestable(effect.id, f"no {channel} was measured"))
+        elif not can_show(effect, motions):
+            reasons.append(Untestable(effect.id, f"no {' and no '.join(sorted(effect.requires))} was measured"))
+        elif effect.id not in visible or visible[effect.id] == 0:
+            reasons.append(Untestable(effect.id, "nothing in these runs brings it about"))
+        elif visible[effect.id] < _LEAST:
+            imitated = 100 * (1 - share[effect.id])
+            reasons.append(Untestable(effect.id, f"the rest of the twin imitates {imitated:.0f} % of it on these runs"))
+    return reasons

@@ -1,0 +1,78 @@
+"""What the twin says a run takes: without the run, and with the causes found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from irtwin.effects.effect import Predicted
+from irtwin.effects.stack import Stack
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.regression.candidate_columns import Below
+from irtwin.gap.regression.channel_equations import Torque
+from irtwin.gap.regression.cross_fitted import PowerOf
+from irtwin.signals.motion import Motion
+
+
+class Explained:
+    """What the causes found in a channel add to its signal, and what the twin is beside them."""
+
+    def __init__(self, stack: Stack, finding: Finding, below: Below):
+        """Take what a channel showed, and what candidates were built on: what the twin predicts `below` them."""
+        self.stack, self.finding, self._below = stack, finding, below
+        self._places = {k: place for place, k in enumerate(finding.used)}
+
+    @property
+    def values(self) -> np.ndarray:
+        """(K,) the twin's coefficients."""
+        return self.finding.estimate.values[: self.finding.system.base]
+
+    def added(self, cause: Cause, whole: Motion, *, real: bool = False) -> np.ndarray:
+        """Return what a cause adds over a whole run, (N, n) N m or (N,) W; `real` torque and power alone, or all."""
+        robot, below = self.stack.robot, self._below(whole)
+        total = np.zeros(whole.dq.shape if self.finding.name == "torque" else len(whole.time))
+        for variant in cause.variants:
+            if (real and variant.effect.channel == "measurement") or not variant.effect.acts_in(whole):
+                continue
+            columns = variant.effect.columns(robot, whole, below)
+            for k in variant.columns:
+                if k < self.finding.system.changed or whole.run in self.finding.observed:
+                    total += self._column(columns, k) * self.finding.estimate.values[self._places[k]]
+        return total
+
+    def _column(self, columns: np.ndarray, k: int) -> np.ndarray:
+        """Return the candidate column k of an effect's columns (..., m)."""
+        system = self.finding.system
+        own = system.columns[(k - len(system.columns) if k >= system.changed else k) - system.base]
+        if own.index is not None:
+            return np.asarray(columns[..., own.index])
+        return np.asarray(columns @ np.array([term.expected for term in own.effect.terms(self.stack.robot)]))
+
+
+class ExplainedTorque(Explained):
+    """The joint torque of the twin refitted with the causes, and what each cause adds to the torque."""
+
+    def __init__(self, stack: Stack, finding: Finding, below: Below):
+        """Take what torque showed, and what candidates were built on."""
+        super().__init__(stack, finding, below)
+        self._held: tuple[str, np.ndarray] | None = None
+
+    def __call__(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, of a run or a part of one."""
+        whole = motion.whole or motion
+        if self._held is None or self._held[0] != whole.run:
+            torque = self.stack.real_torque(whole, self.values)
+            for cause in self.finding.causes:
+                torque = torque + self.added(cause, whole, real=True)
+            self._held = whole.run, torque
+        return self._held[1][motion.start : motion.start + len(motion.time)]
+
+
+def explained_power(stack: Stack, finding: Finding, torque: Torque, power_of: PowerOf) -> Explained:
+    """Return what the causes found in power add to it, built on the joint torque and the power that it takes."""
+
+    def below(whole: Motion) -> Predicted:
+        taken = torque(whole)
+        return Predicted(taken, *power_of(whole, taken))
+
+    return Explained(stack, finding, below)

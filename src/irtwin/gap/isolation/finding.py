@@ -1,0 +1,147 @@
+"""The finding: what one channel, torque or power, shows of the gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from irtwin.effects.catalogue import catalogue
+from irtwin.gap.data.case import Case
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.detectability import can_show
+from irtwin.gap.isolation.forward_selection import Attribution, attribute
+from irtwin.gap.isolation.power_consistency import PowerBalance
+from irtwin.gap.isolation.shares import shares
+from irtwin.gap.regression.held_out import HeldOut, held_out
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
+from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
+from irtwin.identification.estimators import Estimate, estimate
+
+_NO_NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
+
+    `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
+    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
+    part of what they close together, none where they close nothing; `power_balances`: what power says of each.
+    """
+
+    name: str
+    places: tuple[str | None, ...]
+    observed: frozenset[str]
+    system: System
+    attribution: Attribution
+    held_out: HeldOut
+    floor: np.ndarray | None
+    estimate: Estimate
+    shares: tuple[float, ...] = ()
+    power_balances: tuple[PowerBalance, ...] = ()
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The channel's causes, ranked."""
+        return self.attribution.causes
+
+    def share(self, cause: Cause) -> float | None:
+        """Return a cause's part of what all close together, None where they close nothing."""
+        return self.shares[self.causes.index(cause)] if self.shares else None
+
+    def balance(self, cause: Cause) -> PowerBalance | None:
+        """Return what power says of a cause, None where it was not asked."""
+        return self.power_balances[self.causes.index(cause)] if self.power_balances else None
+
+    @property
+    def chosen(self) -> list[int]:
+        """The indices of the causes' columns."""
+        return [k for cause in self.causes for k in cause.columns]
+
+    @property
+    def used(self) -> list[int]:
+        """The indices of the columns in the estimate."""
+        return [*range(self.system.base), *self.chosen]
+
+    @property
+    def rmse(self) -> np.ndarray:
+        """(g,) before anything is added, on groups left out."""
+        return self.held_out.rmse(self.held_out.before)
+
+    @property
+    def excess(self) -> np.ndarray | None:
+        """(g,) mean square over the floor's, less one."""
+        return None if self.floor is None else np.asarray(self.rmse**2 / self.floor**2 - 1)
+
+    @cached_property
+    def fitted(self) -> tuple[np.ndarray, np.ndarray]:
+        """(g,) RMS left in observed runs by fits to all runs: of the twin as it is, and with the causes."""
+        return (
+            observed_rms(self.system, (), noise_before(self.system)),
+            observed_rms(self.system, self.chosen, self.attribution.noise),
+        )
+
+    def closed(self, cause: Cause) -> float:
+        """Return the part of the mean square above the floor, where a cause acts, that all causes together close."""
+        mine = [place in cause.joints or not cause.joints for place in self.places]
+        before, after = (level[mine] ** 2 for level in self.fitted)
+        floor = self.fitted[1][mine] ** 2 * _NO_NOISE if self.floor is None else self.floor[mine] ** 2
+        above = float(np.sum(before / floor - 1))
+        return float(np.clip(np.sum((before - after) / floor) / above, 0.0, 1.0)) if above > 0 else 0.0
+
+    @property
+    def groups(self) -> list[tuple[str, ...]]:
+        """The runs of each observed group."""
+        system = self.system
+        return [
+            tuple(dict.fromkeys(system.blocks[k].run for k in np.flatnonzero(system.group == group)))
+            for group in np.flatnonzero(system.group_observed)
+        ]
+
+
+def find(
+    name: str,
+    case: Case,
+    system: System,
+    floor: np.ndarray | None,
+    seed: int,
+    without: Set[str] = frozenset(),
+) -> Finding:
+    """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
+    power, inside = name == "power", case.effects
+    places = (None,) if power else case.robot.joint_names
+    if system.both:  # zero in the other runs where these did not measure it: there, missing is changed
+        inside = (*inside, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
+    candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
+    if system.both:
+        candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
+    candidates = [one for one in candidates if one.effect not in without]
+    found = attribute(system, candidates, seed, floor)
+    chosen = [k for cause in found.causes for k in cause.columns]
+    judged = held_out(system, noise_before(system), found.noise, chosen)
+    parts = shares(system, found, seed)
+    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), parts)
+
+
+def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
+    """Estimate the twin's terms and the causes' together, with bounds and intervals."""
+    used = [*range(system.base), *chosen]
+    terms = [system.all_terms[k] for k in used]
+    source = [k - len(system.columns) if k >= system.changed else k for k in used]
+    pattern = system.pattern[:, source]
+    blocks = []
+    for block, observed in zip(system.blocks, system.observed, strict=True):
+        factors = []
+        for equation, factor in enumerate(block.factors):
+            place = {int(k): p for p, k in enumerate(np.flatnonzero(system.pattern[equation]))}
+            parts = [
+                factor[:, place[s]] * (observed or k < system.changed)
+                for k, s in zip(used, source, strict=True)
+                if s in place
+            ]
+            factors.append(np.column_stack([*parts, factor[:, -1]]))
+        blocks.append(replace(block, factors=tuple(factors)))
+    return estimate(blocks, pattern, terms)

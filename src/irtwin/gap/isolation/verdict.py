@@ -1,0 +1,41 @@
+"""The verdict: whether there is a gap, and whether anything explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from irtwin.gap.data.noise_floor import REPEATS, Floor
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.regression.normal_equations import noise_before, reference_rms
+
+NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
+_EXCESS = 3.5  # over the floor, mean square: a gap, though nothing explains it; below lies what differs between runs
+_CLOSED = 0.7  # of the largest excess: causes that leave more than the rest of it, anywhere, do not explain the gap
+
+
+def verdict_of(findings: Sequence[Finding], floor: Floor) -> str:
+    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not."""
+    causes = [cause for finding in findings for cause in finding.causes]
+    if floor.source == REPEATS:
+        before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
+        if after > max(_EXCESS, (1 - _CLOSED) * before):
+            return UNEXPLAINED
+    if not causes:
+        return NO_GAP
+    return AMBIGUOUS if any(cause.rivals for cause in causes) else ATTRIBUTED
+
+
+def _largest(finding: Finding) -> tuple[float, float]:
+    """Return the largest excess of a channel's equations without causes, and the largest that these leave.
+
+    Over the floor, and over what the reference runs show, if there are any. The two may lie at different joints.
+    """
+    if finding.floor is None:
+        return 0.0, 0.0
+    level = finding.floor
+    if finding.system.both:
+        level = np.maximum(level, reference_rms(finding.system, noise_before(finding.system)))
+    before, after = ((rms / level) ** 2 - 1 for rms in finding.fitted)
+    return float(before.max()), float(after.max())

@@ -1,0 +1,174 @@
+"""Where the gap lies, over all channels: each channel's residual, held against its floor or the reference runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from irtwin.gap.data.case import Case
+from irtwin.gap.isolation.explained import Explained
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.localisation.excess_map import Map, joint_maps, level_of, robot_maps
+from irtwin.gap.localisation.locations import Location, locate, standing_out
+from irtwin.gap.localisation.operating_variable import curve, followed
+from irtwin.gap.regression.channel_equations import Torque
+from irtwin.gap.regression.hypotheses import CHANGED
+from irtwin.gap.regression.normal_equations import twin_values
+from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
+
+
+@dataclass(frozen=True)
+class ChannelResidual:
+    """What the twin left of one channel in the observed runs, and what it leaves with the causes.
+
+    `before`, `after`: traces without and with the causes, `after` None where there is none, and `seen`, `explained` the
+    maps of them; `added`: what each cause adds to each trace, (N, g), and `acts` the map of all of it. `reference`: the
+    map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean square beyond which a gap
+    lies.
+    """
+
+    finding: Finding
+    before: list[Trace]
+    after: list[Trace] | None
+    added: list[list[np.ndarray]]
+    seen: Map
+    explained: Map | None
+    acts: Map | None
+    reference: Map | None
+    level: np.ndarray
+
+
+def channel_residual(case: Case, explained: Explained, torque: Torque) -> ChannelResidual:
+    """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes)."""
+    finding = explained.finding
+    power = finding.name == "power"
+    reference = against_reference(finding)
+
+    def traces(runs: Sequence[Any], values: Values) -> list[Trace]:
+        return (power_traces if power else torque_traces)(explained.stack, runs, values, torque)
+
+    before = traces(case.seen, fitted_values(finding, reference=reference))
+    others = traces(case.others, fitted_values(finding, reference=True)) if reference else []
+    after, acting, added = None, [], [_added(explained, k, before) for k in range(len(finding.causes))]
+    if added:
+        acting = [_of(trace, sum(parts)) for trace, *parts in zip(before, *added, strict=True)]
+        plain = traces(case.seen, lambda run: explained.values)
+        after = [replace(t, residual=t.residual - sum(parts)) for t, *parts in zip(plain, *added, strict=True)]
+    maps = (robot_maps if power else joint_maps)((before, after or [], acting, others), case.grouping.label)
+    seen, closed, acts, known = maps
+    assert seen is not None
+    return ChannelResidual(
+        finding, before, after, added, seen, closed, acts, known, level_of(finding.floor, seen, known)
+    )
+
+
+def against_reference(finding: Finding) -> bool:
+    """Return whether to hold the observed runs against the others: there are some, and the gap is not in both."""
+    return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
+
+
+def places(left: Sequence[ChannelResidual], seed: int) -> list[Location]:
+    """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess."""
+    found = [(one, _places(one, seed)) for one in left]
+
+    def order(pair: tuple[ChannelResidual, list[Location]]) -> tuple[float, float]:
+        gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
+        return -gain, -max((place.excess for place in pair[1]), default=0.0)
+
+    return [place for _, own in sorted(found, key=order) for place in own]
+
+
+def cause_curves(left: Sequence[ChannelResidual]) -> list[dict[str, Any]]:
+    """Return each cause's curve, on the residual that all the others leave."""
+    lines = []
+    for one in left:
+        for cause, added in zip(one.finding.causes, one.added, strict=True):
+            assert one.after is not None
+            alone = [_of(trace, part) for trace, part in zip(one.after, added, strict=True)]
+            partial = [
+                replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
+            ]
+            for k, joint in enumerate(one.finding.places):
+                best = followed(alone, k, joint) if joint is None or not cause.joints or joint in cause.joints else None
+                if best:
+                    lines.append(_line(one, joint) | curve(partial, k, joint, best[0], cause.effect, added))
+    return lines
+
+
+def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[Location], most: int) -> list[dict[str, Any]]:
+    """Return the residual against what it follows, at the foremost places on which no cause acts."""
+    lines: list[dict[str, Any]] = []
+    for one in left:
+        named = {joint for cause in one.finding.causes for joint in cause.joints or one.finding.places}
+        own = [place.joint for place in located if place.channel == one.finding.name and place.joint not in named]
+        for joint in list(dict.fromkeys(own))[:most]:
+            k = one.finding.places.index(joint)
+            if best := followed(one.before, k, joint):
+                lines.append(_line(one, joint) | curve(one.before, k, joint, best[0]))
+    return lines
+
+
+def _line(left: ChannelResidual, joint: str | None) -> dict[str, Any]:
+    return {"channel": left.finding.name, "joint": joint}
+
+
+def _of(trace: Trace, added: np.ndarray) -> Trace:
+    return replace(trace, residual=np.where(np.isfinite(trace.residual), added, np.nan))
+
+
+def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.ndarray]:
+    """Return what a cause adds to each trace, (N, g), as a measurement would show it."""
+    cause, found = explained.finding.causes[k], []
+    for trace in traces:
+        part = as_filtered(trace.motion, explained.added(cause, trace.motion))
+        found.append(part.reshape(trace.residual.shape))
+    return found
+
+
+def _places(left: ChannelResidual, seed: int) -> list[Location]:
+    names = left.finding.places
+    best = [followed(left.before, k, joint) for k, joint in enumerate(names)]
+    acting = np.array(
+        [any(not cause.joints or name in (None, *cause.joints) for cause in left.finding.causes) for name in names]
+    )
+    located = locate(
+        left.finding.name,
+        names,
+        [found[0] if found else None for found in best],
+        left.seen,
+        left.level,
+        reference=left.reference,
+        explained=left.explained,
+        acting=acting,
+        acts=left.acts,
+        seed=seed,
+    )
+    return [replace(place, runs=_standing_out(left, place)) for place in located]
+
+
+def _standing_out(left: ChannelResidual, place: Location) -> tuple[str, ...]:
+    k = left.finding.places.index(place.joint)
+    return standing_out(left.before, k, float(left.level[k].min()))
+
+
+def fitted_values(finding: Finding, *, reference: bool) -> Values:
+    """Return the coefficients of the twin alone, without causes, for each run.
+
+    They are fitted to all runs; with `reference` to the runs beside the observed ones, without the run's own group.
+    """
+    system = finding.system
+    moments = system.moments(finding.rmse)
+    if not reference:
+        whole = twin_values(system, system.solution((), np.sum(moments, axis=0)))
+        return lambda run: whole
+    groups = np.flatnonzero(~system.group_observed)
+    total = np.sum([moments[group] for group in groups], axis=0)
+    whole = twin_values(system, system.solution((), total))
+    own: dict[str, np.ndarray] = {}
+    for group in groups if len(groups) > 1 else ():
+        without = twin_values(system, system.solution((), total - moments[group]))
+        own |= dict.fromkeys((system.blocks[k].run for k in np.flatnonzero(system.group == group)), without)
+    return lambda run: own.get(run, whole)

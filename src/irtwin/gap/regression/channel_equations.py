@@ -1,0 +1,104 @@
+"""The equations of torque and of power, with every candidate effect's columns beside those of the twin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from irtwin.effects.compliance import load_inertia, load_torque
+from irtwin.effects.effect import Effect, Predicted
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate_pattern
+from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.hypotheses import candidate_columns
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.progress import Tell, with_progress
+from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.signals.motion import Motion
+
+Torque = Callable[[Motion], np.ndarray]
+
+
+def torque_system(
+    stack: Stack,
+    motions: Sequence[Motion],
+    grouping: Grouping,
+    effects: Sequence[Effect],
+    below: Below | None,
+    tell: Tell | None = None,
+) -> System:
+    """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
+
+    `tell` is told how far that has come, where it takes long. Raises InputError where too few samples are left.
+    """
+    robot = stack.robot
+    columns = candidate_columns(robot, effects)
+    tried = candidate_pattern(robot, effects, columns)
+    pattern = np.concatenate([stack.pattern, tried], axis=1)
+
+    def loaded(whole: Motion) -> Predicted:
+        assert below is not None, "candidates are built on what the twin predicts"
+        before = below(whole)
+        load, inertia = load_torque(robot, whole, before), load_inertia(robot, whole, before)
+        return replace(before, load=load, inertia=inertia)
+
+    candidates = Candidates(robot, effects, tried, loaded)
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.torque is not None
+        own = stack.torque_columns(motion)
+        joined = [
+            np.concatenate([own[:, joint, used], added], axis=1)
+            for joint, (used, added) in enumerate(zip(stack.pattern, candidates.part(motion), strict=True))
+        ]
+        return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
+
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
+    return _enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+
+
+def power_system(
+    stack: Stack,
+    motions: Sequence[Motion],
+    grouping: Grouping,
+    effects: Sequence[Effect],
+    predicted: Torque,
+    power_of: Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    tell: Tell | None = None,
+) -> System:
+    """Reduce the equation of measured power, on top of the joint torque that is predicted; `tell` as above."""
+    robot = stack.robot
+    columns = candidate_columns(robot, effects)
+    free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
+    pattern = np.ones((1, len(free) + len(columns)), dtype=bool)
+    fixed_values = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
+
+    def below(whole: Motion) -> Predicted:
+        torque = predicted(whole)
+        return Predicted(torque, *power_of(whole, torque))
+
+    candidates = Candidates(robot, effects, np.ones((1, len(columns)), dtype=bool), below)
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.power is not None
+        own = stack.power_columns(motion, predicted(motion))
+        known = own[:, stack.fixed] @ fixed_values
+        joined = np.concatenate([own[:, ~stack.fixed], *candidates.part(motion)], axis=1)
+        return Rows([joined], known[:, None], motion.power[:, None])
+
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
+    return _enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+
+
+def _enough(system: System) -> System:
+    """Return the system; raise InputError where its samples are so few that the twin would fit whatever they say."""
+    samples = int(system.rows.sum())
+    if samples <= system.base:
+        raise InputError(
+            f"{samples} samples are left of all runs to find {system.base} coefficients of the twin, which would fit "
+            "whatever they say; log longer runs"
+        )
+    return system

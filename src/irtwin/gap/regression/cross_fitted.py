@@ -1,0 +1,66 @@
+"""What the twin says of a run when it is fitted without that run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from irtwin.effects.effect import Predicted
+from irtwin.effects.stack import Stack
+from irtwin.gap.regression.channel_equations import Torque, power_system
+from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.signals.motion import Motion
+
+PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+class LeftOut:
+    """What the twin says of a run, fitted without that run's group; of a run it was not fitted to, by all groups."""
+
+    def __init__(self, stack: Stack, system: System):
+        """Fit the twin's terms to the equations of torque without each group in turn."""
+        moments = system.moments(noise_before(system))
+        total = np.sum(moments, axis=0)
+        self._stack = stack
+        self._all = twin_values(system, system.solution((), total))
+        self._without: dict[str, np.ndarray] = {}
+        for run in {block.run for block in system.blocks}:
+            groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
+            rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
+            self._without[run] = twin_values(system, system.solution((), rest))
+        self._held: dict[str, tuple[Motion, np.ndarray]] = {}  # each run's: every pass over them asks for it
+
+    def torque(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, of a run or a part of one."""
+        if motion.run not in self._without:
+            return self._stack.real_torque(motion, self._all)
+        run = motion.whole or motion
+        if run.run not in self._held or self._held[run.run][0] is not run:
+            self._held[run.run] = run, self._stack.real_torque(run, self._without[run.run])
+        return self._held[run.run][1][motion.start : motion.start + len(motion.time)]
+
+    def below(self, whole: Motion) -> Predicted:
+        """Return what further effects on torque are built on: the torque, and the bodies that were identified."""
+        bodies = self._stack.bodies(whole, self._without.get(whole.run, self._all))
+        return Predicted(self.torque(whole), bodies=bodies)
+
+
+def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: Torque) -> PowerOf:
+    """Return the power that the twin predicts for a run, (N,) W, and the part that its axes take."""
+
+    def none(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(torque)), np.zeros(len(torque))
+
+    system = power_system(stack, motions, grouping, (), torque, none)
+    values = np.array([term.expected for _, term in stack.power_terms])
+    total = np.sum(system.moments(noise_before(system)), axis=0)
+    values[~stack.fixed] = twin_values(system, system.solution((), total))
+    standing = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
+
+    def power_of(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        columns = stack.power_columns(motion, torque)
+        return columns @ values, columns @ np.where(standing, 0.0, values)
+
+    return power_of

@@ -1,0 +1,82 @@
+"""How far the gap shrinks, judged on groups of runs that took no part in the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from irtwin.gap.regression.normal_equations import System
+
+_RESAMPLED = 1000
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Squared residuals of each group and equation (G, g) when the group was left out of the fit; rows likewise."""
+
+    before: np.ndarray
+    after: np.ndarray
+    rows: np.ndarray
+
+    def rmse(self, squares: np.ndarray) -> np.ndarray:
+        """Return each equation's RMSE (g,) over the groups."""
+        return np.asarray(np.sqrt(squares.sum(axis=0) / np.maximum(self.rows.sum(axis=0), 1)))
+
+
+def held_out(system: System, noise: np.ndarray, noise_after: np.ndarray, chosen: Sequence[int]) -> HeldOut:
+    """Refit everything without each observed group in turn, with the chosen columns and without them.
+
+    Equations are weighted by what each model leaves, `noise` and `noise_after` (g,).
+    """
+    judged = np.flatnonzero(system.group_observed)
+    before = _left_out(system, system.moments(noise), (), judged)
+    after = _left_out(system, system.moments(noise_after), chosen, judged) if len(chosen) else before
+    return HeldOut(before, after, system.rows[judged])
+
+
+def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]], seed: int) -> tuple[float, list[float]] | None:
+    """Return the fraction of the gap above the floor that is closed, with its 95 % interval over groups.
+
+    parts: each channel's groups and noise floor (g,). Equations count by their mean square over the floor's, those that
+    have a gap. The interval is Student's, of the deviation under resampling, as groups are few. None without a gap.
+    """
+    gaps = [(part, floor, part.rmse(part.before) > floor) for part, floor in parts]
+
+    def fraction(generator: np.random.Generator | None) -> float:
+        above, below = 0.0, 0.0
+        for part, floor, gap in gaps:
+            groups = len(part.rows)
+            pick = np.arange(groups) if generator is None else generator.integers(groups, size=groups)
+            rows = np.maximum(part.rows[pick].sum(axis=0), 1)
+            above += float(np.sum((part.before[pick].sum(axis=0) / rows / floor**2 - 1)[gap]))
+            below += float(np.sum((part.after[pick].sum(axis=0) / rows / floor**2 - 1)[gap]))
+        return min(1 - below / above, 1.0) if above > 0 else np.nan
+
+    value, groups = fraction(None), len(parts[0][0].rows)
+    if not np.isfinite(value):
+        return None
+    if groups < 2:
+        return value, [value, value]
+    generator = np.random.default_rng(seed)
+    drawn = np.array([fraction(generator) for _ in range(_RESAMPLED)])
+    deviation = drawn[np.isfinite(drawn)].std(ddof=1) * np.sqrt(groups / (groups - 1))
+    half = float(student_t.ppf(0.975, groups - 1) * deviation)
+    return value, [value - half, min(value + half, 1.0)]
+
+
+def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[float]:
+    """Return the 95 % interval over groups of the RMSE pooled over equations."""
+    generator = np.random.default_rng(seed)
+    drawn = []
+    for _ in range(_RESAMPLED):
+        pick = generator.integers(len(rows), size=len(rows))
+        drawn.append(np.sqrt(squares[pick].sum() / max(rows[pick].sum(), 1)))
+    return [float(value) for value in np.quantile(drawn, [0.025, 0.975])]
+
+
+def _left_out(system: System, moments: Sequence[np.ndarray], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
+    total = np.sum(moments, axis=0)
+    return np.array([system.squares(system.solution(chosen, total - moments[group]), int(group)) for group in judged])

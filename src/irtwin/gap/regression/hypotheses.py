@@ -1,0 +1,124 @@
+"""Hypotheses: which effect may be missing or changed, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from irtwin.effects.effect import Effect, Term
+from irtwin.robot.description import Robot
+
+MISSING, CHANGED = "missing", "changed"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """An effect with one choice of its shape: the columns that it adds, by index, and their terms."""
+
+    effect: Effect
+    columns: tuple[int, ...]
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect is missing from the twin, or has changed since the reference runs.
+
+    `joint` is None for an effect of the whole robot; of the `variants` the data choose one.
+    """
+
+    effect: str
+    joint: str | None
+    scope: str
+    variants: tuple[Variant, ...]
+
+    @property
+    def flexibility(self) -> float:
+        """How much it could fit: its coefficients, and the choice among its shapes in bits."""
+        return len(self.variants[0].columns) + float(np.log2(len(self.variants)))
+
+    @property
+    def of_bodies(self) -> bool:
+        """Whether it is the robot's bodies that differ."""
+        return self.variants[0].effect.bodies
+
+    @property
+    def name(self) -> str:
+        """Readable, unique within a diagnosis."""
+        return f"{self.effect} {self.scope} at {self.joint or 'the robot'}"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One candidate column: the k-th of an effect, or (k None) what all its known coefficients give."""
+
+    effect: Effect
+    index: int | None
+    term: Term
+
+
+def candidate_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, ...]:
+    """Return the columns of effects with their terms; those of an effect without any free term become one."""
+    columns: list[Column] = []
+    for effect in effects:
+        terms = effect.terms(robot)
+        if terms and all(term.fixed for term in terms):
+            columns.append(Column(effect, None, Term("share", "1", spread=1.0, lowest=0.0)))
+        else:
+            columns.extend(Column(effect, k, term) for k, term in enumerate(terms) if not term.fixed)
+    return tuple(columns)
+
+
+def hypotheses(
+    columns: Sequence[Column], first: int, scope: str, *, whole: bool = False, inside: Sequence[str] = ()
+) -> list[Hypothesis]:
+    """Group candidate columns (the first of index `first`) into hypotheses of one scope, joint by joint.
+
+    `whole` adds, for effects that act joint by joint, the hypothesis that they act in every joint at once;
+    effects `inside` the twin cannot be missing.
+    """
+    places: dict[tuple[str, str | None], dict[int, list[int]]] = {}
+    for k, column in enumerate(columns):
+        effect = column.effect
+        if scope == MISSING and effect.id in inside:
+            continue
+        joint = column.term.joint if column.term.link is None else None
+        keys = [joint, None] if whole and joint else [joint]
+        for key in keys:
+            places.setdefault((effect.id, key), {}).setdefault(id(effect), []).append(k)
+    return [
+        Hypothesis(
+            effect,
+            joint,
+            scope,
+            tuple(
+                Variant(
+                    columns[members[0]].effect,
+                    tuple(first + k for k in members),
+                    tuple(columns[k].term for k in members),
+                )
+                for members in variants.values()
+            ),
+        )
+        for (effect, joint), variants in places.items()
+    ]
+
+
+def bounds(variant: Variant) -> np.ndarray:
+    """Return the lowest value of each coefficient of a variant, (k,)."""
+    return np.array([term.lowest for term in variant.terms])
+
+
+def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis]:
+    """Return hypotheses without shapes that act in some observed runs only, where these would be `missing` ones.
+
+    Beside reference runs (`both`) such a shape is a change.
+    """
+    found = []
+    for one in candidates:
+        kept = tuple(v for v in one.variants if not (both and one.scope == MISSING and v.effect.runs is not None))
+        if kept:
+            found.append(replace(one, variants=kept))
+    return found

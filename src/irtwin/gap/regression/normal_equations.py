@@ -1,0 +1,213 @@
+"""The equations of one channel, reduced once, and the algebra of trying hypotheses on them.
+
+A sample's equations are [columns of the twin | candidate columns] @ coefficients = measured. Blocks of time are reduced
+to triangular factors while the samples are read; whatever is asked later works on these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from irtwin.effects.effect import Effect, Term
+from irtwin.gap.regression.cholesky import factored, solved
+from irtwin.gap.regression.hypotheses import Column
+from irtwin.gap.regression.transient import Transient
+from irtwin.identification.accumulate import Block
+
+_NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
+_LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
+
+
+@dataclass(frozen=True)
+class System:
+    """g equations a sample, B blocks; K terms of the twin, M candidate columns.
+
+    `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
+    whether the block belongs to an observed run. With any that does not, each candidate column stands there twice: as
+    it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of a brief candidate.
+    """
+
+    terms: tuple[tuple[Effect, Term], ...]
+    columns: tuple[Column, ...]
+    pattern: np.ndarray
+    blocks: tuple[Block, ...]
+    group: np.ndarray
+    observed: np.ndarray
+    transient: Transient | None = None
+
+    @property
+    def base(self) -> int:
+        """K, how many terms the twin has."""
+        return len(self.terms)
+
+    @property
+    def both(self) -> bool:
+        """Whether there are reference runs beside the observed ones."""
+        return not self.observed.all()
+
+    @property
+    def changed(self) -> int:
+        """The index of the first candidate column that is zero outside observed runs."""
+        return self.base + len(self.columns)
+
+    def equations(self, columns: Sequence[int]) -> np.ndarray:
+        """Return (g,) whether an equation has any of some candidate columns."""
+        own = [k - len(self.columns) if k >= self.changed else k for k in columns]
+        return np.asarray(self.pattern[:, own].any(axis=1))
+
+    @property
+    def groups(self) -> int:
+        """How many groups there are."""
+        return int(self.group.max()) + 1
+
+    @cached_property
+    def group_observed(self) -> np.ndarray:
+        """(G,) whether the group is of observed runs."""
+        return np.array([self.observed[self.group == g].all() for g in range(self.groups)])
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(G, g) how many rows each equation has in each group."""
+        counts = np.zeros((self.groups, len(self.pattern)))
+        for block, group in zip(self.blocks, self.group, strict=True):
+            counts[group] += block.rows
+        return counts
+
+    @cached_property
+    def quietest(self) -> np.ndarray:
+        """(g,) the least noise that an equation is taken to have: exact or dead signals have finite weights, too."""
+        return np.array(
+            [
+                least_noise(np.sum([np.diag(products)[:-1].max(initial=0.0) for _, products in own]))
+                for own in zip(*self._products, strict=True)
+            ]
+        )
+
+    @cached_property
+    def all_terms(self) -> tuple[Term, ...]:
+        """The terms of every column, those of changes too: their expectation is no change, without bound."""
+        first = [term for _, term in self.terms]
+        return (*first, *(column.term for column in self.columns), *(_change(c.term) for c in self.columns))
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """(D,) the prior's standard deviations; factors are taken in units of it."""
+        return np.array([term.spread for term in self.all_terms[: self._size]])
+
+    @cached_property
+    def expected(self) -> np.ndarray:
+        """(K,) what is expected of the twin's terms."""
+        return np.array([term.expected for _, term in self.terms])
+
+    @property
+    def _size(self) -> int:
+        return self.base + len(self.columns) * (2 if self.both else 1)
+
+    def factor(self, block: int, equation: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return a block's factor of an equation, (r, k + 1), in units of the prior, and the indices (k,) it has.
+
+        The last column is what was measured, less what was expected.
+        """
+        used = np.flatnonzero(self.pattern[equation])
+        factor = self.blocks[block].factors[equation]
+        own = used[used < self.base]
+        target = factor[:, -1] - factor[:, : len(own)] @ self.expected[own]
+        columns = factor[:, :-1]
+        if self.both and self.observed[block]:
+            later = used >= self.base
+            columns = np.concatenate([columns, columns[:, later]], axis=1)
+            used = np.append(used, used[later] + len(self.columns))
+        return np.column_stack([columns * self.scale[used], target]), used
+
+    @cached_property
+    def _products(self) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+        """Per group and equation: the indices of its columns, the measurement's (D) last, and their products."""
+        found = []
+        for group in range(self.groups):
+            blocks = np.flatnonzero(self.group == group)
+            own = []
+            for equation in range(len(self.pattern)):
+                factors = [self.factor(int(block), equation) for block in blocks]
+                stacked = np.concatenate([factor for factor, _ in factors])
+                own.append((np.append(factors[0][1], self._size), stacked.T @ stacked))
+            found.append(own)
+        return found
+
+    def moments(self, noise: np.ndarray) -> list[np.ndarray]:
+        """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,)."""
+        return [self._weighted([group], noise) for group in range(self.groups)]
+
+    def _weighted(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> np.ndarray:
+        total = np.zeros((self._size + 1, self._size + 1))
+        for group in groups:
+            for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
+                total[np.ix_(places, places)] += products / float(level) ** 2
+        return total
+
+    def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
+        """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.
+
+        Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
+        """
+        found = self.rms(chosen, noise, range(self.groups), range(self.groups))
+        found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
+        return np.asarray(np.maximum(found, self.quietest))
+
+    def rms(
+        self,
+        chosen: Sequence[int],
+        noise: np.ndarray,
+        fitted: Sequence[int] | np.ndarray,
+        of: Sequence[int] | np.ndarray,
+    ) -> np.ndarray:
+        """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
+        vector = self.solution(chosen, self._weighted(fitted, noise))
+        squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
+        return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
+
+    def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
+        """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
+        inside = np.append(np.arange(self.base), np.array(chosen, dtype=int))
+        vector = np.zeros(self._size)
+        vector[inside] = solved(factored(total[np.ix_(inside, inside)]), total[inside, -1])
+        return vector
+
+    def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
+        """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
+        weights = np.append(-vector, 1.0)
+        left = [float(weights[places] @ products @ weights[places]) for places, products in self._products[group]]
+        return np.maximum(left, 0.0)
+
+
+def _change(term: Term) -> Term:
+    return Term(term.name, term.unit, term.joint, term.link, 0.0, term.spread)
+
+
+def least_noise(squares: float) -> float:
+    """Return the least noise of an equation whose largest column, in units of its prior, has such a sum of squares."""
+    return max(_LEAST_NOISE * float(np.sqrt(squares)), _NO_NOISE)
+
+
+def noise_before(system: System) -> np.ndarray:
+    """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
+    return system.residual_rms((), np.ones(len(system.pattern)))
+
+
+def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
+    """Return the RMS (g,) that a fit to all runs leaves in observed ones; equations weighted by `noise` (g,)."""
+    return system.rms(chosen, noise, range(system.groups), np.flatnonzero(system.group_observed))
+
+
+def reference_rms(system: System, noise: np.ndarray) -> np.ndarray:
+    """Return the RMS (g,) that the twin, fitted to the runs that are not observed, leaves in these."""
+    groups = np.flatnonzero(~system.group_observed)
+    return system.rms((), noise, groups, groups)
+
+
+def twin_values(system: System, vector: np.ndarray) -> np.ndarray:
+    """Return the coefficients of the twin's terms, (K,), from a solution (D,) in units of the prior."""
+    return np.asarray(system.expected + vector[: system.base] * system.scale[: system.base])

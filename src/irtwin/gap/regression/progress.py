@@ -1,0 +1,31 @@
+"""How far long work on runs has come."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from irtwin.identification.accumulate import Equations, Rows
+from irtwin.signals.motion import Motion
+
+Tell = Callable[[str], None]
+
+_EVERY = 5.0  # s between two lines: short work says none
+
+
+def with_progress(equations: Equations, motions: Sequence[Motion], tell: Tell | None) -> Equations:
+    """Return the equations, with a line every few seconds of how much of the motions they have been asked for."""
+    if tell is None:
+        return equations
+    place = {motion.run: number for number, motion in enumerate(motions, start=1)}
+    said = time.monotonic()
+
+    def asked(motion: Motion) -> Rows:
+        nonlocal said
+        if time.monotonic() - said >= _EVERY:
+            said = time.monotonic()
+            share = 100 * motion.start // len((motion.whole or motion).time)
+            tell(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")
+        return equations(motion)
+
+    return asked

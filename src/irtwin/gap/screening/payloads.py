@@ -1,0 +1,191 @@
+"""Payloads that nobody told, in some of the runs: which runs carry one.
+
+A payload is a change of the last body, so that a fit to all runs takes half of it into the body where half of them
+carry it. Here the runs are parted in two, and each run's part is told by some joints and judged on another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.effects.effect import Effect
+from irtwin.effects.load import Payload
+from irtwin.effects.rigid_body import flange_frame, to_body
+from irtwin.gap.regression.cholesky import factored, solved
+from irtwin.gap.regression.normal_equations import System
+from irtwin.robot.description import Robot
+
+_FEWEST_RUNS = 4
+_MATTERS = 0.03  # of the mean square of one joint's residual
+_ALPHA = 0.01
+_FLIPS = 999
+_SWEEPS = 10
+
+
+@dataclass(frozen=True)
+class UntoldPayload:
+    """A payload in some runs: `effect` has the `runs`.
+
+    gain: mean square that it explains, of joints by which it was not told which runs carry it, without the runs' group;
+    t: of that between groups; p: under random signs of the groups.
+    """
+
+    effect: Effect
+    gain: float
+    t: float
+    p: float
+
+
+def untold_payload(robot: Robot, system: System, noise: np.ndarray, seed: int) -> UntoldPayload | None:
+    """Return the payload that some observed runs carry and others do not; None where none shows.
+
+    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m.
+    """
+    parts = _Parts.of(robot, system, noise)
+    if parts is None:
+        return None
+    with_load = parts.carrying(np.arange(len(parts.runs)))
+    if not with_load.any() or with_load[parts.observed].all():
+        return None
+    gain = parts.judged()
+    mean, t = float(gain.mean()), float(gain.mean() / max(gain.std(ddof=1) / np.sqrt(len(gain)), 1e-12))
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, len(gain)))
+    p = float((1 + np.sum(signs @ gain >= gain.sum())) / (1 + _FLIPS))
+    if mean < _MATTERS or p > _ALPHA:
+        return None
+    runs = tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries)
+    return UntoldPayload(Payload(runs=runs), mean, t, p)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Each run's products per joint, (R, n, D, D), of [twin's columns | payload | measured], and its group (R,)."""
+
+    runs: tuple[str, ...]
+    products: np.ndarray
+    rows: np.ndarray
+    group: np.ndarray
+    observed: np.ndarray
+    base: int
+
+    @classmethod
+    def of(cls, robot: Robot, system: System, noise: np.ndarray) -> _Parts | None:
+        """Take the runs apart; None where too few are observed, or groups are stretches of runs."""
+        runs = tuple(dict.fromkeys(block.run for block in system.blocks))
+        groups = [{int(g) for g, b in zip(system.group, system.blocks, strict=True) if b.run == run} for run in runs]
+        seen = {block.run for block, observed in zip(system.blocks, system.observed, strict=True) if observed}
+        observed = np.array([run in seen for run in runs])
+        onto = _payload_columns(robot, system)
+        if onto is None or observed.sum() < _FEWEST_RUNS or any(len(one) > 1 for one in groups):
+            return None
+        base, size = system.base, system.base + onto.shape[1] + 1
+        full = np.zeros((base + 1, size))
+        full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
+        products = np.zeros((len(runs), len(noise), size, size))
+        rows = np.zeros(len(runs))
+        for number, block in enumerate(system.blocks):
+            run = runs.index(block.run)
+            rows[run] += block.rows.max()
+            for joint, level in enumerate(noise):
+                factor, used = system.factor(number, joint)
+                inside = used < base
+                mapped = factor[:, np.append(inside, True)] @ full[np.append(used[inside], base)] / level
+                products[run, joint] += mapped.T @ mapped
+        return cls(runs, products, rows, np.array([one.pop() for one in groups]), observed, base)
+
+    def carrying(self, inside: np.ndarray) -> np.ndarray:
+        """Return (R,) which runs carry the payload, as runs `inside` tell; the heavier where either part could.
+
+        Runs are ordered by the mass that each would have alone, parted at the best place, and then moved one by one.
+        """
+        fold = _Fold(self, inside)
+        tried = [int(k) for k in inside if self.observed[k]]
+        order = [tried[k] for k in np.argsort([-fold.mass(k) for k in tried])]
+        every = np.arange(len(self.runs))
+        splits = [np.isin(every, order[:count]) for count in range(1, len(order) + 1)]
+        found = max(splits, key=fold.gain)
+        best = fold.gain(found)
+        for _ in range(_SWEEPS):
+            splits = [found ^ (every == k) for k in tried]
+            moved = max(splits, key=fold.gain)
+            if fold.gain(moved) <= best:
+                break
+            found, best = moved, fold.gain(moved)
+        if len(tried) == len(inside) and fold.values(found)[self.base] < 0:
+            return np.asarray(np.isin(every, tried) & ~found)
+        return found
+
+    def judged(self) -> np.ndarray:
+        """Return (G,) the mean square gained in each observed group, by runs and joints that had no say in it."""
+        found = []
+        for group in dict.fromkeys(self.group[self.observed].tolist()):
+            rest = np.flatnonzero(self.group != group)
+            own = np.flatnonzero(self.group == group)
+            with_load = self.carrying(rest)
+            if not with_load[rest].any():
+                found.append(0.0)
+                continue
+            fold = _Fold(self, rest)
+            plain, loaded = fold.values(np.zeros(len(self.runs), dtype=bool)), fold.values(with_load)
+            empty = loaded.copy()
+            empty[self.base :] = 0.0
+            gain = np.stack([self._losses(own, plain) - self._losses(own, one) for one in (empty, loaded)])
+            others = gain.sum(axis=2, keepdims=True) - gain
+            chosen = np.take_along_axis(gain, others.argmax(axis=0)[None], axis=0)
+            found.append(float(chosen.sum() / self.rows[own].sum()))
+        return np.array(found)
+
+    def _losses(self, runs: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return the squares (r, n) that coefficients leave of runs and joints."""
+        vector = np.append(-values, 1.0)
+        return np.asarray(np.einsum("rjab,a,b->rj", self.products[runs], vector, vector))
+
+
+class _Fold:
+    """The fit of the twin, and of a payload in any of the runs, to some runs; the twin's part is solved once."""
+
+    def __init__(self, parts: _Parts, inside: np.ndarray):
+        """Take the runs to fit to."""
+        base = parts.base
+        products = parts.products.sum(axis=1)
+        total = products[inside].sum(axis=0)
+        factor = factored(total[:base, :base])
+        used = np.isin(np.arange(len(products)), inside)[:, None, None]
+        self._twin = solved(factor, total[:base, -1])
+        self._beside = products[:, :base, base:-1] * used
+        self._imitated = np.stack([solved(factor, one) for one in self._beside])
+        self._own = products[:, base:-1, base:-1] * used
+        self._right = (products[:, base:-1, -1] - np.einsum("rak,a->rk", self._beside, self._twin)) * used[:, 0]
+
+    def mass(self, run: int) -> float:
+        """Return the mass that a run alone would have, in units of its prior, beside the twin that fits all."""
+        return float(np.linalg.solve(self._own[run] + np.eye(len(self._own[run])), self._right[run])[0])
+
+    def gain(self, carrying: np.ndarray) -> float:
+        """Return the squares that a payload in some runs explains, (R,)."""
+        return float(self._load(carrying) @ self._right[carrying].sum(axis=0))
+
+    def values(self, carrying: np.ndarray) -> np.ndarray:
+        """Return the coefficients of twin and payload, in units of their priors."""
+        load = self._load(carrying)
+        return np.append(self._twin - self._imitated[carrying].sum(axis=0) @ load, load)
+
+    def _load(self, carrying: np.ndarray) -> np.ndarray:
+        imitated = self._beside[carrying].sum(axis=0).T @ self._imitated[carrying].sum(axis=0)
+        normal = self._own[carrying].sum(axis=0) - imitated + np.eye(len(imitated))
+        return np.asarray(np.linalg.solve(normal, self._right[carrying].sum(axis=0)))
+
+
+def _payload_columns(robot: Robot, system: System) -> np.ndarray | None:
+    """Return (K, 10) the payload's columns made of those of the body that carries the flange, in units of priors."""
+    frame = flange_frame(robot)
+    last = robot.model.names[frame.parentJoint]
+    bodies = [k for k, (effect, term) in enumerate(system.terms) if effect.bodies and term.joint == last]
+    if len(bodies) != 10:
+        return None
+    spread = np.array([term.spread for term in Payload().terms(robot)])
+    onto = np.zeros((system.base, 10))
+    onto[bodies] = to_body(frame.placement) * spread / system.scale[bodies][:, None]
+    return onto

@@ -1,0 +1,71 @@
+"""What acts in some runs only, for a while, or at one order of many: found before any effect is tried."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from irtwin.effects.effect import Effect
+from irtwin.effects.stack import Stack
+from irtwin.effects.transmission import TorqueRipple
+from irtwin.gap.data.case import Case
+from irtwin.gap.regression.hypotheses import Variant
+from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.gap.regression.residuals import torque_residual
+from irtwin.gap.regression.transient import Transient, is_transient
+from irtwin.gap.screening.contact import contact
+from irtwin.gap.screening.payloads import UntoldPayload, untold_payload
+from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.ripples import fast_ripples
+from irtwin.signals.filter import decimation
+from irtwin.signals.motion import Motion
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A contact, and a payload in some of the runs (None where none stands out); joints' fast ripples."""
+
+    contact: Transient | None = None
+    payload: UntoldPayload | None = None
+    ripples: tuple[TorqueRipple, ...] = ()
+
+    def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the effects to try with those found: a contact in its place only, the others there too."""
+        found: list[Effect] = [
+            effect for effect in effects if not (self.contact and effect.id == self.contact.effect.id)
+        ]
+        return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples]
+
+
+def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
+    """Search the runs' torque; system: its equations, with the terms of the twin at least."""
+    noise = noise_before(system)
+    values = twin_values(system, system.solution((), np.sum(system.moments(noise), axis=0)))
+    left = []
+    for motion in case.with_torque:
+        step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
+        residual = torque_residual(stack, motion, values)
+        observed = motion.run in case.observed
+        left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
+    ripples = fast_ripples(case.robot, left)
+    return Screened(contact(case.robot, left, noise), untold_payload(case.robot, system, noise, seed), tuple(ripples))
+
+
+def acting(variants: Sequence[Variant]) -> dict[str, Any]:
+    """Return the runs and the stretch of the clock, s, in which a cause acts, for those that act in some only."""
+    effects = [variant.effect for variant in variants if variant.effect.runs is not None]
+    if not effects:
+        return {}
+    runs = sorted({run for effect in effects for run in effect.runs or ()})
+    return {
+        "runs": runs,
+        "window": next(([e.shape["start"], e.shape["stop"]] for e in effects if is_transient(e)), None),
+    }
+
+
+def _every(motion: Motion, step: int) -> Motion:
+    cut = slice(None, None, step)
+    return Motion(motion.run, motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut])

@@ -1,0 +1,124 @@
+"""Contacts whose runs, force, start and stop are known, and troubles that are none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from irtwin.effects.effect import Predicted
+from irtwin.effects.load import ExternalContact, Payload
+from irtwin.gap.regression.candidate_columns import Candidates
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, in_scope
+from irtwin.gap.regression.transient import is_transient
+from irtwin.gap.screening.contact import contact
+from irtwin.gap.screening.remainder import Remainder
+from irtwin.signals.filter import low_pass
+from synthetic import arm, swing
+
+ROBOT = arm(6)
+NOISE = np.array([1.0, 0.9, 0.6, 0.3, 0.3, 0.2])
+FORCE = np.array([9.0, -7.0, 6.0])
+
+
+def remainder(seed, added=None, observed=True):
+    """Noise of a run, as coloured as a filter leaves it, and what is `added`, N m."""
+    motion = replace(swing(ROBOT, seed, seconds=8.0, rate=50.0), run=f"run_{seed}")
+    white = np.random.default_rng(seed).standard_normal(motion.q.shape)
+    residual = NOISE * low_pass(white, motion.rate, 8.0) * np.sqrt(motion.rate / 2 / 8.0)
+    if added is not None:
+        residual = residual + added(motion)
+    return Remainder(motion, residual, observed, motion.run)
+
+
+def push(motion):
+    return ExternalContact(3.0, 4.5).contribution(ROBOT, motion, FORCE)
+
+
+def runs(touched, added=push, count=8):
+    return [remainder(seed, added if seed in touched else None) for seed in range(count)]
+
+
+@pytest.mark.parametrize("touched", [(2,), (1, 4, 6)])
+def test_a_contact_is_found_in_its_runs_and_its_time(touched):
+    found = contact(ROBOT, runs(touched), NOISE)
+    assert found.effect.runs == tuple(f"run_{seed}" for seed in touched)
+    assert found.effect.start == pytest.approx(3.0, abs=0.2)
+    assert found.effect.stop == pytest.approx(4.5, abs=0.2)
+    assert found.t > 2.5
+    assert found.p < 0.01
+    assert found.gain.shape == (len(touched), 6)
+
+
+def test_noise_is_no_contact():
+    assert [contact(ROBOT, runs(()), NOISE)] == [None]
+    others = [remainder(seed) for seed in range(100, 108)]
+    assert contact(ROBOT, others, NOISE) is None
+
+
+@pytest.mark.parametrize("joint", range(5))
+def test_what_one_joint_shows_alone_is_no_contact(joint):
+    def jolt(motion):
+        added = np.zeros_like(motion.q)
+        added[:, joint] = 5 * NOISE[joint] * ((motion.time > 3.0) & (motion.time < 4.5))
+        return added
+
+    assert contact(ROBOT, runs((1, 4, 6), jolt), NOISE) is None
+
+
+def test_joints_that_are_jolted_at_once_but_by_no_force_are_no_contact():
+    def jolt(motion):
+        signs = np.array([1, -1, 1, 1, -1, 1])
+        inside = (motion.time > 3.0) & (motion.time < 4.5)
+        return 4 * NOISE * signs * np.sin(9 * motion.time[:, None] + np.arange(6)) * inside[:, None]
+
+    assert contact(ROBOT, runs((1, 4, 6), jolt), NOISE) is None
+
+
+def test_a_force_that_lasts_is_no_episode():
+    def weigh(motion):
+        return ExternalContact().contribution(ROBOT, motion, FORCE)
+
+    assert contact(ROBOT, runs((1, 4, 6), weigh), NOISE) is None
+
+
+def test_a_contact_of_a_reference_run_is_nobodys():
+    left = [remainder(2, push, observed=False), *(remainder(seed) for seed in range(10, 17))]
+    assert contact(ROBOT, left, NOISE) is None
+
+
+def test_undecided_samples_are_left_out():
+    left = runs((1, 4, 6))
+    for one in left:
+        one.residual[100:120, 2] = np.nan
+        one.residual[:5] = np.nan
+    assert contact(ROBOT, left, NOISE).effect.runs == ("run_1", "run_4", "run_6")
+
+
+def test_candidates_are_zero_in_runs_in_which_they_do_not_act():
+    shape = ExternalContact(3.0, 4.5, runs=("run_2",))
+    candidates = Candidates(ROBOT, [shape], np.ones((6, 3), dtype=bool), lambda whole: Predicted(whole.q))
+    for seed, acts in ((1, False), (2, True)):
+        motion = replace(swing(ROBOT, seed, seconds=8.0, rate=50.0), run=f"run_{seed}")
+        assert np.any(np.concatenate(candidates.part(motion), axis=1)) == acts
+
+
+def test_only_what_has_a_start_or_a_stop_is_brief():
+    assert is_transient(ExternalContact(3.0, 4.5))
+    assert not is_transient(ExternalContact())
+    assert not is_transient(Payload(runs=("run_1",)))
+
+
+def test_beside_reference_runs_what_acts_in_some_runs_is_a_change():
+    def hypothesis(scope, *effects):
+        return Hypothesis(effects[0].id, None, scope, tuple(Variant(e, (k,), ()) for k, e in enumerate(effects)))
+
+    everywhere, some = Payload(), Payload(runs=("run_1",))
+    tried = [hypothesis(MISSING, everywhere, some), hypothesis(MISSING, some), hypothesis(CHANGED, some)]
+    assert in_scope(tried, both=False) == tried
+    kept = in_scope(tried, both=True)
+    assert [(one.scope, [v.effect for v in one.variants]) for one in kept] == [
+        (MISSING, [everywhere]),
+        (CHANGED, [some]),
+    ]

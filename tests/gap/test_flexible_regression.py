@@ -1,0 +1,105 @@
+"""The yardstick, held to gaps whose size is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Predicted
+from irtwin.effects.stack import Stack
+from irtwin.gap.experiment.flexible_regression import FlexibleRegression, flexible_regression
+from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.gap.isolation.finding import find
+from irtwin.gap.regression.channel_equations import torque_system
+from irtwin.gap.regression.groups import Grouping
+from synthetic import arm, measure, swing
+
+ROBOT = arm(2)
+NOISE = 0.2
+
+
+def runs(added, count=5):
+    """Motions of the arm with torque that something adds to."""
+    made = []
+    for seed in range(count):
+        motion = replace(swing(ROBOT, seed, 12.0), run=f"run_{seed}")
+        shown = measure(ROBOT, motion, noise=NOISE, seed=seed)
+        made.append(replace(shown, torque=shown.torque + added(motion)))
+    return made
+
+
+def of(motions, tried=("stribeck_friction",)):
+    stack = Stack(ROBOT, BASELINE)
+    values = np.array([term.expected for _, term in stack.torque_terms])
+
+    def predicted(motion):
+        return stack.real_torque(motion, values)
+
+    effects = [shape for effect in tried for shape in catalogue()[effect].candidates(ROBOT)]
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
+    system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
+    case = SimpleNamespace(effects=BASELINE, robot=ROBOT, observed=grouping.observed)
+    finding = find("torque", case, system, np.full(2, NOISE), 0)
+    channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)))
+    return finding, flexible_regression(channel, motions, 0)
+
+
+def on_second(function):
+    def added(motion):
+        torque = np.zeros_like(motion.dq)
+        torque[:, 1] = function(motion.q[:, 1], motion.dq[:, 1])
+        return torque
+
+    return added
+
+
+def test_nothing_is_closeable_where_there_is_noise_alone():
+    _, found = of(runs(lambda motion: 0.0))
+    assert found.plain == pytest.approx(NOISE**2, rel=0.1)
+    assert np.all(found.plain_regressed > 0.97 * found.plain)
+
+
+def test_what_no_effect_names_is_nameless():
+    finding, found = of(runs(on_second(lambda q, dq: np.exp(-(((q - 0.3) / 0.2) ** 2)) * np.tanh(3 * dq))))
+    assert not finding.causes
+    shares = found.shares()
+    assert shares["nameless"] > 0.6
+    assert shares["nameless"] == pytest.approx(shares["closeable"], rel=1e-3)
+    assert shares["nameless_by_equation"][1] > 0.6
+
+
+def test_what_a_cause_closes_is_not_nameless():
+    finding, found = of(runs(on_second(lambda q, dq: 3 * np.sign(dq) * np.exp(-np.abs(dq) / 0.1))))
+    assert [cause.effect for cause in finding.causes] == ["stribeck_friction"]
+    shares = found.shares()
+    assert shares["closeable"] > 0.9
+    assert shares["by_regression"] > 0.5
+    assert shares["nameless"] < 0.05
+
+
+def test_the_same_seed_gives_the_same_yardstick():
+    motions = runs(on_second(lambda q, dq: np.sin(5 * q)), count=3)
+    one, other = (of(motions)[1] for _ in range(2))
+    assert np.array_equal(one.plain_regressed, other.plain_regressed)
+
+
+def test_one_short_run_has_none():
+    (run,) = runs(lambda motion: 0.0, count=1)
+    assert of([run.part(0, 40)])[1] is None
+
+
+def test_without_a_floor_shares_are_of_the_mean_square():
+    made = FlexibleRegression(np.array([4.0]), np.array([1.0]), np.array([2.0]), np.array([1.0]), None)
+    shares = made.shares()
+    assert (shares["closeable"], shares["nameless"]) == (0.75, 0.25)
+    assert "no floor" in shares["of"]
+
+
+def test_without_a_gap_there_are_no_shares():
+    one = np.array([1.0])
+    assert FlexibleRegression(one, one, one, one, np.array([1.1])).shares()["closeable"] is None
+    assert FlexibleRegression(one, one, one, one, np.array([0.98])).shares()["closeable_by_equation"] == [None]

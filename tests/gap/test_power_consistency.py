@@ -1,0 +1,82 @@
+"""Whether a cause of torque is mechanical or lies in its measurement, as power tells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.power_consistency import PowerBalance, filtered, kind_of, refuted
+from irtwin.signals.log import DataSet
+from synthetic import arm, as_run, measure, swing, truth
+
+ROBOT = arm(2)
+KNOWN = catalogue()
+WITH_LOSS = (*BASELINE, "copper_loss")
+MECHANICAL, SENSOR, UNDECIDED = PowerBalance(0.5, 8.0), PowerBalance(-0.5, -8.0), PowerBalance(0.5, 1.0)
+
+
+def data_set(real=None, late=0.0):
+    """Six runs in which joint 1 has a `real` torque more, and its sensor is `late` by some seconds."""
+    made = []
+    for k in range(6):
+        motion = replace(swing(ROBOT, k // 2, seconds=10.0), run=f"run_{k}")
+        plain = measure(ROBOT, motion, noise=0.3, seed=k)
+        more = np.zeros_like(motion.dq)
+        if real is not None:
+            more[:, 0] = real(motion)
+        loss = truth(ROBOT)["R"] / 8.0**2 * ((2 * plain.current * 8.0 + more) * more)
+        power = plain.power + (more * motion.dq + loss).sum(axis=1)
+        torque = plain.torque + more
+        torque[:, 0] = np.interp(motion.time - late, motion.time, torque[:, 0])
+        run = as_run(replace(plain, current=None, torque=torque, power=power))
+        made.append(replace(run, repeat_of=f"run_{k - 1}" if k % 2 else None))
+    return DataSet(Path("arm"), ROBOT, tuple(made), WITH_LOSS, None, "mains", True, {})
+
+
+def cause(effect, *rivals):
+    return Cause(effect, "missing", ("joint_1",), (), 1.0, 5.0, 0.001, rivals)
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        ({"real": lambda m: 4 * np.sign(m.dq[:, 0]) * np.exp(-np.abs(m.dq[:, 0]) / 0.1)}, "mechanical"),
+        ({"real": lambda m: 3 * np.cos(4 * m.q[:, 0]) * np.sign(m.dq[:, 0])}, "mechanical"),
+        ({"late": 0.05}, "sensor"),
+    ],
+)
+def test_power_says_of_what_kind_a_cause_is(made, said):
+    document = diagnose(data_set(**made)).to_json()
+    first = document["causes"][0]
+    assert first["joints"] == ["joint_1"]
+    assert first["evidence"]["power_says"] == said
+    assert kind_of(KNOWN[first["effect"]]) == said
+    assert all(kind_of(KNOWN[rival]) == said for rival in first["indistinguishable_from"])
+
+
+def test_power_drops_rivals_of_the_other_kind():
+    friction = cause("load_dependent_friction", "torque_constant_error", "stribeck_friction")
+    assert filtered(friction, MECHANICAL, KNOWN).rivals == ("stribeck_friction",)
+    gain = cause("torque_constant_error", "load_dependent_friction", "time_delay")
+    assert filtered(gain, SENSOR, KNOWN).rivals == ("time_delay",)
+
+
+def test_power_that_does_not_decide_drops_nothing():
+    friction = cause("load_dependent_friction", "torque_constant_error")
+    assert filtered(friction, UNDECIDED, KNOWN) == friction
+    assert filtered(friction, PowerBalance(0.01, 9.0), KNOWN) == friction
+    assert refuted([friction], [UNDECIDED], KNOWN) == frozenset()
+
+
+def test_power_refutes_a_cause_that_has_a_rival_of_the_right_kind():
+    gain = cause("torque_constant_error", "load_dependent_friction")
+    assert refuted([gain], [MECHANICAL], KNOWN) == {"torque_constant_error"}
+    assert filtered(gain, MECHANICAL, KNOWN) == gain
+    alone = cause("torque_constant_error", "time_delay")
+    assert refuted([alone], [MECHANICAL], KNOWN) == frozenset()

@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+import numpy as np
+
+from irtwin.gap.regression import progress
+from irtwin.gap.regression.progress import with_progress
+from irtwin.identification.accumulate import Rows
+from synthetic import arm, swing
+
+ROBOT = arm(2)
+MOTIONS = [swing(ROBOT, seed, seconds=4.0) for seed in (1, 2)]
+
+
+def equations(motion):
+    return Rows(np.ones((len(motion.time), 1, 1)), np.zeros((len(motion.time), 1)), motion.q[:, :1])
+
+
+def said(motions, every, monkeypatch):
+    monkeypatch.setattr(progress, "_EVERY", every)
+    lines = []
+    asked = with_progress(equations, motions, lines.append)
+    for motion in motions:
+        for piece in motion.pieces(100):
+            np.testing.assert_array_equal(asked(piece).measured, piece.q[:, :1])
+    return lines
+
+
+def test_long_work_says_how_far_it_has_come(monkeypatch):
+    lines = said(MOTIONS, 0.0, monkeypatch)
+    assert lines[1] == "  run 1 of 2, 25 % of it"
+    assert lines[-1] == "  run 2 of 2, 75 % of it"
+
+
+def test_short_work_says_nothing(monkeypatch):
+    assert said(MOTIONS, 60.0, monkeypatch) == []
+    assert with_progress(equations, MOTIONS, None) is equations
