@@ -11,9 +11,11 @@ from pathlib import Path
 import pytest
 
 from endpoint import make_graph
+from irtwin import workflow
 from irtwin.asking import ask, explain, export, questions
 from irtwin.errors import InputError
 from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.storage.database import Workspace
 
 ROBOTS = "SELECT ?robot { ?robot a irt:Industrial_Robot }"
 
@@ -38,6 +40,14 @@ def test_a_question_is_answered_while_another_process_writes(workspace: Path, wr
     assert len(ask(ROBOTS, workspace)) == 3
     with ThreadPoolExecutor(4) as threads:
         assert [len(found) for found in threads.map(lambda _: ask(ROBOTS, workspace), range(8))] == [3] * 8
+
+
+def test_a_run_shows_its_graph_when_it_has_ended(workspace: Path) -> None:
+    with Workspace(workspace) as place:
+        with workflow._graph(place, None) as graph:
+            graph.update("DELETE WHERE { ?robot a irt:Industrial_Robot }")
+            assert len(ask(ROBOTS, workspace)) == 2
+        assert len(ask(ROBOTS, workspace)) == 0
 
 
 def test_so_are_the_other_readers(workspace: Path, writer: KnowledgeGraph, tmp_path: Path) -> None:
