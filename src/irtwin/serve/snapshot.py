@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Self
 
 from irtwin.errors import InputError
-from irtwin.knowledge.damage import check_files
+from irtwin.knowledge.damage import check_files, damaged
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.serve.linked import linked, remove_left_behind
 
@@ -76,7 +76,7 @@ class Snapshot:
                         self._view, self.graph = view.pop_all(), graph
                         return
             time.sleep(0.01)
-        raise InputError(f"{self._folder}: the graph cannot be read: {reason}")
+        raise InputError(damaged(self._folder, reason))
 
     def _opened(self, view: ExitStack) -> KnowledgeGraph:
         workspace, files = self._folder.parent, self._folder
