@@ -14,6 +14,7 @@ from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.providers.joint_stream import StateReader, feed, lines_of, listening
 from irtwin.providers.live import LiveTwin
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import told_when_full
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 _MOST_REASONS = 20  # said of refused lines
@@ -43,6 +44,7 @@ def watch(
             announce(f"refused: {reason}")
 
     with (
+        told_when_full(workspace),
         Workspace.existing(workspace, database) as place,
         KnowledgeGraph.of_workspace(place, graph_url) as graph,
         LiveTwin(place, graph, announce) as twin,

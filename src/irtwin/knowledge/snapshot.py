@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from irtwin.errors import InputError
-from irtwin.knowledge.damage import check_files
+from irtwin.knowledge.damage import check_files, damaged
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.linked import found, linked, published, remove_left_behind
 
@@ -122,7 +122,7 @@ def _whole(source: Callable[[], Path], do: Callable[[Path, ExitStack], T]) -> tu
                 if _belonging(folder) == belonging and folder == source():
                     return view.pop_all(), made
         time.sleep(0.01)
-    raise InputError(f"{source()}: the graph cannot be read: {reason}")
+    raise InputError(damaged(source(), reason))
 
 
 def _belonging(folder: Path) -> Stamp:

@@ -48,6 +48,8 @@ def note_sums(folder: Path) -> None:
 
 
 def _fault(folder: Path) -> str | None:
+    if (folder / "CURRENT").exists() and not _manifest(folder):
+        return "the manifest that CURRENT names is missing"
     sums = _sums(folder)
     for name, size in (_tables(folder) or {}).items():
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import shutil
@@ -11,6 +12,19 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from irtwin.errors import InputError
+
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+
+
+@contextmanager
+def told_when_full(place: Path) -> Iterator[None]:
+    """Raise InputError where the disk takes no more; other errors pass."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        raise InputError(f"{place}: cannot be written ({error.strerror}); make room and do it again") from error
 
 
 @contextmanager
@@ -22,7 +36,8 @@ def temporary_beside(folder: Path) -> Iterator[Path]:
     path = Path(name)
     path.chmod(0o644)
     try:
-        yield path
+        with told_when_full(folder):
+            yield path
     finally:
         path.unlink(missing_ok=True)
 
@@ -33,7 +48,11 @@ def working_folder(parent: Path, prefix: str) -> Iterator[Path]:
     for left in parent.glob(f"{prefix}*"):
         with suppress(OSError), _locked(left):  # else it is in use
             shutil.rmtree(left)
-    with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as name, _locked(Path(name)):
+    with (
+        told_when_full(parent),
+        tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as name,
+        _locked(Path(name)),
+    ):
         yield Path(name)
 
 

@@ -1,0 +1,205 @@
+"""A workspace whose files were lost or altered: each command answers, or says in one line what to do."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from data_sets import irtwin
+from irtwin import upkeep
+from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.mapping import refresh
+from irtwin.providers.records import ingest
+from irtwin.resources import folder as resource
+from irtwin.signals.log import read_data_set
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Base
+from small_robots import data_set
+
+COUNT = "SELECT (COUNT(*) AS ?count) { ?s ?p ?o }"
+NAMES = "SELECT ?name { ?robot irt:IR_Name ?name } ORDER BY ?name"
+Damage = Callable[[Path], object]
+
+
+def flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 16] = bytes(255 - byte for byte in content[middle : middle + 16])
+    file.write_bytes(content)
+
+
+DAMAGES: dict[str, Damage] = {
+    "deleted": Path.unlink,
+    "empty": lambda file: file.write_bytes(b""),
+    "cut": lambda file: file.write_bytes(file.read_bytes()[: file.stat().st_size // 2]),
+    "flipped": flip,
+    "random": lambda file: file.write_bytes(random.Random(3).randbytes(file.stat().st_size)),
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace with two robots taken in and mapped."""
+    folder = tmp_path_factory.mktemp("made")
+    with Workspace(folder / "workspace") as place:
+        for seed, name in enumerate(("First", "Second arm"), start=1):
+            ingest(place, read_data_set(data_set(folder / name, name, seed=seed)))
+        with KnowledgeGraph(place.graph_folder) as graph:
+            graph.load_ontology()
+            refresh(graph, place.engine, sorted(resource("mappings").glob("*.r2rml.ttl")), place.mapped_rows)
+    return folder / "workspace"
+
+
+@pytest.fixture
+def workspace(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "workspace"))
+
+
+def asked(workspace: Path, question: str) -> str:
+    said = irtwin("query", question, "--workspace", workspace, "--format", "csv")
+    assert said.status == 0, said.err
+    return said.out
+
+
+def one_line(workspace: Path, *arguments: object) -> str:
+    said = irtwin(*arguments, "--workspace", workspace)
+    assert said.status == 2, said.out
+    (line,) = said.err.splitlines()
+    return line
+
+
+def tables(workspace: Path) -> list[Path]:
+    return sorted((workspace / "graph").glob("*.sst"))
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_table_of_the_graph_is_told_before_it_is_read(workspace: Path, damage: str) -> None:
+    for file in tables(workspace):
+        content = file.read_bytes()
+        DAMAGES[damage](file)
+        assert f"`irtwin repair --workspace {workspace}`" in one_line(workspace, "query", COUNT)
+        file.write_bytes(content)
+    assert asked(workspace, NAMES)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("pattern", ["CURRENT", "MANIFEST-*"])
+def test_the_files_that_a_graph_begins_with(workspace: Path, pattern: str, damage: str) -> None:
+    (file,) = (workspace / "graph").glob(pattern)
+    DAMAGES[damage](file)
+    for command in (("query", COUNT), ("backup", workspace / "kept.zip"), ("export", "--owl", workspace / "x.owl")):
+        assert "`irtwin repair --workspace" in one_line(workspace, *command)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_log_of_the_graph_holds_nothing_once_it_is_closed(made: Path, workspace: Path, damage: str) -> None:
+    for file in (workspace / "graph").glob("*.log"):
+        if file.stat().st_size or damage in ("deleted", "random"):
+            DAMAGES[damage](file)
+    assert asked(workspace, COUNT) == asked(made, COUNT)
+
+
+def test_a_lost_graph_is_not_begun_anew_in_silence(workspace: Path) -> None:
+    shutil.rmtree(workspace / "graph")
+    for command in (("query", COUNT), ("backup", workspace / "kept.zip"), ("drop", "First")):
+        assert "graph is missing" in one_line(workspace, *command)
+    assert not (workspace / "graph").exists()
+
+
+@pytest.mark.parametrize("damage", [each for each in DAMAGES if each != "flipped"])  # SQLite sums no contents
+def test_a_damaged_database_is_told(workspace: Path, damage: str) -> None:
+    DAMAGES[damage](workspace / "irtwin.db")
+    for command in (("query", COUNT), ("repair",), ("backup", workspace / "kept.zip"), ("drop", "First")):
+        assert "`irtwin restore ARCHIVE --workspace NEW`" in one_line(workspace, *command)
+
+
+def test_a_database_that_lacks_a_table_is_told(workspace: Path) -> None:
+    with Workspace(workspace) as place, place.engine.begin() as connection:
+        connection.exec_driver_sql("DROP TABLE joint_energy")
+    assert "table joint_energy is missing" in one_line(workspace, "query", COUNT)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_remembered_rows_are_made_anew(made: Path, workspace: Path, damage: str) -> None:
+    """Though a robot goes at the same time, whose rows are looked up in them."""
+    DAMAGES[damage](workspace / "mapped_rows.db")
+    with Workspace(workspace) as place:
+        place.drop_robot("First")
+        with KnowledgeGraph.of_workspace(place) as graph:
+            refresh(graph, place.engine, sorted(resource("mappings").glob("*.r2rml.ttl")), place.mapped_rows)
+    assert asked(workspace, NAMES).split() == ["name", "Second", "arm"]
+
+
+@pytest.fixture
+def unreasoned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reasoning has tests of its own, and takes long."""
+    monkeypatch.setattr(upkeep, "reason", lambda graph: None)
+    monkeypatch.setattr(upkeep, "conclude", lambda graph, announce: None)
+    monkeypatch.setattr(upkeep, "populate_others", lambda place, graph, announce: False)
+
+
+@pytest.mark.parametrize("damage", ["none", "flipped", "folder"])
+def test_repair_makes_the_graph_of_the_database(made: Path, workspace: Path, unreasoned: None, damage: str) -> None:
+    if damage == "flipped":
+        flip(tables(workspace)[-1])
+    elif damage == "folder":
+        shutil.rmtree(workspace / "graph")
+    said = irtwin("repair", "--workspace", workspace)
+    assert said.status == 0, said.err
+    assert asked(workspace, COUNT) == asked(made, COUNT)
+    assert asked(workspace, NAMES) == asked(made, NAMES)
+    assert (workspace / "graph.damaged").exists() == (damage == "flipped")
+    assert not list(workspace.glob(".*"))
+
+
+def test_repair_keeps_what_updates_wrote(workspace: Path, unreasoned: None) -> None:
+    with KnowledgeGraph(workspace / "graph") as graph:
+        graph.update('INSERT DATA { id:robot irt:Note "mine" . GRAPH <urn:x> { id:robot irt:Note "named" } }')
+    assert irtwin("repair", "--workspace", workspace).status == 0
+    assert asked(workspace, "SELECT ?note { id:robot irt:Note ?note } ORDER BY ?note").split() == [
+        "note", "mine", "named",
+    ]  # fmt: skip
+
+
+def test_repair_says_which_files_are_lost(workspace: Path, unreasoned: None) -> None:
+    file = next((workspace / "series").iterdir())
+    file.unlink()
+    said = irtwin("repair", "--workspace", workspace)
+    assert said.status == 2
+    assert f"  series/{file.name} of " in said.err
+    assert "the graph is whole again, but files are lost (1)" in said.err
+
+
+def test_a_graph_in_use_is_not_repaired(workspace: Path) -> None:
+    code = "import sys; from pyoxigraph import Store; store = Store(sys.argv[1]); print(flush=True); sys.stdin.read()"
+    command = [sys.executable, "-c", code, str(workspace / "graph")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert "another process has the graph open; end it first" in one_line(workspace, "repair")
+        process.kill()
+
+
+def test_a_dropped_robot_is_forgotten(workspace: Path, unreasoned: None) -> None:
+    report = workspace / "reports" / "First.html"
+    report.parent.mkdir()
+    report.write_text("<html>")
+    assert 'no robot "Frist" here; the nearest is "First"' in one_line(workspace, "drop", "Frist")
+    assert irtwin("drop", "First", "--workspace", workspace).status == 0
+    assert not report.exists()
+    with Workspace(workspace) as place, place.reading() as session:
+        for table in Base.metadata.sorted_tables:
+            assert not [row for row in session.execute(select(table)) if "First" in str(row)]
+        assert len(list((workspace / "series").iterdir())) == 3
+    assert asked(
+        workspace, 'SELECT ?s { ?s ?p ?o FILTER(CONTAINS(STR(?s), "First") || STR(?o) = "First") }'
+    ).split() == ["s"]
+    assert irtwin("drop", "Second arm", "--workspace", workspace).status == 0
+    assert asked(workspace, NAMES).split() == ["name"]

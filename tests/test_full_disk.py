@@ -1,0 +1,48 @@
+"""A disk that fills, as a limit on the size of files makes it: one line, exit status 2, and the earlier state."""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from data_sets import irtwin
+from small_robots import data_set
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    done = irtwin("run", data_set(folder / "first", "First"), "--workspace", folder / "workspace")
+    assert done.status == 0, done.err
+    data_set(folder / "second", "Second", seed=5)
+    return folder
+
+
+@pytest.mark.parametrize("size", [1, 8, 40, 100, 200, 500, 1000])
+@pytest.mark.parametrize("command", ["run", "backup"])
+def test_a_full_disk_is_one_line(made: Path, tmp_path: Path, command: str, size: int) -> None:
+    """size: kB that the longest file may have, so that each step of the way is met by one."""
+    workspace = shutil.copytree(made / "workspace", tmp_path / "workspace")
+    what = made / "second" if command == "run" else tmp_path / "kept.zip"
+    asked = ("query", "energy_per_run", "--workspace", workspace, "--format", "csv")
+    before = irtwin(*asked).out
+    done = subprocess.run(
+        [sys.executable, "-m", "irtwin", command, str(what), "--workspace", str(workspace)],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size << 10, size << 10)),
+    )
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.splitlines()[-1].startswith("irtwin: ")
+    assert irtwin(*asked).out == before
+    assert not (tmp_path / "kept.zip").exists()
+    assert not list(workspace.glob(".*"))
