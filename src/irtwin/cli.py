@@ -288,7 +288,8 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     click.echo("\nStopped: this is the best so far." if motion.interrupted else "", err=True)
     click.echo(
         f"{out}: condition number {motion.condition_number:.1f}, "
-        f"{motion.limit_margin:.1%} of the joint limits to spare, {motion.clearance:.3f} m to the nearest wall"
+        f"{motion.limit_margin:.1%} of the joint limits to spare, "
+        + ("no wall in reach" if motion.clearance == math.inf else f"{motion.clearance:.3f} m to the nearest wall")
     )
 
 

@@ -114,3 +114,23 @@ def test_odd_signals_are_diagnosed(changes, tmp_path):
 def test_what_would_pass_for_no_gap_is_refused(changes, seconds, message):
     with pytest.raises(InputError, match=message):
         diagnose(data_set(arm(2), runs(arm(2), 1, seconds, **changes)))
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "message"),
+    [
+        (('mass value="8.0"', 'mass value="1e300"'), 'arm_2: m of "link_1" is 1e+300 kg'),
+        (('<origin xyz="0.03 0.02', '<origin xyz="0.03 1e150'), "arm_2: m"),
+    ],
+)
+def test_bodies_that_no_robot_has_are_refused(spoilt, message):
+    robot = parse_urdf(arm(2).urdf.replace(*spoilt))
+    assert spoilt[1] in robot.urdf
+    with pytest.raises(InputError, match=message.replace("+", ".") + ".* as no robot has; mend the URDF"):
+        diagnose(data_set(robot, runs(arm(2), 2)))
+
+
+def test_a_payload_that_no_robot_carries_is_refused():
+    made = [replace(run, payload_mass=1e300) for run in runs(arm(2), 2)]
+    with pytest.raises(InputError, match=r'run "run_0": a payload of 1e\+300 kg; give 0 to'):
+        diagnose(data_set(arm(2), made))

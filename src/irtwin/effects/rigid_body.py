@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.effects.effect import Effect, Predicted, Term
+from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange
 from irtwin.signals.motion import Motion
@@ -17,6 +18,7 @@ from irtwin.signals.motion import Motion
 NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 _UNITS = ("kg",) + ("kg m",) * 3 + ("kg m^2",) * 6
 _LIGHT = 1e-6  # kg
+_HEAVIEST, _FARTHEST = 1e5, 1e3  # kg, m: of a payload
 _SPREAD = 50.0  # kg: no link of an arm that lifts up to some ten kg is farther off
 
 
@@ -61,7 +63,11 @@ class RigidBody(Effect):
         return inverse_dynamics(model_of(robot, values), motion)
 
     def shift(self, robot: Robot, motion: Motion) -> np.ndarray:
-        """Return the payload that the controller was told, as a point mass on the last body."""
+        """Return the payload that the controller was told, as a point mass on the last body.
+
+        Raises InputError on one that no robot carries.
+        """
+        _check_payload(motion)
         model = robot.model
         added = np.zeros(10 * model.nv)
         if motion.payload_mass:
@@ -71,6 +77,17 @@ class RigidBody(Effect):
             first = 10 * (frame.parentJoint - 1)
             added[first : first + 10] = load.toDynamicParameters()
         return added
+
+
+def _check_payload(motion: Motion) -> None:
+    mass, com = motion.payload_mass, motion.payload_com
+    if not 0 <= mass <= _HEAVIEST:
+        raise InputError(f'run "{motion.run}": a payload of {mass:g} kg; give 0 to {_HEAVIEST:g} kg')
+    if not all(abs(part) <= _FARTHEST for part in com):
+        shown = ", ".join(f"{part:g}" for part in com)
+        raise InputError(
+            f'run "{motion.run}": a payload at {shown} m; give its place in the flange frame, within {_FARTHEST:g} m'
+        )
 
 
 def flange_frame(robot: Robot) -> pin.Frame:

@@ -14,6 +14,7 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+_LARGEST = 1e15  # SI: beyond, squares of what a coefficient does are no numbers
 _PIECE = 4096  # samples whose columns are held at once
 
 
@@ -31,7 +32,7 @@ class Stack:
     """The effects of a robot of n joints: K coefficients of the torque signal, L of the power signal."""
 
     def __init__(self, robot: Robot, effects: Sequence[str | Effect]):
-        """Take effects or their ids. Raise InputError on an id or joint that is unknown, or on one effect twice."""
+        """Take effects or their ids. Raise InputError on an unknown id or joint, an effect twice, or an absurd body."""
         known = catalogue()
         for effect in effects:
             if isinstance(effect, str) and effect not in known:
@@ -59,6 +60,11 @@ class Stack:
             if key in seen:
                 raise InputError(f'effect "{effect.id}" stands there twice; name it once')
             seen.add(key)
+            if not (abs(term.expected) <= _LARGEST and term.spread <= _LARGEST):
+                raise InputError(
+                    f'{self.robot.name}: {term.name} of "{term.link or term.joint}" is {term.expected:g} {term.unit}, '
+                    f"give or take {term.spread:g}, as no robot has; mend the URDF"
+                )
 
     @cached_property
     def torque_terms(self) -> tuple[tuple[Effect, Term], ...]:

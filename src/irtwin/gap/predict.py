@@ -8,14 +8,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from irtwin.errors import InputError
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import Run, payload_told
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.twin.twin import Twin
-
-_HEAVIEST, _FARTHEST = 1e5, 1e3  # kg, m: beyond what any robot carries
 
 
 def read_motion(
@@ -24,33 +21,22 @@ def read_motion(
     """Read a run of the twin's robot, of which the motion is enough.
 
     payload_mass kg, payload_com m in the flange frame: what the controller was told; None takes it from the data set
-    that lists the file. Raises InputError on a file that is no run of the robot, or a payload that cannot be.
+    that lists the file. Raises InputError on a file that is no run of the robot.
     """
     signals, _ = read_signals(file, twin.robot, measured=False)
     mass, com = payload_told(file) if payload_mass is None or payload_com is None else (0.0, (0.0, 0.0, 0.0))
-    mass = mass if payload_mass is None else payload_mass
-    com = com if payload_com is None else payload_com
-    _check_payload(mass, com)
     return Run(
         name=file.stem,
         file=file,
         sha256="",
         role="observed",
-        payload_mass=mass,
-        payload_com=com,
+        payload_mass=mass if payload_mass is None else payload_mass,
+        payload_com=com if payload_com is None else payload_com,
         repeat_of=None,
         started=None,
         notes={},
         signals=signals,
     )
-
-
-def _check_payload(mass: float, com: tuple[float, float, float]) -> None:
-    if not 0 <= mass <= _HEAVIEST:
-        raise InputError(f"a payload of {mass:g} kg: give 0 to {_HEAVIEST:g} kg")
-    if not all(abs(part) <= _FARTHEST for part in com):
-        shown = ", ".join(f"{part:g}" for part in com)
-        raise InputError(f"a payload at {shown} m: give its place in the flange frame, within {_FARTHEST:g} m")
 
 
 def predict(twin: Twin, run: Run) -> pa.Table:
