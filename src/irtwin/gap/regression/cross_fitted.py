@@ -13,6 +13,8 @@ from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.signals.motion import Motion
 
+_PIECE = 32768  # samples whose columns are held at once
+
 PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
@@ -60,7 +62,12 @@ def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torq
     standing = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
 
     def power_of(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        columns = stack.power_columns(motion, torque)
-        return columns @ values, columns @ np.where(standing, 0.0, values)
+        both = []
+        for piece in motion.pieces(_PIECE):
+            start = piece.start - motion.start
+            columns = stack.power_columns(piece, torque[start : start + len(piece.time)])
+            both.append((columns @ values, columns @ np.where(standing, 0.0, values)))
+        power, axes = zip(*both, strict=True)
+        return np.concatenate(power), np.concatenate(axes)
 
     return power_of
