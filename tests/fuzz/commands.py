@@ -70,7 +70,7 @@ def try_case(case: Case) -> Fault | None:
                 file.unlink(missing_ok=True)
             patience = _EXCITING if command == "excite" else None
             done = in_child(partial(_main, arguments), folder, stdin, patience)
-            kind = _fault(done, writes)
+            kind = fault_of(done, writes)
             if kind is not None:
                 return Fault(f"{place + 1}: {command}", f"{command}: {kind}", done.err[-6000:])
             if done.status:
@@ -165,7 +165,7 @@ def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
         os._exit(status)
 
 
-def _fault(done: Done, writes: list[Path]) -> str | None:
+def fault_of(done: Done, writes: list[Path]) -> str | None:
     """Say what is wrong with how a command ended; None where nothing is."""
     if done.status == -signal.SIGKILL:
         return f"hang of {SECONDS} s"
