@@ -64,4 +64,5 @@ def cases(draw: st.DrawFn) -> Case:
     """Draw a case; one in three data sets is spoilt, one in eight goes into a workspace."""
     spoilt = draw(spoils()) if draw(st.integers(0, 2)) == 0 else ()
     commands = draw(st.sampled_from((ALONE,) * 6 + (WITH_WORKSPACE, ("excite",))))
-    return Case(draw(data_sets()), spoilt, commands, draw(streams()))
+    stream = draw(streams()) if "live" in commands else StreamPlan()
+    return Case(draw(data_sets()), spoilt, commands, stream)

@@ -30,6 +30,7 @@ import irtwin.workflow  # here, once, not in each child
 SECONDS = 60
 MEGABYTES = 2000  # beside what the libraries take
 _EXCITING = 4.0  # s until Ctrl-C: the best motion so far is kept
+_STOPPED = 130  # exit status after Ctrl-C
 LONGEST_LINE = 2000  # characters of an error
 _STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
@@ -70,7 +71,9 @@ def try_case(case: Case) -> Fault | None:
                 file.unlink(missing_ok=True)
             patience = _EXCITING if command == "excite" else None
             done = in_child(partial(_main, arguments), folder, stdin, patience)
-            kind = _fault(done, writes)
+            if patience is not None and done.status == _STOPPED:
+                continue  # before there was a motion to keep
+            kind = fault_of(done, writes)
             if kind is not None:
                 return Fault(f"{place + 1}: {command}", f"{command}: {kind}", done.err[-6000:])
             if done.status:
@@ -165,7 +168,7 @@ def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
         os._exit(status)
 
 
-def _fault(done: Done, writes: list[Path]) -> str | None:
+def fault_of(done: Done, writes: list[Path]) -> str | None:
     """Say what is wrong with how a command ended; None where nothing is."""
     if done.status == -signal.SIGKILL:
         return f"hang of {SECONDS} s"

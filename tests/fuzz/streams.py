@@ -12,7 +12,7 @@ NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 
 @dataclass(frozen=True)
 class StreamPlan:
-    """States at 100 Hz from `start` on; `odd` are lines put in at a place, with `time` and `position` spoilt."""
+    """States at 100 Hz from `start` on; `odd` are lines put in at a place, by their names."""
 
     start: float = NOON
     states: int = 50
@@ -25,33 +25,33 @@ def lines(plan: StreamPlan, robot_id: str, joints: int) -> bytes:
     out = []
     for number in range(plan.states):
         if number in odd:
-            out.append(odd[number].replace("ROBOT", json.dumps(robot_id)).encode())
+            out.append(ODD[odd[number]].replace("ROBOT", json.dumps(robot_id)).encode())
         time = plan.start + number / 100
         said = {"robot": robot_id, "time": time, "position": [0.01 * number] * joints, "effort": [1.0] * joints}
         out.append(json.dumps(said).encode())
     return b"\n".join(out) + b"\n"
 
 
-_ODD = (
-    "",
-    "{",
-    "[]",
-    "[" * 5000,
-    '{"robot": ROBOT}',
-    '{"robot": ROBOT, "time": 253402300799.0, "position": [0]}',
-    '{"robot": ROBOT, "time": 1772369000.0, "position": [0]}',
-    '{"robot": ROBOT, "time": 0, "position": [0]}',
-    '{"robot": ROBOT, "time": 1e999, "position": [0]}',
-    '{"robot": ROBOT, "time": NaN, "position": [NaN]}',
-    '{"robot": ROBOT, "time": 1772366400.255, "position": [1e300], "effort": [1e300], "velocity": [-1e300]}',
-    '{"robot": ROBOT, "time": 1772366400.255, "position": [' + "9" * 5000 + "]}",
-    '{"robot": ROBOT, "time": 1772366400.255, "position": [1], "name": [{}]}',
-    '{"robot": "\\ud800", "time": 1, "position": [1]}',
-    "x" * 70000,
-)
+ODD = {
+    "empty": "",
+    "cut off": "{",
+    "no object": "[]",
+    "deep": "[" * 5000,
+    "no time": '{"robot": ROBOT}',
+    "year 9999": '{"robot": ROBOT, "time": 253402300799.0, "position": [0]}',
+    "an hour off": '{"robot": ROBOT, "time": 1772369000.0, "position": [0]}',
+    "1970": '{"robot": ROBOT, "time": 0, "position": [0]}',
+    "beyond a float": '{"robot": ROBOT, "time": 1e999, "position": [0]}',
+    "no number": '{"robot": ROBOT, "time": NaN, "position": [NaN]}',
+    "huge": '{"robot": ROBOT, "time": 1772366400.255, "position": [1e300], "effort": [1e300], "velocity": [-1e300]}',
+    "many digits": '{"robot": ROBOT, "time": 1772366400.255, "position": [' + "9" * 5000 + "]}",
+    "odd names": '{"robot": ROBOT, "time": 1772366400.255, "position": [1], "name": [{}]}',
+    "half a character": '{"robot": "\\ud800", "time": 1, "position": [1]}',
+    "long": "x" * 70000,
+}
 
 
 def streams() -> st.SearchStrategy[StreamPlan]:
     """Draw a stream."""
-    odd = st.lists(st.tuples(st.integers(0, 49), st.sampled_from(_ODD)), max_size=4).map(tuple)
+    odd = st.lists(st.tuples(st.integers(0, 49), st.sampled_from(sorted(ODD))), max_size=4).map(tuple)
     return st.builds(StreamPlan, start=st.sampled_from((NOON, NOON, 0.0, 1e9, 253402300700.0)), odd=odd)

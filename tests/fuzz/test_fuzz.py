@@ -1,0 +1,61 @@
+"""A small fixed part of `make fuzz`: the same few cases each time, and the harness itself."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from case import ALONE, Case, cases, read_case
+from commands import fault_of, in_child, try_case
+from hypothesis import HealthCheck, Phase, given, settings
+
+FEW = settings(
+    max_examples=12, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+)
+
+
+@FEW
+@given(cases())
+def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(case: Case):
+    fault = try_case(replace(case, commands=ALONE))
+    assert fault is None, f"{fault.kind}\n{fault.said}\n{case.to_json()}"
+
+
+@settings(deadline=None, max_examples=50)
+@given(cases())
+def test_a_case_that_is_kept_reads_as_it_was(case: Case):
+    assert read_case(case.to_json()) == case
+
+
+def _fills_the_memory() -> None:
+    np.ones(500_000_000)
+
+
+def _warns() -> None:
+    warnings.warn("no good", RuntimeWarning, stacklevel=1)
+
+
+def _says_two_lines() -> None:
+    sys.exit(print("irtwin: one\nirtwin: two", file=sys.stderr) or 2)
+
+
+def _leaves() -> None:
+    sys.exit(5)
+
+
+@pytest.mark.parametrize(
+    ("work", "kind"),
+    [
+        (_fills_the_memory, "MemoryError"),
+        (_warns, "RuntimeWarning: no good"),
+        (_says_two_lines, "2 lines of error"),
+        (_leaves, "exit status 5"),
+        (lambda: None, "out.json is not whole"),
+    ],
+)
+def test_the_harness_sees_each_kind_of_fault(work, kind, tmp_path: Path):
+    assert kind in str(fault_of(in_child(work, tmp_path), [tmp_path / "out.json"]))
