@@ -107,8 +107,12 @@ class _Part:
 
 
 def _parts(channel: PlannedEquations, motions: Sequence[Motion]) -> Iterator[_Part]:
-    """Yield stretches of the runs, thinned, with what the twin leaves of them."""
+    """Yield stretches of the runs, thinned, with what the twin leaves of them.
+
+    Temperature is a variable where all runs have it.
+    """
     own = [m for m in motions if (m.torque if channel.finding.name == "torque" else m.power) is not None]
+    warm = all(motion.temperature is not None for motion in own)
     share = max(1, _SAMPLES // max(len(own), 1))
     total = min(share * len(own), sum(len(motion.time) for motion in own))
     for motion in own:
@@ -117,10 +121,10 @@ def _parts(channel: PlannedEquations, motions: Sequence[Motion]) -> Iterator[_Pa
         starts = np.linspace(0, len(motion.time) - length // count, count).astype(int)
         for start in starts:
             part = motion.part(int(start), int(start) + length // count)
-            yield from _part(channel, part, max(1, total // _ROWS))
+            yield from _part(channel, part, max(1, total // _ROWS), warm)
 
 
-def _part(channel: PlannedEquations, part: Motion, thinned: int) -> Iterator[_Part]:
+def _part(channel: PlannedEquations, part: Motion, thinned: int, warm: bool) -> Iterator[_Part]:
     plain, closed, undecided = channel.residuals(part)
     if part.cutoff:
         undecided = np.abs(low_pass(undecided.astype(float), part.rate, part.cutoff)) > 0.1
@@ -132,7 +136,7 @@ def _part(channel: PlannedEquations, part: Motion, thinned: int) -> Iterator[_Pa
     if not kept.any():
         return
     torque = channel.finding.name == "torque"
-    variables = _of_joints(channel, part) if torque else [_of_power(channel, part)]
+    variables = _of_joints(channel, part, warm) if torque else [_of_power(channel, part, warm)]
     speeds = part.dq if torque else np.zeros((len(part.time), 1))
     signs = np.where(np.abs(speeds) < _STANDSTILL, 0.0, np.sign(speeds))
     decided = np.where(undecided, np.nan, 1.0)[kept]
@@ -141,7 +145,7 @@ def _part(channel: PlannedEquations, part: Motion, thinned: int) -> Iterator[_Pa
     )
 
 
-def _of_joints(channel: PlannedEquations, part: Motion) -> list[np.ndarray]:
+def _of_joints(channel: PlannedEquations, part: Motion, warm: bool) -> list[np.ndarray]:
     """Return each joint's variables, (N, v)."""
     signs = np.where(np.abs(part.dq) < _STANDSTILL, 0.0, np.sign(part.dq))
     before = [_remembered(signs, part.rate, seconds) for seconds in _MEMORY]
@@ -149,23 +153,23 @@ def _of_joints(channel: PlannedEquations, part: Motion) -> list[np.ndarray]:
     found = []
     for joint in range(part.dq.shape[1]):
         near = [k for k in (joint - 1, joint + 1) if 0 <= k < part.dq.shape[1]]
-        warm = [] if part.temperature is None else [part.temperature[:, [joint]]]
+        heat = [part.temperature[:, [joint]]] if warm and part.temperature is not None else []
         others = [values[:, [joint]] for values in (part.dq, part.ddq, load, *before)]
         beside = [values[:, near] for values in (part.q, part.dq, part.ddq)]
         speed = np.abs(part.dq[:, [joint]])
-        found.append(np.concatenate([part.q[:, [joint]], speed, *others, *beside, time, *warm], axis=1))
+        found.append(np.concatenate([part.q[:, [joint]], speed, *others, *beside, time, *heat], axis=1))
     return found
 
 
-def _of_power(channel: PlannedEquations, part: Motion) -> np.ndarray:
+def _of_power(channel: PlannedEquations, part: Motion, warm: bool) -> np.ndarray:
     """Return the variables of power, (N, v)."""
     load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
     work = load * part.dq
     total = work.sum(axis=1, keepdims=True)
     slow = [_remembered(total, part.rate, seconds) for seconds in _MEMORY]
     sums = [total, np.abs(work).sum(axis=1, keepdims=True), *slow, time]
-    warm = [] if part.temperature is None else [part.temperature]
-    return np.concatenate([work, load**2, np.abs(load), np.abs(part.dq), part.dq**2, *sums, *warm], axis=1)
+    heat = [part.temperature] if warm and part.temperature is not None else []
+    return np.concatenate([work, load**2, np.abs(load), np.abs(part.dq), part.dq**2, *sums, *heat], axis=1)
 
 
 def _remembered(values: np.ndarray, rate: float, seconds: float) -> np.ndarray:
