@@ -1,25 +1,61 @@
-"""A digital twin of an industrial robot's energy, held in a knowledge graph."""
+"""A digital twin of an industrial robot's energy, held in a knowledge graph.
+
+As a library: `read_data_set` reads a data set, `identify` fits a `Twin` to it, `predict` says what the twin expects of
+a run, `diagnose` says where twin and robot differ and why; `read_urdf` gives a `Robot`, `catalogue` the effects.
+With a workspace: `run`, `adopt`, `ask`, `export`.
+"""
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["adopt", "ask", "diagnose", "export", "predict", "run"]
+__all__ = [
+    "DataSet",
+    "Robot",
+    "Twin",
+    "adopt",
+    "ask",
+    "catalogue",
+    "diagnose",
+    "export",
+    "identify",
+    "predict",
+    "read_data_set",
+    "read_urdf",
+    "run",
+]
 
 if TYPE_CHECKING:
     from irtwin.asking import ask, export
-    from irtwin.workflow import adopt, diagnose, predict, run
+    from irtwin.effects.catalogue import catalogue
+    from irtwin.modelling import identify, predict
+    from irtwin.robot.description import Robot
+    from irtwin.robot.urdf import read_urdf
+    from irtwin.signals.log import DataSet, read_data_set
+    from irtwin.twin.twin import Twin
+    from irtwin.workflow import adopt, diagnose, run
+
+_MODULES = {
+    "DataSet": "signals.log",
+    "Robot": "robot.description",
+    "Twin": "twin.twin",
+    "adopt": "workflow",
+    "ask": "asking",
+    "catalogue": "effects.catalogue",
+    "diagnose": "workflow",
+    "export": "asking",
+    "identify": "modelling",
+    "predict": "modelling",
+    "read_data_set": "signals.log",
+    "read_urdf": "robot.urdf",
+    "run": "workflow",
+}
 
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for when it is first used: `irtwin --help` need not wait for it."""
-    if name in ("ask", "export"):
-        from irtwin import asking
-
-        return getattr(asking, name)
-    if name in __all__:
-        from irtwin import workflow
-
-        return getattr(workflow, name)
+    if name in _MODULES:
+        return getattr(import_module(f"irtwin.{_MODULES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -215,9 +215,9 @@ def predict(
 
     Torque and power for the motion in RUN, by the TWIN that `irtwin diagnose --save-twin` wrote.
     """
-    from irtwin import workflow
+    from irtwin import modelling
 
-    workflow.predict(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
+    modelling.predict(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
     click.echo(out)
 
 

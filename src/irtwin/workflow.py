@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import shutil
 import time
@@ -11,15 +10,11 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet
-
 from irtwin import resources
 from irtwin.asking import WORKSPACE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
-from irtwin.gap import predict as predicted
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge.backup import backup as keep
 from irtwin.knowledge.explain import explain_one
@@ -39,7 +34,7 @@ from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
 from irtwin.storage.staging import staged
-from irtwin.twin.files import load, to_json
+from irtwin.twin.files import to_json
 
 Announce = Callable[[str], None]
 
@@ -128,27 +123,6 @@ def diagnose(
             map_rows(place, graph)
             reason(graph)
     return found
-
-
-def predict(
-    twin: Path | str,
-    run_file: Path | str,
-    out: Path | str,
-    *,
-    payload_mass: float | None = None,
-    payload_com: tuple[float, float, float] | None = None,
-) -> None:
-    """Write to a Parquet file what a saved twin expects of a run's motion: time, `tau_J` of each joint, `power`.
-
-    payload_mass kg, payload_com m in the flange frame: what the controller was told; None takes it from the data set
-    that lists the run. Raises InputError on a file that is no twin or no run of its robot.
-    """
-    check_place(Path(out))
-    saved = load(Path(twin))
-    table = predicted.predict(saved, predicted.read_motion(saved, Path(run_file), payload_mass, payload_com))
-    buffer = io.BytesIO()
-    pa.parquet.write_table(table, buffer)
-    write(Path(out), buffer.getvalue())
 
 
 def adopt(

@@ -1,0 +1,75 @@
+"""The physics as a library: from a data set to a twin and what it predicts, without a workspace."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import Effect
+from irtwin.gap import predict as predicted
+from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.log import DataSet, read_data_set
+from irtwin.storage.files import check_place, write
+from irtwin.twin.files import load
+from irtwin.twin.identify import identify as fit
+from irtwin.twin.twin import Twin
+
+
+def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | None = None) -> Twin:
+    """Fit a twin to the runs of a data set, all filtered alike.
+
+    effects: ids of the catalogue, or effects of a shape; None takes those of `dataset.toml`, else the baseline. A
+    simulator's runs stay apart where the robot's own are there. Weighted least squares on the base regressor, with
+    bounds (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).
+    Raises InputError on bad input, or where there is nothing to fit.
+
+    >>> import irtwin
+    >>> twin = irtwin.identify(demo)
+    >>> len(twin.robot.joints), round(twin.condition_number) < 200
+    (6, True)
+    >>> friction = next(one for one in twin.stated if one.effect == "coulomb_friction")
+    >>> friction.joint, friction.unit, friction.lower < friction.value < friction.upper
+    ('joint_a1', 'N m', True)
+    """
+    given = data_set if isinstance(data_set, DataSet) else read_data_set(Path(data_set))
+    own = [run for run in given.runs if run.role != "simulated"] or list(given.runs)
+    cutoff = choose_cutoff(own)
+    motions = [condition(run, given.robot, cutoff) for run in own]
+    return fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
+
+
+def predict(
+    twin: Path | str | Twin,
+    run_file: Path | str,
+    out: Path | str | None = None,
+    *,
+    payload_mass: float | None = None,
+    payload_com: tuple[float, float, float] | None = None,
+) -> pa.Table:
+    """Return what a twin expects of a run's motion, a row a sample: `time` s, `tau_J` N m of each joint, `power` W.
+
+    twin: one that was identified, or the file of a saved one; `out`: a Parquet file to write it to. payload_mass kg,
+    payload_com m in the flange frame: what the controller was told; None takes it from the data set that lists the run.
+    Raises InputError on a file that is no twin or no run of its robot.
+
+    >>> import irtwin
+    >>> twin = irtwin.identify(demo)
+    >>> table = irtwin.predict(twin, demo / "runs" / "exciting_1.parquet")
+    >>> table.column_names[:2], table.column_names[-1]
+    (['time', 'tau_joint_a1'], 'power')
+    """
+    if out is not None:
+        check_place(Path(out))
+    known = twin if isinstance(twin, Twin) else load(Path(twin))
+    run = predicted.read_motion(known, Path(run_file), payload_mass, payload_com)
+    table = predicted.predict(known, run)
+    if out is not None:
+        buffer = io.BytesIO()
+        pa.parquet.write_table(table, buffer)
+        write(Path(out), buffer.getvalue())
+    return table
