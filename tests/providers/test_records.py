@@ -33,7 +33,7 @@ def run(name: str = "first", **changes: object) -> Run:
 
 def data_set(*runs: Run) -> DataSet:
     robot = parse_urdf(URDF)
-    joints = (replace(robot.joints[0], gear_ratio=50.0),)
+    joints = (replace(robot.joints[0], gear_ratio=50.0, acceleration=40.0),)
     robot = replace(robot, name="One arm", joints=joints, weight=3.0)
     return DataSet(Path(), robot, runs, ("rigid_body",), 21.0, "mains", True, {"note": "kept"})
 

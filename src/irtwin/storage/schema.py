@@ -79,6 +79,7 @@ class Joint(Base):
     lower_limit_rad: Mapped[float | None]
     upper_limit_rad: Mapped[float | None]
     speed_limit_rad_s: Mapped[float | None]
+    acceleration_limit_rad_s2: Mapped[float | None]
     torque_limit_nm: Mapped[float | None]
     gear_ratio: Mapped[float | None]
     rotor_inertia_kg_m2: Mapped[float | None]
