@@ -13,9 +13,11 @@ from irtwin.signals.log import Run
 Change = Callable[[Run], Run]
 
 
-def data_set(folder: Path, name: str, seed: int = 1, change: Change = lambda run: run, tail: str = "") -> Path:
-    """Write the data set of an arm of two joints with three runs of 8 s; `change` spoils each run."""
-    robot = replace(synthetic.with_constants(synthetic.arm(2)), name=name)
+def data_set(
+    folder: Path, name: str, seed: int = 1, change: Change = lambda run: run, tail: str = "", joints: int = 2
+) -> Path:
+    """Write the data set of an arm with three runs of 8 s; `change` spoils each run."""
+    robot = replace(synthetic.with_constants(synthetic.arm(joints)), name=name)
     motions = [synthetic.swing(robot, of, seconds=8.0) for of in range(seed, seed + 3)]
     runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
     return data_sets.write(folder, robot, [change(run) for run in runs], tail=tail)

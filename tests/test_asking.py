@@ -22,7 +22,8 @@ ROBOTS = "SELECT ?robot { ?robot a irt:Industrial_Robot }"
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
-    """A workspace that holds nothing but a graph."""
+    """A workspace whose graph holds more than its database."""
+    Workspace(tmp_path).close()
     make_graph(tmp_path)
     return tmp_path
 
@@ -44,7 +45,7 @@ def test_a_question_is_answered_while_another_process_writes(workspace: Path, wr
 
 def test_a_run_shows_its_graph_when_it_has_ended(workspace: Path) -> None:
     with Workspace(workspace) as place:
-        with workflow._graph(place, None) as graph:
+        with workflow.rewriting(place, None) as graph:
             graph.update("DELETE WHERE { ?robot a irt:Industrial_Robot }")
             assert len(ask(ROBOTS, workspace)) == 2
         assert len(ask(ROBOTS, workspace)) == 0
@@ -88,3 +89,19 @@ cli.cli(["query", "robots"], standalone_mode=False)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "PermissionError" in done.stderr
+
+
+def test_asking_imports_nothing_that_it_does_not_need(tmp_path: Path) -> None:
+    """The physics and the readers of series take longer to import than a query to answer."""
+    heavy = {"numpy", "scipy", "pinocchio", "pyarrow", "duckdb", "rdflib", "sqlalchemy", "starlette", "jinja2"}
+    with KnowledgeGraph(tmp_path / "graph") as graph:
+        graph.update('INSERT DATA { id:robot irt:Note "mine" }')
+    code = f"""
+import sys
+from irtwin import cli
+cli.cli(["query", "SELECT * {{ ?s ?p ?o }}", "--workspace", {str(tmp_path)!r}], standalone_mode=False)
+print({heavy!r} & set(sys.modules))
+"""
+    said = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert "mine" in said
+    assert said.splitlines()[-1] == "set()"

@@ -116,14 +116,15 @@ def test_a_lost_graph_is_not_begun_anew_in_silence(workspace: Path) -> None:
 @pytest.mark.parametrize("damage", [each for each in DAMAGES if each != "flipped"])  # SQLite sums no contents
 def test_a_damaged_database_is_told(workspace: Path, damage: str) -> None:
     DAMAGES[damage](workspace / "irtwin.db")
-    for command in (("query", COUNT), ("repair",), ("backup", workspace / "kept.zip"), ("drop", "First")):
+    for command in (("repair",), ("backup", workspace / "kept.zip"), ("drop", "First")):
         assert "`irtwin restore ARCHIVE --workspace NEW`" in one_line(workspace, *command)
+    assert asked(workspace, NAMES)  # the graph is whole
 
 
 def test_a_database_that_lacks_a_table_is_told(workspace: Path) -> None:
     with Workspace(workspace) as place, place.engine.begin() as connection:
         connection.exec_driver_sql("DROP TABLE joint_energy")
-    assert "table joint_energy is missing" in one_line(workspace, "query", COUNT)
+    assert "table joint_energy is missing" in one_line(workspace, "drop", "First")
 
 
 @pytest.mark.parametrize("damage", DAMAGES)

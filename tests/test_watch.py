@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import rows
+from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 
 
@@ -32,6 +33,7 @@ def lines(count: int) -> str:
 def workspace(tmp_path: Path) -> Path:
     with Workspace(tmp_path / "w") as place:
         place.ingest(*rows.data_set())
+        KnowledgeGraph(place.graph_folder).close()
     return tmp_path / "w"
 
 

@@ -63,6 +63,10 @@ def _graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
         return
     folder = workspace / "graph"
     if not folder.is_dir():
-        raise InputError(f"{workspace}: no workspace here; run `irtwin run DATASET --workspace {workspace}` first")
+        from irtwin.storage.database import Workspace
+
+        with Workspace.existing(workspace) as place:  # says that there is none, or that its graph is lost
+            place.check_graph()
+        raise InputError(f"{workspace}: no graph here; run `irtwin run DATASET --workspace {workspace}` first")
     with Snapshot(folder) as snapshot:
         yield snapshot.graph

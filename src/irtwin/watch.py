@@ -49,7 +49,7 @@ def watch(
         KnowledgeGraph.of_workspace(place, graph_url) as graph,
         LiveTwin(place, graph, announce) as twin,
     ):
-        reader = StateReader(twin.joints)
+        reader = StateReader(twin.joints, twin.names)
 
         def take(lines: Iterable[bytes]) -> None:
             feed(lines, reader, twin.receive, refuse)

@@ -28,6 +28,16 @@ def test_a_full_line() -> None:
     assert READER.read(said) == State("R", 5.5, (0.1, 0.2), (1.0, 2.0), (3.0, 4.0), (5.0, 6.0), 7.0, 2.5)
 
 
+@pytest.mark.parametrize("said", ["Prüfstand 3", "Pru\u0308fstand 3", "Pr_fstand_3~1"])
+def test_a_robot_is_said_by_its_name_or_its_identifier(said: str) -> None:
+    reader = StateReader({"Pr_fstand_3~1": ["a1", "a2"], "R": ["a1", "a2"]}, {"Pr_fstand_3~1": "Prüfstand 3", "R": "R"})
+    assert reader.read(line(robot=said)).robot_id == "Pr_fstand_3~1"
+    with pytest.raises(InputError, match=r"no robot 'Prufstand 3' in the workspace.*known are Prüfstand 3, R$"):
+        reader.read(line(robot="Prufstand 3"))
+    with pytest.raises(InputError, match="`name` is to name the joints of Prüfstand 3: a1, a2"):
+        reader.read(line(robot=said, name=["a1"]))
+
+
 def test_what_is_not_said_is_nan() -> None:
     state = READER.read(line())
     assert all(map(math.isnan, [*state.velocity, *state.effort, *state.temperature, state.power]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import subprocess
 import sys
 import time
@@ -229,6 +230,30 @@ def test_a_first_state_of_a_wrong_time_does_not_stop_the_rest(place: Workspace, 
     assert counts(place) == [(0.01, 99), (1800.0, 1)]
 
 
+@pytest.mark.parametrize("restarted", [True, False])
+def test_a_log_that_comes_again_is_stored_once(
+    place: Workspace, graph: KnowledgeGraph, restarted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    twin = LiveTwin(place, graph)
+    for number in range(50):
+        twin.receive(state(number))
+    if restarted:
+        twin.stop()
+        twin = LiveTwin(place, graph)
+    else:  # by the hole, the first run ends while the watching goes on
+        for number in range(3):
+            twin.receive(moved(number, -300.0))
+        wait_for(lambda: counts(place) == [(0.0, 50)])
+    for number in range(50):
+        with pytest.raises(InputError, match=r"the stored run \S+live_20260301T120000000000 covers this time"):
+            twin.receive(state(number))
+    for number in range(50, 80):
+        twin.receive(state(number))
+    twin.stop()
+    assert counts(place) == ([] if restarted else [(-300.0, 3)]) + [(0.0, 50), (0.5, 30)]
+    assert quads(graph) == mapped(place)
+
+
 def test_where_storage_is_slow_the_source_waits(
     place: Workspace, graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -281,7 +306,7 @@ with Workspace(Path(sys.argv[1])) as place, KnowledgeGraph(place.graph_folder) a
 def test_a_kill_loses_no_stored_sample(place: Workspace, tmp_path: Path) -> None:
     here = Path(__file__).parent
     command = [sys.executable, "-c", WATCHER, str(tmp_path), str(here)]
-    environment = {"PYTHONPATH": str(here.parent)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parent), *sys.path])}
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stdout is not None
         stored = 0

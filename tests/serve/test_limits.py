@@ -130,7 +130,7 @@ async def pool(graph: Path, limits: Limits, size: int = 1) -> AsyncIterator[Pool
 
 
 async def read(workers: Pool, query: str) -> bytes:
-    async with workers.worker() as worker:
+    async with workers.worker("here") as worker:
         await worker.ask({**REQUEST, "text": query})
         return b"".join([piece async for piece in worker.pieces()])
 
@@ -158,7 +158,7 @@ def test_a_large_answer_comes_whole(new_graph: Callable[[], Path]) -> None:
 
 def test_who_finds_the_queue_full_is_told_to_come_back(new_graph: Callable[[], Path]) -> None:
     async def scenario() -> None:
-        async with pool(new_graph(), Limits(waiting=1, seconds=1)) as workers, workers.worker():
+        async with pool(new_graph(), Limits(waiting=1, seconds=1)) as workers, workers.worker("here"):
             waiting = asyncio.create_task(read(workers, "ASK {}"))
             await asyncio.sleep(0)
             with pytest.raises(Refusal, match="too many queries are waiting") as full:

@@ -11,15 +11,17 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyoxigraph import BlankNode, DefaultGraph, Literal, NamedNode, Store, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.table import to_python
 from irtwin.knowledge.vocabulary import RDF, SERIES, shorten, term
-from irtwin.storage.series import inside
-from irtwin.storage.windows import SeriesWindows, open_series
+from irtwin.storage.files import inside
+
+if TYPE_CHECKING:
+    from irtwin.storage.windows import SeriesWindows  # pyarrow: a tenth of a second, for those who ask for samples
 
 Term = NamedNode | BlankNode | Literal | Triple
 Answer = float | list[tuple[float, float]] | None
@@ -27,11 +29,11 @@ Answer = float | list[tuple[float, float]] | None
 _JSON = NamedNode(f"{RDF}JSON")
 _MOST_FAULTS = 20
 _ASKED: Mapping[str, Callable[[SeriesWindows, str, float, float], Answer]] = {
-    "mean": SeriesWindows.mean,
+    "mean": lambda series, *window: series.mean(*window),
     "min": lambda series, *window: series.extreme("min", *window),
     "max": lambda series, *window: series.extreme("max", *window),
-    "integral": SeriesWindows.integral,
-    "samples": SeriesWindows.samples,
+    "integral": lambda series, *window: series.integral(*window),
+    "samples": lambda series, *window: series.samples(*window),
 }
 
 
@@ -87,6 +89,8 @@ class _Asker:
             raise InputError(f"{shorten(run.value)}: {error}") from None
 
     def _series(self, run: NamedNode, kind: str) -> SeriesWindows:
+        from irtwin.storage.windows import open_series
+
         for series in self._objects(run, "has_Series"):
             if kind in map(to_python, self._objects(series, "Series_Kind")):
                 for file in self._objects(series, "File"):

@@ -10,11 +10,8 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from http.client import HTTPException, HTTPResponse
-from typing import Any, cast
-from urllib.error import HTTPError, URLError
+from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import SplitResult, quote, unquote, urlencode, urlsplit
-from urllib.request import Request, urlopen
 
 from pyoxigraph import (
     DefaultGraph,
@@ -31,6 +28,9 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
+
+if TYPE_CHECKING:
+    from http.client import HTTPResponse
 
 TOKEN = "IRTWIN_GRAPH_TOKEN"  # environment variable: sent as a bearer token
 TIMEOUT = 300.0  # s without a byte from the server
@@ -104,10 +104,15 @@ class SparqlServer:
         """Do nothing: what a server answered is committed."""
 
     def _post(self, url: str, kind: str, text: str, accept: str) -> HTTPResponse:
+        # a quarter of the imports of a command that asks a folder
+        from http.client import HTTPException
+        from urllib.error import HTTPError, URLError
+        from urllib.request import Request, urlopen
+
         headers = {**self.headers, "Content-Type": f"application/sparql-{kind}; charset=utf-8", "Accept": accept}
         try:
             request = Request(url, text.encode(), headers, method="POST")
-            return cast(HTTPResponse, urlopen(request, timeout=TIMEOUT))
+            return cast("HTTPResponse", urlopen(request, timeout=TIMEOUT))
         except HTTPError as error:
             said = " ".join(error.read(1000).decode(errors="replace").split())
             if error.code == 400:

@@ -16,7 +16,7 @@ from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
-from irtwin.storage.series import inside
+from irtwin.storage.files import inside
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate

@@ -21,8 +21,8 @@ from irtwin.providers.records import identifier, load_robot, load_run, robot_iri
 from irtwin.signals.conditioning import condition
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
+from irtwin.storage.files import inside
 from irtwin.storage.schema import Base
-from irtwin.storage.series import inside
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
 

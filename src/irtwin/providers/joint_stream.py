@@ -3,8 +3,9 @@
 {"robot": "KUKA_KR6_R700", "time": 1764583200.012, "position": [...], "velocity": [...], "effort": [...],
  "temperature": [...], "power": 512.0}
 
-`time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must, the rest is not. Values are in the order of
-the robot's joints, base to flange, or in that of `name`. `payload`, kg, counts where a run begins.
+`robot` is its name, or its identifier; `time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must,
+the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg,
+counts where a run begins.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import math
 import re
 import socketserver
 import threading
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -49,9 +51,15 @@ class State:
 
 
 class StateReader:
-    """Reads lines for robots that are known: their joints' names, base to flange, by robot_id."""
+    """Reads lines for robots that are known: their joints' names, base to flange, and their own, by robot_id.
 
-    def __init__(self, joints: Mapping[str, Sequence[str]]) -> None:
+    A line says a robot by its name, in any form of Unicode, or by its robot_id.
+    """
+
+    def __init__(self, joints: Mapping[str, Sequence[str]], names: Mapping[str, str] | None = None) -> None:
+        self._names = {robot: robot for robot in joints} | dict(names or {})
+        self._ids = {_nfc(name): robot for robot, name in self._names.items()}
+        self._ids |= {robot: robot for robot in joints if robot not in self._ids}
         self._joints = {robot: tuple(names) for robot, names in joints.items()}
         self._orders: dict[tuple[str, tuple[str, ...]], tuple[int, ...]] = {}
 
@@ -67,10 +75,11 @@ class StateReader:
             raise InputError("a line is no JSON") from None
         if not isinstance(said, dict):
             raise InputError("a line is no JSON object")
-        robot = said.get("robot")
-        if not isinstance(robot, str) or robot not in self._joints:
+        name = said.get("robot")
+        robot = self._ids.get(_nfc(name)) if isinstance(name, str) else None
+        if robot is None:
             raise InputError(
-                f"no robot {str(robot)[:100]!r} in the workspace: run its data set first; known are {self._known}"
+                f"no robot {str(name)[:100]!r} in the workspace: run its data set first; known are {self._known}"
             )
         order = self._order(robot, said.get("name"))
         time = _number(said, "time")
@@ -86,7 +95,7 @@ class StateReader:
 
     @property
     def _known(self) -> str:
-        return ", ".join(sorted(self._joints)[:10]) or "none"
+        return ", ".join(sorted(self._names.values())[:10]) or "none"
 
     def _order(self, robot: str, names: Any) -> tuple[int, ...]:
         """Return the place in a message of each joint, (n,)."""
@@ -94,7 +103,7 @@ class StateReader:
         if names is None:
             return tuple(range(len(joints)))
         if not isinstance(names, list) or sorted(map(str, names)) != sorted(joints):
-            raise InputError(f"`name` is to name the joints of {robot}: {', '.join(joints)}")
+            raise InputError(f"`name` is to name the joints of {self._names[robot]}: {', '.join(joints)}")
         key = (robot, tuple(names))
         if key not in self._orders:
             self._orders[key] = tuple(names.index(joint) for joint in joints)
@@ -155,6 +164,10 @@ def listening(port: int, handle: Callable[[Iterator[bytes]], None]) -> Iterator[
             yield int(server.server_address[1])
         finally:
             server.shutdown()
+
+
+def _nfc(name: str) -> str:
+    return unicodedata.normalize("NFC", name)
 
 
 def _number(said: Mapping[str, Any], name: str) -> float:

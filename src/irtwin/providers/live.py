@@ -28,10 +28,11 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers import live_run
 from irtwin.providers.joint_stream import State
 from irtwin.providers.records import run_iri
+from irtwin.providers.stored_times import StoredTimes
 from irtwin.providers.watched_run import HOLE, WatchedRun
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import DamagedJournal, Header, Journal, left_behind, read_journal
-from irtwin.storage.schema import LIVE, Joint, Run
+from irtwin.storage.schema import LIVE, Joint, Robot, Run
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
@@ -43,7 +44,7 @@ class LiveTwin:
     """Watches the robots of a workspace; to be used as a context, whose end stores what is left.
 
     `stored`, `superseded` and `waited` (s) count what became of the states; `announce` is told what one should know.
-    `joints`: names of a robot's joints, base to flange, by robot_id.
+    `joints`: names of a robot's joints, base to flange, and `names` of the robots, by robot_id.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class LiveTwin:
         self._folder = place.folder / LIVE
         self._documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
         self._mapper = RowMapper(place.engine, self._documents)
-        self.joints = _joints(place)
+        self.joints, self.names = _joints(place), _names(place)
         self.stored = self.superseded = 0
         self.waited = 0.0
         self._waiting = 0
@@ -69,6 +70,7 @@ class LiveTwin:
         self._room = threading.Condition(self._lock)
         self._over = threading.Condition(self._lock)
         self._showing = threading.Lock()  # of the graph's view of runs
+        self._times = StoredTimes(place)
         self._recover()
         self._refresh()
         work = (self._show_states, self._store_samples, self._close_runs)
@@ -87,6 +89,7 @@ class LiveTwin:
 
         A state more than a minute before or after the newest is held until the next one: where that goes on from it,
         a new run began; where that goes on from the run, InputError is raised for the one held.
+        A state of a time that a stored run of the robot covers is refused, too: a log that comes again is stored once.
         Raises also what ended the work in the background: a full disk, say.
         """
         if state.time > time.time() + AHEAD:
@@ -97,6 +100,8 @@ class LiveTwin:
             self.check()
             if self._stop.is_set():
                 raise InputError("the watching is over: not stored")
+            if (stored := self._times.run_at(state.robot_id, state.time)) is not None:
+                raise InputError(f"{state.robot_id}: the stored run {stored} covers this time; not stored again")
             run = self._runs.get(state.robot_id) or self._begin(state)
             is_next = run.is_next(state)
             doubted, run.doubted = run.doubted, None
@@ -267,6 +272,8 @@ class LiveTwin:
             if not kept:  # else the crash came right here
                 run, activity, made = live_run.records(tables)
                 self._place.keep_live_run(run, series, activity, made)
+                with self._lock:
+                    self._times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
             self._show(header.run_id, shown, {quad for it in tables.items() for quad in self._mapper.quads(*it)})
         path.unlink()
 
@@ -313,3 +320,8 @@ def _joints(place: Workspace) -> dict[str, list[str]]:
         for robot_id, name in session.execute(select(Joint.robot_id, Joint.name).order_by(Joint.position)):
             joints.setdefault(robot_id, []).append(name)
     return joints
+
+
+def _names(place: Workspace) -> dict[str, str]:
+    with place.reading() as session:
+        return {robot_id: name for robot_id, name in session.execute(select(Robot.robot_id, Robot.name))}

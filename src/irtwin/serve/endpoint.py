@@ -88,7 +88,7 @@ class Endpoint:
         accept = request.headers.get("accept", "")
         if negotiation.wants_page(accept):
             return page.response()
-        graphs = await self._named_graphs(_address(request))
+        graphs = await self._named_graphs(_address(request), _client(request))
         return description.response(accept, _address(request), graphs, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
@@ -104,7 +104,7 @@ class Endpoint:
     async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
         """Take the answer off the worker as fast as it makes it; the client may take its time."""
         with self._answers.new() as answer, ExitStack() as held:
-            async with self._pool.worker() as worker:
+            async with self._pool.worker(_client(request)) as worker:
                 deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
                 media_type = await self._ask(
                     worker, operation, _address(request), request.headers.get("accept", ""), deadline
@@ -141,8 +141,8 @@ class Endpoint:
             seconds = self._limits.seconds
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
 
-    async def _named_graphs(self, base: str) -> list[str]:
-        async with self._pool.worker() as worker:
+    async def _named_graphs(self, base: str, client: str) -> list[str]:
+        async with self._pool.worker(client) as worker:
             deadline = time.monotonic() + self._limits.seconds
             try:
                 await self._ask(worker, Operation("query", description.NAMED_GRAPHS), base, "text/csv", deadline)
@@ -177,6 +177,11 @@ async def _left(receive: Receive) -> None:
 def _address(request: Request) -> str:
     """Return the endpoint's address as the client wrote it, which relative IRIs are below."""
     return str(request.url.replace(query=""))
+
+
+def _client(request: Request) -> str:
+    """Return the address that a client asks from; clients of one machine, or behind one proxy, share it."""
+    return request.client.host if request.client is not None else ""
 
 
 def _with_charset(media_type: str) -> str:

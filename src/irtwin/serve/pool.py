@@ -16,6 +16,7 @@ from typing import Any
 
 from irtwin.knowledge.linked import remove_left_behind
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.turns import Displaced, Turns
 from irtwin.serve.worker import FRAME
 
 _log = logging.getLogger(__name__)
@@ -121,15 +122,14 @@ class Worker:
 
 
 class Pool:
-    """A fixed number of workers, and a queue of bounded length before them."""
+    """A fixed number of workers, and a queue of bounded length before them, in which clients take turns."""
 
     def __init__(self, folder: Path, size: int, limits: Limits):
         self._folder = folder
         self._size = size
         self._limits = limits
-        self._idle: asyncio.Queue[Worker] = asyncio.Queue()
+        self._idle: Turns[Worker] = Turns(limits.waiting)
         self._starting: set[asyncio.Task[None]] = set()
-        self._waiting = 0
         self.workers: set[Worker] = set()
 
     async def open(self) -> None:
@@ -144,30 +144,30 @@ class Pool:
         remove_left_behind(self._folder)
 
     @asynccontextmanager
-    async def worker(self) -> AsyncIterator[Worker]:
-        """Lend a worker; one that is not done when it is given back is ended. Raises Refusal where all are taken."""
-        worker = await self._wait()
+    async def worker(self, client: str) -> AsyncIterator[Worker]:
+        """Lend a worker to a client, by its address; one that is not done when it is given back is ended.
+
+        Raises Refusal where all are taken.
+        """
+        worker = await self._wait(client)
         try:
             yield worker
         finally:
             if worker.idle and worker.alive:
-                self._idle.put_nowait(worker)
+                self._idle.give(worker)
             else:
                 self._replace(worker)
 
-    async def _wait(self) -> Worker:
-        if self._waiting >= self._limits.waiting:
-            raise Refusal(503, "too many queries are waiting: try again later", _RETRY_AFTER)
-        self._waiting += 1
+    async def _wait(self, client: str) -> Worker:
         try:
             async with asyncio.timeout(self._limits.seconds):
-                while not (worker := await self._idle.get()).alive:
+                while not (worker := await self._idle.take(client)).alive:
                     self._replace(worker)
                 return worker
         except TimeoutError:
             raise Refusal(503, "no worker came free in time: try again later", _RETRY_AFTER) from None
-        finally:
-            self._waiting -= 1
+        except Displaced:
+            raise Refusal(503, "too many queries are waiting: try again later", _RETRY_AFTER) from None
 
     def _replace(self, worker: Worker) -> None:
         async def replace() -> None:
@@ -187,4 +187,4 @@ class Pool:
     async def _start(self) -> None:
         worker = await Worker.start(self._folder, self._limits)
         self.workers.add(worker)
-        self._idle.put_nowait(worker)
+        self._idle.give(worker)

@@ -25,6 +25,7 @@ from irtwin.knowledge.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
+from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
 _PIECE = 1 << 20  # bytes; a failure before the first piece is full can still be told as such

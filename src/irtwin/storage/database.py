@@ -14,10 +14,11 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
+from irtwin.storage.files import inside
 from irtwin.storage.gap_schema import GapDiagnosis
 from irtwin.storage.rows import drop_activities, drop_data_set, drop_robot, facts, insert_rows, values, with_dependents
 from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Joint, Robot, Run, Series, Twin
-from irtwin.storage.series import FOLDER, inside, is_whole, read_series, write_series
+from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
 
 Outcome = Literal["new", "unchanged", "replaced"]
 _DATABASE = "irtwin.db"

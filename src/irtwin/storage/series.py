@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
 from irtwin.storage import files
+from irtwin.storage.files import inside
 from irtwin.storage.summary import ROW_GROUP, with_summary
 
 FOLDER = "series"
@@ -62,11 +63,3 @@ def checksum(file: Path) -> str:
     """Return the sha256 of a file's bytes, in hexadecimal."""
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def inside(workspace: Path, path: str) -> Path:
-    """Return the file that a workspace's relative path means; InputError where it leads outside."""
-    file = (workspace / path).resolve()
-    if not file.is_relative_to(workspace.resolve()):
-        raise InputError(f"{workspace}: the path {path!r} leads out of the workspace; nothing was read or written")
-    return file

@@ -11,9 +11,10 @@ from sqlalchemy import update
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import inside
 from irtwin.storage.rows import Rows, data_set_rows, drop_data_set, files_of, insert_values
 from irtwin.storage.schema import Robot
-from irtwin.storage.series import inside, is_whole
+from irtwin.storage.series import is_whole
 
 _PREFIX = ".staged-"
 

@@ -1,0 +1,124 @@
+"""Clients that wait for a worker: they take turns, and one with many requests keeps nobody out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from irtwin.serve.pool import Limits, Pool
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.turns import Displaced, Turns
+
+Served = list[str]
+
+
+def scenario(run: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    asyncio.run(asyncio.wait_for(run(), 60))
+
+
+async def waiting(turns: Turns[str], served: Served, *requests: str) -> list[asyncio.Task[None]]:
+    """Let requests such as "A1" wait, in this order; what is served is given on at once."""
+
+    async def wait(request: str) -> None:
+        thing = await turns.take(request[0])
+        served.append(request)
+        turns.give(thing)
+
+    tasks = []
+    for request in requests:
+        tasks.append(asyncio.create_task(wait(request)))
+        await asyncio.sleep(0)
+    return tasks
+
+
+def test_clients_take_turns() -> None:
+    async def run() -> None:
+        turns, served = Turns[str](64), Served()
+        tasks = await waiting(turns, served, "A1", "A2", "A3", "A4", "B1", "C1", "B2")
+        turns.give("worker")
+        await asyncio.gather(*tasks)
+        assert served == ["A1", "B1", "C1", "A2", "B2", "A3", "A4"]
+
+    scenario(run)
+
+
+def test_a_free_one_is_lent_at_once() -> None:
+    async def run() -> None:
+        turns = Turns[str](0)
+        turns.give("worker")
+        assert await turns.take("A") == "worker"
+        with pytest.raises(Displaced):
+            await turns.take("A")
+
+    scenario(run)
+
+
+def test_in_a_full_queue_who_has_fewer_places_takes_one_of_who_has_most() -> None:
+    async def run() -> None:
+        turns, served = Turns[str](3), Served()
+        tasks = await waiting(turns, served, "A1", "A2", "A3", "A4", "B1", "B2")
+        turns.give("worker")
+        ends = await asyncio.gather(*tasks, return_exceptions=True)
+        assert served == ["A1", "B1", "A2"]
+        assert [isinstance(end, Displaced) for end in ends] == [False, False, True, True, False, True]
+
+    scenario(run)
+
+
+def test_who_leaves_keeps_nothing() -> None:
+    async def run() -> None:
+        turns, served = Turns[str](64), Served()
+        tasks = await waiting(turns, served, "A1", "B1", "C1", "A2")
+        tasks[0].cancel()
+        await asyncio.sleep(0)
+        tasks[1].cancel()
+        turns.give("worker")  # to C1, though B1 did not get to say that it left
+        tasks[2].cancel()  # with the worker in its hand
+        await asyncio.gather(*tasks, return_exceptions=True)
+        assert served == ["A2"]
+        assert await turns.take("A") == "worker"
+
+    scenario(run)
+
+
+def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callable[[], Path]) -> None:
+    request = {"default_graphs": (), "named_graphs": (), "base": "http://e/", "accept": "text/csv", "at_once": False}
+
+    async def run() -> None:
+        pool, done = Pool(new_graph(), 1, Limits()), Served()
+
+        async def ask(client: str, number: int) -> None:
+            async with pool.worker(client) as worker:
+                await worker.ask({**request, "text": "ASK {}"})
+                assert [piece async for piece in worker.pieces()] == [b"true"]
+            done.append(f"{client} {number}")
+
+        await pool.open()
+        try:
+            many = [asyncio.create_task(ask("10.0.0.1", number)) for number in range(20)]
+            await asyncio.sleep(0)
+            await asyncio.gather(*many, ask("10.0.0.2", 0))
+        finally:
+            await pool.close()
+        assert done.index("10.0.0.2 0") <= 2
+
+    scenario(run)
+
+
+def test_the_queue_says_that_it_is_full(new_graph: Callable[[], Path]) -> None:
+    async def run() -> None:
+        pool = Pool(new_graph(), 1, Limits(waiting=0))
+        await pool.open()
+        try:
+            async with pool.worker("A"):
+                with pytest.raises(Refusal, match="too many queries are waiting"):
+                    async with pool.worker("B"):
+                        pass
+        finally:
+            await pool.close()
+
+    scenario(run)
