@@ -45,9 +45,10 @@ def folder(good: Path, tmp_path: Path) -> Path:
 
 
 def content(workspace: Path) -> dict[str, object]:
-    """Return the bytes of all files that hold data, and the graph's triples."""
+    """Return the bytes of all files that hold data, and the graph's triples, whatever its store's files are."""
     kinds = ("*.parquet", "*.json", "*.html")
-    files = {file.name: file.read_bytes() for kind in kinds for file in workspace.rglob(kind)}
+    found = [file for kind in kinds for file in workspace.rglob(kind) if file.parent.name != "graph"]
+    files = {str(file.relative_to(workspace)): file.read_bytes() for file in found}
     with Workspace(workspace) as place, place.engine.connect() as connection:
         dump = "\n".join(connection.connection.driver_connection.iterdump())  # type: ignore[union-attr]
     with KnowledgeGraph(workspace / "graph") as graph:

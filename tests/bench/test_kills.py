@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import random
+from pathlib import Path
+
 import pytest
 
 import kills
 
 
+@pytest.fixture(scope="module")
+def commands(tmp_path_factory: pytest.TempPathFactory) -> dict[str, kills.Command]:
+    return kills.prepared(tmp_path_factory.mktemp("kills"))
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["run", "live", "diagnose", "restore", "repair"])
-def test_a_killed_command_can_be_done_again(command: str) -> None:
-    assert kills.main(2, [command], seed=11) == 0
+@pytest.mark.parametrize("kind", ["run", "live", "diagnose", "restore", "repair"])
+def test_a_killed_command_can_be_done_again(commands: dict[str, kills.Command], kind: str, tmp_path: Path) -> None:
+    assert kills.killed_often(kind, commands[kind], 2, random.Random(11), tmp_path / "tried") == 0
