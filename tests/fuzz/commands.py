@@ -33,7 +33,8 @@ for _module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):  # here, once,
     if not _module.name.endswith("__main__"):
         importlib.import_module(_module.name)
 
-SECONDS = 60
+SECONDS = 60  # of the processor, as others may share it
+_PATIENCE = 600  # s, for what waits and does nothing
 MEGABYTES = 2000  # beside what the libraries take
 _EXCITING = 2.0  # s until Ctrl-C: the best motion so far is kept
 _STOPPED = 130  # exit status after Ctrl-C
@@ -144,7 +145,7 @@ def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, 
     try:
         if patience is not None and not select.select([end], [], [], patience)[0]:
             os.kill(child, signal.SIGINT)
-        if not select.select([end], [], [], SECONDS)[0]:
+        if not select.select([end], [], [], _PATIENCE)[0]:
             os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
     finally:
@@ -156,6 +157,7 @@ def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, 
 def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
     status = 1
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # which a session in the background has not
         for number, file, flags in ((0, stdin, os.O_RDONLY), (1, out, os.O_WRONLY), (2, err, os.O_WRONLY)):
             os.dup2(os.open(file, flags | (os.O_CREAT | os.O_TRUNC if flags else 0), 0o600), number)
         sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w")  # noqa: SIM115
@@ -168,6 +170,7 @@ def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
         pages = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_DATA, (pages + (MEGABYTES << 20),) * 2)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
         work()
         status = 0
     except SystemExit as stop:

@@ -180,11 +180,11 @@ def _mostly(usual: object, *others: object) -> st.SearchStrategy:
 def _runs(draw: st.DrawFn, plain: bool, large: bool) -> RunPlan:
     run = RunPlan(seed=draw(st.integers(0, 9999)), csv=draw(st.booleans()), torque=draw(_LOGGED), power=draw(_LOGGED))
     if plain:
-        return replace(run, torque="model", samples=draw(st.sampled_from((300, 600) if large else (60, 120, 200))))
+        return replace(run, torque="model", samples=draw(st.sampled_from((300, 600) if large else (120, 200, 300))))
     return replace(
         run,
         rate=draw(_mostly(100.0, 1.0, 8.0, 25.0, 500.0, 1e-3, 1e5)),
-        samples=draw(_mostly(300 if large else 100, 1, 2, 5, 20, 21, 40, 60, 800)),
+        samples=draw(_mostly(300 if large else 160, 1, 2, 5, 20, 21, 40, 60, 800)),
         motion=draw(_mostly("swing", "still", "one joint", "steps", "stops")),
         amplitude=draw(_mostly(0.5, 1e-9, 1e-3, 1.2, 30.0)),
         noise=draw(_mostly(1e-3, 0.0, 1.0, 1e3)),

@@ -74,9 +74,12 @@ def base_parameters(stack: Stack) -> BaseParameters:
 def condition_number(factor: np.ndarray, base: BaseParameters) -> float:
     """Return the condition number of the base regressor with columns scaled to one.
 
-    `factor`: (r, K) triangular factor of the torque regressor. Infinite where the motion leaves a column empty.
+    `factor`: (r, K) triangular factor of the torque regressor. Infinite where the motion leaves a column empty; one
+    where there is no column, and so nothing to tell apart.
     """
     columns = factor[:, base.independent]
+    if columns.shape[1] == 0:
+        return 1.0
     norms = np.linalg.norm(columns, axis=0)
     if np.any(norms == 0):
         return float("inf")
