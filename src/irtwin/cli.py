@@ -285,7 +285,8 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
         )
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
-    click.echo("\nStopped: this is the best so far." if motion.interrupted else "", err=True)
+    ended = {motion.bounded: "Ended at its most work: ", motion.interrupted: "Stopped: "}.get(True)
+    click.echo(f"\n{ended}this is the best so far." if ended else "", err=True)
     click.echo(
         f"{out}: condition number {motion.condition_number:.1f}, "
         f"{motion.limit_margin:.1%} of the joint limits to spare, "

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
+import pkgutil
 import re
 import resource
 import select
@@ -12,6 +14,7 @@ import sys
 import tempfile
 import traceback
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -23,13 +26,17 @@ import spoil
 import streams
 from case import Case
 
+import irtwin
 import irtwin.cli
-import irtwin.watch
-import irtwin.workflow  # here, once, not in each child
 
-SECONDS = 60
+for _module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):  # here, once, not in each child
+    if not _module.name.endswith("__main__"):
+        importlib.import_module(_module.name)
+
+SECONDS = 60  # of the processor, as others may share it
+_PATIENCE = 600  # s, for what waits and does nothing
 MEGABYTES = 2000  # beside what the libraries take
-_EXCITING = 4.0  # s until Ctrl-C: the best motion so far is kept
+_EXCITING = 2.0  # s until Ctrl-C: the best motion so far is kept
 _STOPPED = 130  # exit status after Ctrl-C
 LONGEST_LINE = 2000  # characters of an error
 _STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
@@ -54,8 +61,8 @@ class Fault:
     said: str
 
 
-def try_case(case: Case) -> Fault | None:
-    """Try the commands of a case, one after the other; return the first fault."""
+def try_case(case: Case, tried: Counter[str] | None = None) -> Fault | None:
+    """Try the commands of a case, one after the other; return the first fault. `tried` counts how each ended."""
     with tempfile.TemporaryDirectory(prefix="irtwin-fuzz-") as name:
         folder = Path(name)
         made = in_child(lambda: _make(case, folder / "data"), folder)
@@ -71,6 +78,8 @@ def try_case(case: Case) -> Fault | None:
                 file.unlink(missing_ok=True)
             patience = _EXCITING if command == "excite" else None
             done = in_child(partial(_main, arguments), folder, stdin, patience)
+            if tried is not None:
+                tried[f"{command}: {'refused' if done.status else 'answered'}"] += 1
             if patience is not None and done.status == _STOPPED:
                 continue  # before there was a motion to keep
             kind = fault_of(done, writes)
@@ -94,7 +103,11 @@ def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]
     diagnose = ["diagnose", data, "--json", out["gap.json"]]
     run = next((data / "runs").iterdir())
     words, writes = {
-        "diagnose": ([*diagnose, "--report", out["gap.html"], "--save-twin", twin], [out["gap.json"], out["gap.html"]]),
+        "diagnose": (diagnose, [out["gap.json"]]),
+        "diagnose with page and twin": (
+            [*diagnose, "--report", out["gap.html"], "--save-twin", twin],
+            [out["gap.json"], out["gap.html"]],
+        ),
         "diagnose into workspace": ([*diagnose, "--workspace", workspace], [out["gap.json"]]),
         "predict": (["predict", twin, run, "--out", out["predicted.parquet"]], [out["predicted.parquet"]]),
         "excite": (
@@ -132,7 +145,7 @@ def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, 
     try:
         if patience is not None and not select.select([end], [], [], patience)[0]:
             os.kill(child, signal.SIGINT)
-        if not select.select([end], [], [], SECONDS)[0]:
+        if not select.select([end], [], [], _PATIENCE)[0]:
             os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
     finally:
@@ -144,6 +157,7 @@ def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, 
 def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
     status = 1
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # which a session in the background has not
         for number, file, flags in ((0, stdin, os.O_RDONLY), (1, out, os.O_WRONLY), (2, err, os.O_WRONLY)):
             os.dup2(os.open(file, flags | (os.O_CREAT | os.O_TRUNC if flags else 0), 0o600), number)
         sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w")  # noqa: SIM115
@@ -156,6 +170,7 @@ def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
         pages = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_DATA, (pages + (MEGABYTES << 20),) * 2)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
         work()
         status = 0
     except SystemExit as stop:

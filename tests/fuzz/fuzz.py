@@ -10,6 +10,7 @@ import os
 import re
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 from case import Case, cases
@@ -21,10 +22,11 @@ _ROUND = 200  # draws by one seed
 
 
 class Session:
-    """Draws until the time is over; `faults` counts each kind."""
+    """Draws until the time is over; `faults` counts each kind, `tried` each command."""
 
     def __init__(self, seconds: float) -> None:
         self.faults: dict[str, int] = {}
+        self.tried: Counter[str] = Counter()
         self.draws = 0
         self._end = time.monotonic() + seconds
 
@@ -38,7 +40,9 @@ class Session:
         if self.over:
             return
         self.draws += 1
-        fault = try_case(case)
+        if self.draws % _ROUND == 0:
+            print(f"draw {self.draws}, {sum(self.tried.values())} commands", flush=True)
+        fault = try_case(case, self.tried)
         if fault is None:
             return
         self.faults[fault.kind] = self.faults.get(fault.kind, 0) + 1
@@ -74,6 +78,8 @@ def main() -> None:
         number += 1
     minutes = (time.monotonic() - began) / 60
     print(f"{session.draws} draws, {session.draws / minutes:.0f} a minute; {len(session.faults)} kinds of fault")
+    for how, count in sorted(session.tried.items()):
+        print(f"{count:6d}  {how}")
     for kind, count in sorted(session.faults.items(), key=lambda entry: -entry[1]):
         print(f"{count:6d}  {kind}")
     sys.exit(bool(session.faults))

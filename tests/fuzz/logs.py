@@ -177,14 +177,14 @@ def _mostly(usual: object, *others: object) -> st.SearchStrategy:
 
 
 @st.composite
-def _runs(draw: st.DrawFn, plain: bool) -> RunPlan:
+def _runs(draw: st.DrawFn, plain: bool, large: bool) -> RunPlan:
     run = RunPlan(seed=draw(st.integers(0, 9999)), csv=draw(st.booleans()), torque=draw(_LOGGED), power=draw(_LOGGED))
     if plain:
-        return replace(run, torque="model", samples=draw(st.sampled_from((300, 600))))
+        return replace(run, torque="model", samples=draw(st.sampled_from((300, 600) if large else (120, 200, 300))))
     return replace(
         run,
         rate=draw(_mostly(100.0, 1.0, 8.0, 25.0, 500.0, 1e-3, 1e5)),
-        samples=draw(_mostly(300, 1, 2, 5, 20, 21, 40, 100, 800)),
+        samples=draw(_mostly(300 if large else 160, 1, 2, 5, 20, 21, 40, 60, 800)),
         motion=draw(_mostly("swing", "still", "one joint", "steps", "stops")),
         amplitude=draw(_mostly(0.5, 1e-9, 1e-3, 1.2, 30.0)),
         noise=draw(_mostly(1e-3, 0.0, 1.0, 1e3)),
@@ -202,12 +202,12 @@ def _runs(draw: st.DrawFn, plain: bool) -> RunPlan:
 
 
 @st.composite
-def data_sets(draw: st.DrawFn) -> DataPlan:
+def data_sets(draw: st.DrawFn, large: bool) -> DataPlan:
     """Draw a data set: a plain robot or plain runs half of the time each, so that something is left to work on."""
     plain = draw(st.booleans())
     return DataPlan(
-        robot=draw(robots()),
-        runs=tuple(draw(st.lists(_runs(plain), min_size=1, max_size=4))),
+        robot=draw(robots(large)),
+        runs=tuple(draw(st.lists(_runs(plain, large), min_size=1, max_size=4 if large else 2))),
         sheet=draw(st.sampled_from(((), (), (("torque_constant", 8.0),), (("rotor_inertia", 0.0),)))),
         effects=draw(_mostly(None, (), _EFFECTS, ("standby_power",), ("rigid_body",), ("coulomb_friction",))),
         power_at=draw(_mostly("mains", "dc_bus")),

@@ -79,7 +79,7 @@ _KINDS = ("revolute",) * 8 + ("prismatic",) * 2 + ("continuous", "fixed", "mimic
 _AXES = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8), (0.0, 0.0, -1.0))
 _LIMITS = ((-2.5, 2.5, 3.0, 200.0), (-2.5, 2.5, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (-1e9, 1e9, 1e9, 1e9), None)
 _SHAPES = ("", "", '<box size="0.1 0.1 0.2"/>', '<sphere radius="0"/>', '<mesh filename="package://x/y.stl"/>')
-_COUNTS = (1, 1, 2, 2, 2, 3, 3, 3, 3, 4, 6, 6, 7, 12, 40)
+_FEW, _MANY = (1, 1, 2, 2, 3), (4, 6, 6, 7, 12, 40)
 
 
 @st.composite
@@ -100,9 +100,9 @@ def _axis(draw: st.DrawFn, plain: bool) -> Axis:
 
 
 @st.composite
-def robots(draw: st.DrawFn, plain: bool | None = None) -> RobotPlan:
-    """Draw a robot of 1 to 40 axes; a `plain` one is an arm of revolute joints as they are built."""
-    plain = draw(st.booleans()) if plain is None else plain
-    count = draw(st.sampled_from(_COUNTS))
+def robots(draw: st.DrawFn, large: bool) -> RobotPlan:
+    """Draw a robot of 1 to 3 axes, or of 4 to 40; half are arms of revolute joints as they are built."""
+    plain = draw(st.booleans())
+    count = draw(st.sampled_from(_MANY if large else _FEW))
     axes = tuple(draw(_axis(plain)) for _ in range(count))
     return RobotPlan(axes, name="arm" if plain else draw(st.sampled_from(("arm", *NAMES))) or "arm")

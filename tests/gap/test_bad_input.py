@@ -50,6 +50,10 @@ REFUSED = {
         lambda: runs(torque=nothing, power=nothing),
         "observed_0.parquet: neither torque nor power can be told; log tau_, i_ or power",
     ),
+    "too short": (
+        lambda: [replace(run, signals=run.signals.rows(slice(26))) for run in runs(seeds=range(3))],
+        "dataset.toml: the observed runs last 0.75 s together, too short to tell a gap from none; log at least 1 s",
+    ),
     "nothing moves": (lambda: runs(q=still), "dataset.toml: no joint moves in any observed run; log runs in motion"),
     "nothing in common": (
         lambda: [*runs("reference", torque=nothing), *runs(seeds=range(5, 9), power=nothing)],

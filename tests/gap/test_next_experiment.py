@@ -117,6 +117,32 @@ def test_a_page_draws_the_joints_that_move(motions):
     assert experiment(proposal.curve) is not None
 
 
+def test_positions_of_sliding_joints_are_in_metres(motions):
+    gantry = arm(2, slides=(1,))
+    both = next(iter(programmes(gantry, [], motions)))
+    drawn = Proposal("tell", (), both.joints, gantry, both, (), (), (), None).curve
+    assert drawn["units"] == ["rad", "m"]
+    assert experiment(drawn)["layout"]["yaxis"]["title"]["text"] == "position, rad or m"
+    assert "m/s" in next(iter(programmes(gantry, ["joint_2"], motions))).text
+
+
+@pytest.mark.parametrize(("speed", "rate"), [(1e-5, 100.0), (3.0, 50_000.0)])
+def test_a_programme_lasts_minutes_and_has_no_million_samples(motions, speed, rate):
+    robot = replace(ROBOT, joints=tuple(replace(joint, velocity=speed) for joint in ROBOT.joints))
+    fast = [replace(motion, time=motion.time * motion.rate / rate, cutoff=rate / 5) for motion in motions]
+    for one in programmes(robot, [], fast):
+        for motion in one.motions:
+            assert motion.time[-1] <= 600
+            assert len(motion.time) <= 100_000
+
+
+def test_where_every_programme_would_last_too_long_it_is_said(motions):
+    robot = replace(ROBOT, joints=tuple(replace(joint, velocity=1e-5) for joint in ROBOT.joints))
+    silent = catalogue()["stribeck_friction"]
+    proposal = next_experiment(robot, [ground_of(motions, [silent.id])], [silent], motions)
+    assert proposal.programme is None or proposal.programme.seconds <= 600
+
+
 def test_without_limits_those_that_were_seen_are_kept(motions):
     joints = tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in ROBOT.joints)
     free = replace(ROBOT, joints=joints)

@@ -64,7 +64,7 @@ MALFORMED = {
     "loop": (GOOD.replace('child link="b"', 'child link="a"'), "loop|several bases"),
     "unknown type": (GOOD.replace("revolute", "teleport"), "cannot be modelled"),
     "free joint": (GOOD.replace("revolute", "floating"), "cannot be modelled"),
-    "mimic": (GOOD.replace("</joint>", '<mimic joint="j"/></joint>'), "mimics another joint"),
+    "mimic": (GOOD.replace("</joint>", '<mimic joint="j"/></joint>'), 'mimics "j", which is no other joint'),
     "no axis": (GOOD.replace("0 0 1", "0 0 0"), "axis is zero"),
     "short axis": (GOOD.replace("0 0 1", "0 1"), "3 finite numbers"),
     "limits swapped": (GOOD.replace('lower="-1"', 'lower="3"'), "lies above"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from arms import kr6
 
-from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters, condition_number
 from irtwin.robot.urdf import parse_urdf
@@ -99,6 +99,12 @@ def test_condition_number_of_what_a_motion_shows():
     poor = condition_number(columns[:40], base)
     assert 1 < rich < poor
     assert condition_number(np.zeros_like(columns), base) == np.inf
+
+
+def test_where_nothing_makes_torque_there_is_nothing_to_tell_apart():
+    none = base_parameters(Stack(kr6(), [catalogue()["standby_power"]]))
+    assert none.independent.shape == (0,)
+    assert condition_number(np.zeros((3, 0)), none) == 1.0
 
 
 def test_seven_axes_are_named():

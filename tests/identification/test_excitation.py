@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.errors import InputError
+from irtwin.identification import excitation
 from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import CLEARANCE, FULL_SPEED_AFTER, Box
 from irtwin.robot.description import Robot
@@ -151,6 +152,16 @@ def test_ctrl_c_gives_the_best_motion_so_far() -> None:
     assert len(told) == 16
     assert found.condition_number == pytest.approx(told[-1], rel=0.1)  # at other samples
     assert_limits_kept(TWO, found)
+
+
+def test_the_most_work_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(excitation, "_MOST_WORK", 1e5)  # as if TWO had fifteen joints
+    found = excite(TWO, 5.0, iterations=5)
+    assert found.bounded
+    assert_limits_kept(TWO, found)
+    assert not found.interrupted
+    monkeypatch.undo()
+    assert not excite(TWO, 5.0, iterations=5).bounded
 
 
 def test_a_time_limit_ends_the_search() -> None:

@@ -49,6 +49,21 @@ def test_kinematics_of_a_planar_elbow():
     assert np.allclose(link_placements(robot, q[1])["fore"][:3, 3], [0, 1, 0], atol=1e-12)
 
 
+FINGERS = ARM.replace(
+    "</robot>",
+    """<link name="left"><inertial><mass value="0.5"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
+    <joint name="finger" type="prismatic"><parent link="tool"/><child link="left"/><mimic joint="elbow"/></joint>
+    </robot>""",
+)
+
+
+def test_a_joint_that_mimics_another_is_held_and_its_mass_stays():
+    robot, plain = parse_urdf(FINGERS), parse_urdf(ARM)
+    assert robot.held == ("finger",)
+    assert robot.joint_names == plain.joint_names
+    assert sum(i.mass for i in robot.model.inertias) == pytest.approx(sum(i.mass for i in plain.model.inertias) + 0.5)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -69,7 +84,10 @@ def test_kinematics_of_a_planar_elbow():
         (ARM.replace('<child link="upper"/>', '<child link="tool"/>'), "child of two joints"),
         (ARM.replace('<parent link="base"/>', '<parent link="fore"/>'), "several bases|loop"),
         (ARM.replace('name="elbow"', 'name="shoulder"'), "stands there twice"),
-        (ARM.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="elbow"/>'), "mimics another joint"),
+        (
+            ARM.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="wrist"/>'),
+            'mimics "wrist", which is no other',
+        ),
     ],
 )
 def test_faults_are_named(text, message):

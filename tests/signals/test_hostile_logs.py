@@ -109,12 +109,13 @@ ROWS = b"".join(b"%g,0.1,1\n" % (row / 100) for row in range(30))
         (b"time,q_joint_1,tau_joint_1\n" + b"1" * 100_000_000 + b"\n", "a line is longer than 1 MB"),
         (b"time,q_joint_1,tau_joint_1\n0," + b"9" * 5000 + b",1\n" + ROWS, "line 2, column q_joint_1"),
         (b"time,q_joint_1,tau_joint_1\n0,1e999,1\n" + ROWS, "line 2, column q_joint_1"),
-        (b"\xff\xfetime\n" + ROWS, "wrong|not readable|values|missing"),
+        (b"\xff\xfetime\n" + ROWS, "line 1: not UTF-8 text"),
+        (b"time,q_a\n0,1,\xe9,2\n" + ROWS, "line 2: not UTF-8 text"),
         (b"time,q_joint_1,tau_joint_1\n0,\x00,1\n" + ROWS, "line 2, column q_joint_1"),
         (b"\x00" * 1000 + b"\n" + ROWS, "missing|values"),
         (b'time,"q_joint_1,tau_joint_1\n' + ROWS, "not readable as CSV"),
     ],
-    ids=range(8),
+    ids=range(9),
 )
 def test_tables_of_text_that_are_none(folder, content, message):
     assert re.search(message, refused(as_csv(folder, content)))

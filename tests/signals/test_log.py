@@ -66,6 +66,16 @@ def write_csv(path: Path, signals: dict[str, np.ndarray]) -> Path:
     return path
 
 
+def test_columns_of_a_joint_that_mimics_another_are_left_out_and_it_is_said(folder: Path):
+    finger = '<joint name="b_too" type="revolute"><parent link="l2"/><child link="tip"/><mimic joint="b"/></joint>'
+    urdf = URDF.replace("</robot>", f'<link name="tip"/>{finger}</robot>')
+    (folder / "robot.urdf").write_text(urdf)
+    write_csv(folder / "runs/one.csv", columns() | {"q_b_too": np.zeros(50), "tau_b_too": np.zeros(50)})
+    data_set = read_data_set(folder)
+    assert data_set.robot.joint_names == ("a", "b")
+    assert "joint b_too mimics another: it is held at zero, and left out of the logs" in data_set.repairs[0]
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "dataset.toml").write_text(TOML)

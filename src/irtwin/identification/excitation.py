@@ -28,6 +28,7 @@ _BARRIERS = (0.3, 0.1, 0.03, 0.01, 0.003)  # weights of the walls, falling: an i
 _RESERVE = 0.99  # share of the joint limits that is used: controllers round, too
 _STARTS = 10
 _POSTURES = 300
+_MOST_WORK = 3e7  # numbers of regressors, an iteration asked for: thrice what six or seven joints take
 _MOST = 100_000_000  # numbers that a motion is worked out from: 3600 s at 500 Hz of six joints, 0.8 GB
 
 
@@ -37,7 +38,8 @@ class Excitation:
 
     condition_number: of the scaled base regressor at the samples of `rate`, Hz. limit_margin: least distance to a
     joint limit at any time, as a share of it. clearance: lower bound at any time on the distance to the floor and the
-    box, m. interrupted: the search was broken off, and this is the best found until then.
+    box, m. interrupted: the search was broken off; bounded: it ended at its most work, as that of many joints does.
+    Either way this is the best found until then.
     """
 
     joint_names: tuple[str, ...]
@@ -48,6 +50,7 @@ class Excitation:
     limit_margin: float
     clearance: float
     interrupted: bool = False
+    bounded: bool = False
 
     def sample(self, rate: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return time (N,) s and q, dq, ddq (N, n) in SI from rest to rest, evenly at (nearly) `rate` Hz."""
@@ -84,8 +87,9 @@ def excite(
     """Search a motion of `seconds` whose scaled base regressor has the least condition number (Yan 2018, eq. 4).
 
     The limits of the joints, the floor and the `box` are kept at every instant. Equal seeds give equal motions, other
-    seeds other ones, unless `time_limit` (s) ends the search before its `iterations`. A KeyboardInterrupt ends it with
-    the best motion so far. Raises InputError where limits are missing or contradictory or the box is out of reach.
+    seeds other ones, unless `time_limit` (s) ends the search before its `iterations`. Its most work, for robots of many
+    joints, or a KeyboardInterrupt ends it with the best motion so far. Raises InputError where limits are missing or
+    contradictory or the box is out of reach.
     """
     if not 0.5 <= seconds <= 3600:
         raise InputError(f"an exciting motion of {seconds:g} s: ask for 0.5 to 3600 s")
@@ -114,6 +118,10 @@ def excite(
     return search.result(seconds, rate, interrupted)
 
 
+class _MostWork(Exception):
+    """The search has done the work that it may."""
+
+
 class _Search:
     """Interior-point search over the coefficients x: (2 K - 1, n); `best` is always a motion that keeps all limits."""
 
@@ -129,6 +137,8 @@ class _Search:
         self._ranges = tuple(_RESERVE * limit / factor for limit in self._limits.ranges)
         self._box = box
         self._keep_off = 0.03 * self._workspace.reach  # from walls at the grid: for what happens in between
+        self._work = 0.0
+        self.bounded = False
         self.best: FourierSeries | None = None
         self.best_condition = math.inf
 
@@ -141,14 +151,20 @@ class _Search:
             starts.append((self._consider(start), start.ravel()))
             yield
         x = min(starts, key=lambda start: start[0])[1]
+        most = iterations * _MOST_WORK
         for weight in _BARRIERS:
 
             def cost(x: np.ndarray, weight: float = weight) -> tuple[float, np.ndarray]:
+                self._spend(most)
                 return self._cost(x, weight)
 
-            for x in descend(cost, x, iterations // len(_BARRIERS)):  # noqa: B020 - the next barrier goes on from here
-                self._consider(self._shaped(x))
-                yield
+            try:
+                for x in descend(cost, x, iterations // len(_BARRIERS)):  # noqa: B020 - the next barrier goes on from here
+                    self._consider(self._shaped(x))
+                    yield
+            except _MostWork:
+                self.bounded = True
+                return
 
     def result(self, seconds: float, rate: float, interrupted: bool) -> Excitation:
         """Return the best motion and what is known of it."""
@@ -164,7 +180,15 @@ class _Search:
             limit_margin=self._limits.margin(self.best),
             clearance=self._workspace.least_clearance(self.best),
             interrupted=interrupted,
+            bounded=self.bounded,
         )
+
+    def _spend(self, most: float) -> None:
+        """Count the numbers of a cost and its gradient: a sample's regressor is n by 10 n, and 3 n + 1 are needed."""
+        n = len(self._robot.joints)
+        self._work += len(self._rest.grid) * (3 * n + 1) * 10 * n**2
+        if self._work > most:
+            raise _MostWork
 
     def _shaped(self, x: np.ndarray) -> np.ndarray:
         return x.reshape(-1, len(self._robot.joints))
@@ -176,7 +200,7 @@ class _Search:
     def _consider(self, x: np.ndarray) -> float:
         """Return the condition number of the motion, and keep it if it is the best and proven to keep the limits."""
         condition = self._regressor.condition_number(*self._motion(x))
-        if condition < self.best_condition:
+        if self.best is None or condition < self.best_condition:
             series = self._rest.series(x)
             if self._limits.margin(series) > 0 and self._workspace.least_clearance(series) > 0:
                 self.best, self.best_condition = series, condition

@@ -9,6 +9,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -132,7 +133,14 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
         )
         for joint in bare.joints
     )
-    return description.Robot(row.name, joints, bare.links, bare.urdf, row.manufacturer, row.type, row.weight_kg)
+    return replace(
+        bare,
+        name=row.name,
+        joints=joints,
+        manufacturer=row.manufacturer,
+        type=row.type,
+        weight=row.weight_kg,
+    )
 
 
 def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log.Run:

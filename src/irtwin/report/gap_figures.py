@@ -259,17 +259,24 @@ def experiment(curve: Evidence) -> Figure | None:
     """Draw the positions that the proposed experiment commands."""
     if not curve.get("q"):
         return None
+    units = curve.get("units") or ["rad"] * len(curve["joints"])
     lines = [
         {
             "type": "scatter", "mode": "lines", "name": plain(joint), "x": curve["time"], "y": q,
             "line": {"width": 1.5, "color": PALETTE[place % len(PALETTE)]},
-            "hovertemplate": f"{plain(joint)} %{{y:.3~g}} rad<extra></extra>",
+            "hovertemplate": f"{plain(joint)} %{{y:.3~g}} {unit}<extra></extra>",
         }
-        for place, (joint, q) in enumerate(zip(curve["joints"], curve["q"], strict=True))
+        for place, (joint, unit, q) in enumerate(zip(curve["joints"], units, curve["q"], strict=True))
         if place < _JOINTS_DRAWN
     ]  # fmt: skip
     xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
-    return {"data": lines, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": "position, rad"}}}}
+    return {
+        "data": lines,
+        "layout": {
+            "xaxis": xaxis,
+            "yaxis": {"title": {"text": f"position, {' or '.join(sorted(set(units), reverse=True))}"}},
+        },
+    }
 
 
 def _numbered(names: Sequence[str]) -> list[str]:

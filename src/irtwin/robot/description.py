@@ -60,7 +60,10 @@ class Link:
 
 @dataclass(frozen=True)
 class Robot:
-    """A serial (or branched) robot of n moving joints, in the order of `q`."""
+    """A serial (or branched) robot of n moving joints, in the order of `q`.
+
+    `held`: joints that mimic others, as fingers of a gripper do; they stand still in the model.
+    """
 
     name: str
     joints: tuple[Joint, ...]
@@ -69,6 +72,7 @@ class Robot:
     manufacturer: str | None = None
     type: str | None = None
     weight: float | None = None  # kg
+    held: tuple[str, ...] = ()
 
     @cached_property
     def model(self) -> pin.Model:

@@ -13,7 +13,8 @@ _UNBOUNDED = {"lower": "-1e9", "upper": "1e9", "velocity": "1e9", "effort": "1e9
 def build_model(urdf: str) -> pin.Model:
     """Build the model of checked URDF text with one position and one speed per moving joint: nq = nv = n.
 
-    A continuous joint becomes a revolute one without limits (Pinocchio would give it a cosine and a sine).
+    A continuous joint becomes a revolute one without limits (Pinocchio would give it a cosine and a sine); one that
+    mimics another is fixed.
     Raises ValueError where Pinocchio refuses the text.
     """
     root = SafeXml.fromstring(urdf.encode("utf-8"), forbid_dtd=True)
@@ -21,6 +22,9 @@ def build_model(urdf: str) -> pin.Model:
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)
     for joint in root.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
+            joint.set("type", "fixed")
         kind = joint.get("type")
         if kind == "continuous":
             joint.set("type", "revolute")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
@@ -39,14 +40,15 @@ def parse_urdf(text: str, source: str = "URDF") -> Robot:
     """Make a robot of URDF text; `source` names it in messages. Meshes are never opened. Raises InputError."""
     root = _parse(text, source)
     links = _links(root, source)
+    held = _held(root, source)
     joints = _joints(root, links, source)
     _check_tree(root, links, source)
-    robot = Robot(name=root.get("name") or "robot", joints=(), links=tuple(links.values()), urdf=text)
+    robot = Robot(name=root.get("name") or "robot", joints=(), links=tuple(links.values()), urdf=text, held=held)
     try:
         order = list(robot.model.names)[1:]
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{source}: Pinocchio cannot build this robot: {_first_line(error)}") from error
-    return Robot(robot.name, tuple(joints[name] for name in order), robot.links, text)
+    return replace(robot, joints=tuple(joints[name] for name in order))
 
 
 def _first_line(error: Exception) -> str:
@@ -157,13 +159,28 @@ def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joi
         if kind not in _MOVING:
             raise InputError(f'{where}: type "{kind}" cannot be modelled; use revolute, continuous, prismatic or fixed')
         if element.find("mimic") is not None:
-            raise InputError(f"{where}: mimics another joint, which is not supported; make it fixed")
+            continue
         joints[name] = _joint(element, name, kind, where)
     if not joints:
         raise InputError(f"{source}: no joint moves; a robot needs at least one revolute or prismatic joint")
     if len(joints) > _MOST_JOINTS:
         raise InputError(f"{source}: {len(joints)} joints move; a robot of more than {_MOST_JOINTS} cannot be modelled")
     return joints
+
+
+def _held(root: Element, source: str) -> tuple[str, ...]:
+    """Return the names of the joints that mimic others, which stand still in the model."""
+    names = [joint.get("name") for joint in root.findall("joint")]
+    held = []
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is None or joint.get("type") == "fixed":
+            continue
+        name, other = str(joint.get("name")), mimic.get("joint")
+        if other not in names or other == name:
+            raise InputError(f'{source}: joint "{name}": mimics "{other}", which is no other joint of this robot')
+        held.append(name)
+    return tuple(held)
 
 
 def _joint(element: Element, name: str, kind: str, where: str) -> Joint:

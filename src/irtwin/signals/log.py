@@ -42,7 +42,8 @@ class Run:
 class DataSet:
     """A robot and its runs; `effects` is what the twin is said to model, None for the baseline.
 
-    `repairs` says what was done to the samples: some dropped, a run cut at a hole in time, held samples thinned out.
+    `repairs` says what was done to the samples: some dropped, a run cut at a hole in time, held samples thinned out,
+    joints that mimic others left out.
     """
 
     folder: Path
@@ -66,7 +67,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     document = read_toml(file)
     table = Table(file, "[robot]", take(document, "robot", dict, file, "[robot]"))
     robot = _robot(folder, table)
-    repairs: list[str] = []
+    repairs = [f"{file}: {_held(robot)}"] if robot.held else []
     runs = list(_runs(folder, file, document, robot, repair, repairs))
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
@@ -86,6 +87,12 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf")},
         repairs=tuple(repairs),
     )
+
+
+def _held(robot: Robot) -> str:
+    one = len(robot.held) == 1
+    what = "joint {} mimics another: it is" if one else "joints {} mimic others: they are"
+    return f"{what.format(', '.join(robot.held))} held at zero, and left out of the logs"
 
 
 def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:

@@ -135,6 +135,7 @@ def _read_csv(path: Path, robot: Robot, repair: bool) -> tuple[pa.Table, int, li
         raise InputError(f"{path}: is empty; a run has a line of column names and a line for each sample")
     if b"\n" not in text:
         raise InputError(f"{path}: has no sample below its first line; an empty run cannot be used")
+    _check_characters(text, path)
     columns = text.count(b",", 0, text.index(b"\n")) + 1
     if columns > _MOST_COLUMNS:
         raise InputError(f"{path}, line 1: {columns} columns; a run has at most {_MOST_COLUMNS}")
@@ -166,6 +167,19 @@ def _read_csv(path: Path, robot: Robot, repair: bool) -> tuple[pa.Table, int, li
     return table.select(known), 2, [said] if wrong else []
 
 
+def _check_characters(text: bytes, path: Path) -> None:
+    """Raise where the text is not UTF-8: Arrow stumbles over such a line of the wrong length, and says so to nobody."""
+    if text.isascii():
+        return
+    for number, line in enumerate(io.BytesIO(text), start=1):
+        try:
+            line.decode()
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"{path}, line {number}: not UTF-8 text (byte {error.start + 1}); save the run as UTF-8"
+            ) from error
+
+
 def _known(columns: Sequence[str], robot: Robot, path: Path) -> list[str]:
     """Return those columns that the log format knows; raise on missing, repeated, foreign ones."""
     names = [name.strip() for name in columns]
@@ -177,7 +191,7 @@ def _known(columns: Sequence[str], robot: Robot, path: Path) -> list[str]:
     per_joint = {f"{kind}_{joint}" for kind in REACH if kind not in _WHOLE_ROBOT for joint in robot.joint_names}
     for name in names:
         kind, _, joint = name.partition("_")
-        if kind in ("q", "dq", "ddq", "tau") and joint and name not in per_joint:
+        if kind in ("q", "dq", "ddq", "tau") and joint and name not in per_joint and joint not in robot.held:
             raise InputError(
                 f'{path}: column {name}: the URDF has no moving joint "{joint}" (it has {", ".join(robot.joint_names)})'
             )

@@ -11,14 +11,16 @@ from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 
 _SLOW = 1e-3  # rad/s (m/s)
+_SHORTEST = 1.0  # s of all observed runs: in less no robot makes a move, and any twin fits
 _STILL = 1e-3  # rad (m): noise of a joint that stands still spans less
 
 
 def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     """Raise InputError, naming the file and what to do, where no diagnosis is possible; `motions` by name of the run.
 
-    There have to be observed runs, with torque or power that changes with the motion, in which some joint moves;
-    references that share a signal with them; and no run twice, which would judge a fit on what it was fitted to.
+    There have to be observed runs, a second long together, with torque or power that changes with the motion, in which
+    some joint moves; references that share a signal with them; and no run twice, which would judge a fit on what it was
+    fitted to.
     """
     file = data_set.folder / "dataset.toml"
     observed = [run for run in data_set.runs if run.role == "observed"]
@@ -27,6 +29,12 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     seen = [motions[run.name] for run in observed]
     if not any(motion.torque is not None or motion.power is not None for motion in seen):
         raise InputError(f"{file}: {_nothing_measured(seen)}")
+    seconds = sum(float(motion.time[-1] - motion.time[0]) for motion in seen)
+    if seconds < _SHORTEST:
+        raise InputError(
+            f"{file}: the observed runs last {seconds:.2g} s together, too short to tell a gap from none; log at least "
+            f"{_SHORTEST:g} s in motion"
+        )
     if not any(_moving(motion).any() for motion in seen):
         raise InputError(f"{file}: no joint moves in any observed run; log runs in motion")
     _check_dead([run for run in observed if _moving(motions[run.name]).any()], data_set.robot.joint_names, motions)

@@ -11,7 +11,7 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
-from irtwin.gap.experiment.programmes import Programme, programmes
+from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
@@ -127,6 +127,7 @@ class Proposal:
         return {
             "time": np.concatenate(time).round(3).tolist(),
             "joints": list(self.programme.joints),
+            "units": [self.robot.joints[joint].unit for joint in moved],
             "q": np.concatenate(q).T[moved].round(5).tolist(),
         }
 
@@ -224,6 +225,8 @@ def next_experiment(
     tried = programmes(robot, joints, seen, warm=warm, take_off=off) if questions else ()
     weighed = [(one, _weigh(one, questions)) for one in tried]
     note = _note([weights for _, weights in weighed])
+    if questions and not weighed:
+        note = f"no programme of at most {LONGEST / 60:g} minutes keeps to the limits of this robot"
     weighed = [(one, open_) for one, weights in weighed if (open_ := [w for w in weights if not w.known])]
     asked = {name for q in questions for name in q.effects}
     by_hand = _manual_tests([effect for effect in effects if effect.id not in asked])

@@ -16,14 +16,14 @@ from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
 _RESERVE = 0.9  # of the limits of speed and acceleration
-_SLOWEST = 0.005  # rad/s
+_SLOWEST = 0.005  # rad/s (m/s)
 _LEVELS = 8  # speeds of a ladder
 _LEG = 3.0  # s at each speed
 _SWEEP = 20.0  # s one way
 _TURN = 2 * np.pi  # rad: more repeats itself
 _POSES = 10
 _HOLD = 2.0  # s
-_SMALL = (3e-3, 0.01, 0.03)  # rad: half of the way between reversals
+_SMALL = (3e-3, 0.01, 0.03)  # rad (m): half of the way between reversals
 _STEPS = (0.25, 0.5, 1.0)  # of the largest acceleration
 _EXCITING = 20.0  # s
 _ITERATIONS = 5  # enough to compare; `irtwin excite` goes on from there
@@ -34,6 +34,8 @@ _PAYLOAD_SHARE = 1 / 8  # of the arm's mass: what arms of their class carry at l
 _CENTRE = (0.0, 0.0, 0.05)  # m, of the load, from the flange
 _SHRINK, _TRIES = 0.7, 6
 _CHECKED = 200  # poses on the way
+LONGEST = 600.0  # s of one programme
+_MOST_SAMPLES = 100_000  # of one programme
 _RATE = 5.0  # samples a period of the cutoff: enough of what the filter lets through
 
 
@@ -89,7 +91,7 @@ def programmes(
         made = yard.clear(build)
         if made is not None:
             yield made
-    exciting = _exciting(robot, yard)
+    exciting = _exciting(robot, yard) if yard.within(_EXCITING) else None
     if exciting is None:
         return
     yield exciting
@@ -129,18 +131,31 @@ class _Yard:
         self._walls = walls if walls.clearance(q[::every]).min(initial=1.0) > 0 else None  # else the floor is elsewhere
 
     def clear(self, build: Callable[[_Yard], Programme]) -> Programme | None:
-        """Return the programme about the pose, smaller where it would touch the floor; None where none is clear."""
+        """Return the programme about the pose, smaller where it would touch the floor or last too long.
+
+        None where no such one is clear.
+        """
         whole = self.reach
         for _ in range(_TRIES):
-            made = build(self)
-            q = np.concatenate([motion.q for motion in made.motions])
-            every = max(1, len(q) // _CHECKED)
-            if self._walls is None or self._walls.clearance(q[::every]).min(initial=1.0) > 0:
+            try:
+                made = build(self)
+            except _TooLong:
+                made = None
+            if made is not None and self._above_floor(made):
                 self.reach = whole
                 return made
             self.reach = _SHRINK * self.reach
         self.reach = whole
         return None
+
+    def within(self, seconds: float) -> bool:
+        """Return whether a programme may last so long."""
+        return seconds <= LONGEST and seconds * self.rate <= _MOST_SAMPLES
+
+    def _above_floor(self, made: Programme) -> bool:
+        q = np.concatenate([motion.q for motion in made.motions])
+        every = max(1, len(q) // _CHECKED)
+        return self._walls is None or float(self._walls.clearance(q[::every]).min(initial=1.0)) > 0
 
     def motion(self, stops: Sequence[np.ndarray], speeds: Sequence[np.ndarray], hold: float = 0.1) -> Motion:
         """Move from stop to stop (n,) at most at `speeds` (n,) each, with a rest of `hold` s between them."""
@@ -153,10 +168,14 @@ class _Yard:
         accelerations: Sequence[np.ndarray],
         hold: float,
     ) -> Motion:
-        """Do as `motion` does, with the acceleration of each move."""
+        """Do as `motion` does, with the acceleration of each move. Raises _TooLong."""
+        moves = list(zip(stops, stops[1:], speeds, accelerations, strict=False))
+        whole = hold * len(stops) + sum(1 / fast + fast / sharp for fast, sharp in (_pace(*move) for move in moves))
+        if not self.within(whole):
+            raise _TooLong
         rest = np.zeros((max(1, round(hold * self.rate)), len(self.pose)))
         parts = [(stops[0] + rest, rest, rest)]
-        for start, stop, speed, acceleration in zip(stops, stops[1:], speeds, accelerations, strict=False):
+        for start, stop, speed, acceleration in moves:
             parts += [_move(start, stop, speed, acceleration, self.rate), (stop + rest, rest, rest)]
         q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
         return Motion("planned", np.arange(len(q)) / self.rate, q, dq, ddq, cutoff=self.cutoff)
@@ -169,9 +188,26 @@ class _Yard:
         }
 
     @property
+    def unit(self) -> str:
+        """The unit of the joints that move, in words."""
+        units = {joint.unit for joint in self.robot.joints if joint.name in self.joints}
+        return " or ".join(sorted(units, reverse=True))
+
+    @property
     def named(self) -> str:
         """Which joints move, in words."""
         return "all joints" if self.moved.all() else ", ".join(self.joints)
+
+
+class _TooLong(Exception):
+    """A programme would last longer, or have more samples, than one may."""
+
+
+def _pace(start: np.ndarray, stop: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> tuple[float, float]:
+    """Return the largest speed (1/s) and acceleration (1/s^2) of a move, as shares of its way."""
+    size = np.maximum(np.abs(stop - start), 1e-12)
+    fast, sharp = float((speed / size).min()), float((acceleration / size).min())
+    return min(fast, sharp**0.5), sharp
 
 
 def _move(
@@ -179,9 +215,7 @@ def _move(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return q, dq, ddq (N, n) from rest to rest on a straight line in joint space, by a trapezoid of speed."""
     way = stop - start
-    size = np.maximum(np.abs(way), 1e-12)
-    fast, sharp = float((speed / size).min()), float((acceleration / size).min())
-    fast = min(fast, sharp**0.5)
+    fast, sharp = _pace(start, stop, speed, acceleration)
     needed = 1 / fast + fast / sharp
     count = int(np.ceil(needed * rate))
     slower = needed * rate / count
@@ -222,7 +256,7 @@ def _ladder(yard: _Yard) -> Programme:
     return Programme(
         "speed_ladder",
         f"{yard.named}: a ladder of {_LEVELS} constant speeds, each both ways, from "
-        f"{speeds[0][yard.moved].min():.2g} to {speeds[-1][yard.moved].max():.2g} rad/s",
+        f"{speeds[0][yard.moved].min():.2g} to {speeds[-1][yard.moved].max():.2g} {yard.unit}/s",
         yard.joints,
         (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
         settings={"pose": _pose(yard), "speeds": yard.by_joint(speeds), "amplitudes": yard.by_joint(half)},
@@ -234,7 +268,7 @@ def _sweep(yard: _Yard) -> Programme:
     ends = yard.pose - yard.reach, yard.pose + yard.reach
     return Programme(
         "slow_sweep",
-        f"{yard.named}: one slow, constant speed both ways over {2 * yard.reach.max():.2g} rad",
+        f"{yard.named}: one slow, constant speed both ways over {2 * yard.reach.max():.2g} {yard.unit}",
         yard.joints,
         (
             yard.motion(
@@ -253,7 +287,8 @@ def _reversals(yard: _Yard) -> Programme:
         rates += [np.maximum(2 * way, 1e-6)] * 6
     return Programme(
         "small_reversals",
-        f"{yard.named}: slow reversals of {_SMALL[0]:g} to {_SMALL[-1]:g} rad about one pose, a second each way",
+        f"{yard.named}: slow reversals of {_SMALL[0]:g} to {_SMALL[-1]:g} {yard.unit} about one pose, "
+        "a second each way",
         yard.joints,
         (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
         settings={"pose": _pose(yard), "amplitudes": {name: list(_SMALL) for name in yard.joints}},

@@ -13,6 +13,7 @@ from irtwin.effects.supply import MechanicalPower
 from irtwin.signals.motion import Motion
 from irtwin.twin.identify import fit_through_power, power_slope
 
+_PIECE = 8192  # samples whose columns of torque are held at once
 Terms = tuple[tuple[Effect, Term], ...]
 
 
@@ -45,6 +46,11 @@ class ThroughPower(Stack):
 
     def power_columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
         """Return the (N, L) regressor of power."""
+        starts = range(0, len(motion.time), _PIECE)
+        pieces = [self._columns(motion.part(at, at + _PIECE), torque[at : at + _PIECE]) for at in starts]
+        return np.concatenate(pieces)
+
+    def _columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
         torque_values, power_values = self._values
         own = self._own.predicted_power_columns(motion, torque_values, power_values)
         slope = power_slope(self._own, motion, torque, power_values)
