@@ -77,7 +77,8 @@ def of_query(text: str) -> Reach:
     def visit(node: Any) -> None:
         if not isinstance(node, CompValue):
             return
-        patterns.extend(node.get("triples") or () if node.name in ("BGP", "TriplesBlock") else ())
+        for triples in node.get("triples") or () if node.name in ("BGP", "TriplesBlock") else ():
+            patterns.extend(zip(*[iter(triples)] * 3, strict=True))  # rdflib strings those within EXISTS together
         if node.name == "Extend" and isinstance(node.expr, rdflib.URIRef):
             named.add(node.var)
             terms.add(str(node.expr))
