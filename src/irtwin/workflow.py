@@ -224,6 +224,8 @@ def conclude(graph: KnowledgeGraph, announce: Announce) -> None:
     announce("Reasoning")
     inferred = reason(graph)
     announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
+    if inferred.joined_by:
+        announce(f"  reasoned over all robots together, as of all of them speaks: {inferred.joined_by}")
     for violation in validate(graph):
         announce(f"  {violation}")
 

@@ -1,7 +1,10 @@
+import pyshacl
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 
+from irtwin.knowledge import owl_dl
 from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.validation import validate
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, individual, term
 
@@ -71,3 +74,82 @@ def test_report_is_replaced_not_gathered(two_robots: list[Quad], graph: Knowledg
     graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
     assert validate(graph) == ()
     assert len(graph.triples(GRAPH_VALIDATION)) == 2
+
+
+def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    reason(graph)
+    return graph
+
+
+def violations_anew(quads: list[Quad]) -> tuple[str, ...]:
+    return tuple(map(str, validate(reasoned(quads))))
+
+
+@pytest.fixture
+def checked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
+    """Return the individuals that pySHACL is given, call by call; no rule of SWRL, as Pellet takes seconds."""
+    calls: list[set[str]] = []
+    shacl = pyshacl.validate
+
+    def spy(data, **options):
+        calls.append({str(node) for node in data.subjects() if str(node).startswith(ID)})
+        return shacl(data, **options)
+
+    monkeypatch.setattr(pyshacl, "validate", spy)
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts: set())
+    return calls
+
+
+def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], checked: list[set[str]]) -> None:
+    of_b = individual("run", "Arm_B.work_1")
+    broken = changed(two_robots, of_b, "Run_Time", Literal(0.0))
+    graph = reasoned(broken)
+    assert tuple(map(str, validate(graph))) == violations_anew(broken)
+    worse = changed(broken, RUN, "Run_Time", None)
+    for now in (worse, two_robots):
+        as_stored = KnowledgeGraph()
+        as_stored.replace(now, GRAPH_SOURCE, GRAPH_ACTIVITY)
+        current, new = (
+            {one for one in of.quads() if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))}
+            for of in (graph, as_stored)
+        )
+        graph.change(current - new, new - current)
+        reason(graph)
+        checked.clear()
+        found = validate(graph)
+        assert tuple(map(str, found)) == violations_anew(now)
+        again, anew = checked
+        assert again < anew
+        kept = graph.query("PREFIX sh: <http://www.w3.org/ns/shacl#> SELECT ?n { ?r sh:result / sh:focusNode ?n }")
+        assert sorted(row["n"] for row in kept) == sorted(one.node for one in found)
+    assert len(graph.triples(GRAPH_VALIDATION)) == 2
+
+
+def test_what_was_not_reasoned_over_is_checked_whole(two_robots: list[Quad], checked: list[set[str]]) -> None:
+    graph = reasoned(two_robots)
+    validate(graph)
+    wrong = changed(two_robots, RUN, "Run_Time", None)
+    graph.change(set(two_robots) - set(wrong), set(wrong) - set(two_robots))
+    assert len(validate(graph)) == 1
+    reason(graph)
+    assert len(validate(graph)) == 1
+
+
+def test_nothing_is_checked_where_nothing_changed(two_robots: list[Quad], checked: list[set[str]]) -> None:
+    graph = reasoned(changed(two_robots, RUN, "Run_Time", None))
+    first = validate(graph)
+    checked.clear()
+    assert validate(graph) == first
+    assert checked == []
+
+
+def test_violations_go_with_their_robot(two_robots: list[Quad], checked: list[set[str]]) -> None:
+    graph = reasoned(changed(two_robots, RUN, "Run_Time", None))
+    assert len(validate(graph)) == 1
+    gone = {one for one in graph.quads() if "Arm_A" in str(one.triple) and "/inferred/" not in str(one.graph_name)}
+    graph.change({one for one in gone if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))}, ())
+    reason(graph)
+    assert validate(graph) == ()

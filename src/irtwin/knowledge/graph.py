@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
 from pyoxigraph import (
+    BlankNode,
     DefaultGraph,
     NamedNode,
     Quad,
@@ -20,7 +21,7 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
-from irtwin.knowledge import store_files
+from irtwin.knowledge import changes, store_files
 from irtwin.knowledge.blank_nodes import has_blank_node, same
 from irtwin.knowledge.damage import check_files, telling, told
 from irtwin.knowledge.keywords import refuse_service
@@ -31,7 +32,7 @@ from irtwin.knowledge.sparql_text import bound
 from irtwin.knowledge.table import Table, to_python
 from irtwin.knowledge.update_dataset import using
 from irtwin.knowledge.updates import as_change, check, keeping_union
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, ID, PREFIXES
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_UPDATE, ID, PREFIXES
 from irtwin.resources import folder
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ class KnowledgeGraph:
         quads = _belonging(quads, below)
         old = self.graphs(*below)
         if isinstance(self._store, Store) and not old:
+            self._forget_what_was_inferred(below)
             self._store.bulk_extend(_with_union(quads))
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
@@ -125,6 +127,7 @@ class KnowledgeGraph:
         names = {*_names(new), *old}
         changed = sorted(name for name in names if not same(_read(new, name), _read(self._store, name)))
         if changed:
+            self._forget_what_was_inferred(changed)
             self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
@@ -137,6 +140,8 @@ class KnowledgeGraph:
         """
         taken, given = set(removed), set(added)
         taken -= given
+        if isinstance(self._store, Store):
+            given |= changes.notes(self._store, taken | given)
         if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
         triples = {quad.triple for quad in taken}
@@ -256,12 +261,34 @@ class KnowledgeGraph:
         try:
             change = as_change(text, self._holding, base)
             if change is None:
+                self._forget_what_was_inferred([GRAPH_UPDATE])
                 self._store.update(keeping_union(text, base), base_iri=base, prefixes=PREFIXES)
             else:
                 self.change(*change)
             self._store.flush()
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
+
+    @telling
+    def about(self, node: NamedNode | BlankNode) -> list[Quad]:
+        """Return the quads of named graphs that have a node for subject or object; not of a server's graph."""
+        assert isinstance(self._store, Store)
+        return [
+            quad
+            for ends in ((node, None), (None, node))
+            for quad in self._store.quads_for_pattern(ends[0], None, ends[1], None)
+            if not isinstance(quad.graph_name, DefaultGraph)
+        ]
+
+    @telling
+    def changed(self, reader: str) -> set[Quad] | None:
+        """Return the notes of `changes` for GRAPH_INFERRED or GRAPH_VALIDATION; None on a server, where none are."""
+        return changes.noted(self._store, reader) if isinstance(self._store, Store) else None
+
+    def _forget_what_was_inferred(self, written: Iterable[str]) -> None:
+        """Before graphs are written whole: have everything inferred and validated anew, if they are asserted."""
+        if isinstance(self._store, Store) and not all(name.startswith(changes.NOT_ASSERTED) for name in written):
+            self.change(changes.made_of(self._store), ())
 
     def _functions(self, faults: dict[str, None]) -> Functions:
         """Return the functions that reach the samples, where their files are known."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain, product
+from itertools import chain, islice, product
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
@@ -90,6 +90,17 @@ class Closure:
             if subject != object and subject not in hidden and object not in hidden and predicate not in helpers:
                 kept.update(list(terms.triples(fact))[:1])
         return kept
+
+    def __len__(self) -> int:
+        """Return how many statements are known."""
+        return len(self._round)
+
+    def since(self, count: int) -> Iterator[Statement]:
+        """Yield what is known beside the first `count` statements, given or inferred, but not that x is itself."""
+        forms = self._terms.forms
+        for subject, predicate, object in islice(self._round, count, None):
+            if (predicate != self._program.same or subject != object) and forms[subject] and forms[object]:
+                yield (forms[subject][0], forms[predicate][0], forms[object][0])
 
     def why(self, statement: Statement | Triple) -> Derivation | None:
         """Return how a statement was first inferred; None where it was given, does not follow, or needs no premise."""

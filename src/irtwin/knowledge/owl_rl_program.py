@@ -53,6 +53,13 @@ class Program:
             (rule, compile_join(rule, self.number, [rule.culprits])) for rule in self._rules if rule.culprits
         ]
 
+    def terms_of_models(self) -> tuple[set[str], set[str]]:
+        """Return the IRIs of properties and of classes by whose use an ontology tells the rules what to conclude."""
+        body = [pattern for rule in self._rules for pattern in rule.body]
+        properties = {predicate for _, predicate, _ in body if not predicate.startswith(("?", "rl:"))} - {"rdf:type"}
+        classes = {kind for _, predicate, kind in body if predicate == "rdf:type" and not kind.startswith("?")}
+        return ({_node(it).value for it in properties}, {_node(it).value for it in classes})
+
     def number(self, term: Term) -> Number:
         """Return the number of a term of the rules."""
         return self.terms.number(_node(term))

@@ -1,7 +1,9 @@
 """What follows from the graph: OWL 2 RL, SWRL and SHACL rules, each into a named graph of its own.
 
-Beside what was inferred stands what it was inferred from, as the name that the premises' content has (RFC 6920). Where
-that is still the same nothing is done; else it is inferred again, and only what differs is taken out or put in.
+What is concluded of one robot bears on no other (see `parts`), so after a change only those parts of the graph that it
+touched are reasoned over again, beside the ontology. Where that cannot be, the whole graph is. What the conclusions
+were made of stands beside them, as the name that the premises' content has (RFC 6920): the ontology and the rules, or
+everything where the graph is one part; and of each part what the SWRL rules speak of, as Pellet is slow to start.
 """
 
 from __future__ import annotations
@@ -9,45 +11,76 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 
-from pyoxigraph import BlankNode, NamedNode, Quad, Store, Triple
+from pyoxigraph import NamedNode, Quad, Store, Triple
 
-from irtwin.knowledge import shacl_rules
+from irtwin.knowledge import parts, shacl_rules
+from irtwin.knowledge.blank_nodes import has_blank_node
+from irtwin.knowledge.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
 from irtwin.knowledge.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.owl_rl import Closure
+from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.vocabulary import (
+    GRAPH_CHANGED,
     GRAPH_INFERRED,
     GRAPH_OWL_RL,
     GRAPH_REASONED,
     GRAPH_SHACL,
     GRAPH_SWRL,
     GRAPH_VALIDATION,
-    PROV,
 )
 from irtwin.resources import folder
 
-_NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION)
-_DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
+_COUNT = f"""
+SELECT ?owl_rl ?swrl ?shacl
+WHERE {{
+  {{ SELECT (COUNT(*) AS ?owl_rl) {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }} }}
+  {{ SELECT (COUNT(*) AS ?swrl) {{ GRAPH <{GRAPH_SWRL}> {{ ?s ?p ?o }} }} }}
+  {{ SELECT (COUNT(*) AS ?shacl) {{
+    {{ SELECT DISTINCT ?s ?p ?o {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }} }} }}
+}}"""
+
+_NOT_CLOSED = (GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
 
 _AROUND = f"""
 CONSTRUCT {{ ?s ?p ?o }}
 WHERE {{
   {{ VALUES ?s {{ ?nodes }} GRAPH ?g {{ ?s ?p ?o }} }} UNION {{ VALUES ?o {{ ?nodes }} GRAPH ?g {{ ?s ?p ?o }} }}
-  FILTER(?g NOT IN (<{GRAPH_OWL_RL}>, <{GRAPH_REASONED}>, <{GRAPH_VALIDATION}>))
+  FILTER(?g NOT IN (<{GRAPH_OWL_RL}>, <{GRAPH_REASONED}>, <{GRAPH_VALIDATION}>, <{GRAPH_CHANGED}>))
 }}"""
-
-Contents = Mapping[str, set[Triple]]  # of named graphs, by their IRIs
 
 
 @dataclass(frozen=True)
 class Inferences:
-    """How many triples each kind of reasoning holds, and the IRIs of the named graphs that changed."""
+    """How many triples each kind of reasoning holds, and the IRIs of the named graphs that changed.
+
+    `joined_by` is a statement that makes the graph one part, so that all of it was reasoned over; None where none is.
+    """
 
     owl_rl: int
     swrl: int
     shacl: int
     changed: tuple[str, ...]
+    joined_by: str | None = None
+
+
+@dataclass
+class _Conclusions:
+    """What was concluded, by the IRIs of named graphs; what it was made of; and what makes the graph one part."""
+
+    contents: dict[str, set[Triple]] = field(default_factory=dict)
+    made_of: dict[object, NamedNode] = field(default_factory=dict)
+    joined_by: str | None = None
+
+    def quads(self) -> set[Quad]:
+        """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
+        store = Store()
+        derivations = (Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items())  # type: ignore[arg-type]
+        for name, triples in {**self.contents, GRAPH_REASONED: derivations}.items():
+            store.extend(in_graph(triples, name))
+        return set(store)
 
 
 def reason(graph: KnowledgeGraph) -> Inferences:
@@ -56,27 +89,28 @@ def reason(graph: KnowledgeGraph) -> Inferences:
     The closure comes first, so that rules see types and inverses that nobody wrote; then the rules; then the
     closure of what they concluded. InputError names a contradiction, and what was inferred before is dropped.
     """
-    premises = asserted(graph)
-    made_of = _content_name(premises)
-    if _derivations(graph).get(GRAPH_OWL_RL) == made_of:
-        return _count(_inferred(graph), [])
+    ontology = Ontology(graph)
+    changed = graph.changed(GRAPH_INFERRED)
     try:
-        contents, sources = _infer(graph, premises)
+        if changed is not None and made_of(graph) == content_name(ontology.triples):
+            done = _reason_again(graph, ontology, changed)
+            if done is not None:
+                return done
+        return _reason_over_all(graph, ontology, changed)
     except Exception:
         graph.replace([], GRAPH_INFERRED, GRAPH_REASONED)
         raise
-    return _count(contents, _write(graph, contents, {GRAPH_OWL_RL: made_of, **sources}))
 
 
 def asserted(graph: KnowledgeGraph) -> set[Triple]:
     """Return what nobody inferred: ontology, mapped sources, activities, and what SPARQL updates wrote."""
-    names = [name for name in graph.graphs() if not name.startswith(_NOT_ASSERTED)]
+    names = [name for name in graph.graphs() if not name.startswith(NOT_ASSERTED)]
     return graph.triples(*names) if names else set()
 
 
 def not_closed(graph: KnowledgeGraph) -> set[Triple]:
     """Return what the closure was made of: what is asserted, and what rules concluded."""
-    names = [name for name in graph.graphs() if not name.startswith((GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION))]
+    names = [name for name in graph.graphs() if not name.startswith(_NOT_CLOSED)]
     return graph.triples(*names) if names else set()
 
 
@@ -93,71 +127,122 @@ def check_consistency(graph: KnowledgeGraph) -> None:
     owl_dl.check_consistency(asserted(graph))
 
 
-def _infer(graph: KnowledgeGraph, premises: set[Triple]) -> tuple[Contents, dict[str, NamedNode]]:
-    from irtwin.knowledge import owl_dl
+def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences | None:
+    """Reason over the parts that changed; None where that would not do."""
+    if not changed:
+        return _count(graph, ())
+    region = parts.around(graph, ontology, nodes_of(changed))
+    if region is None:
+        return None
+    found = _infer(ontology, region.asserted, region.concluded)
+    old = region.concluded
+    new = {quad for quad in found.quads() if ontology.nodes(quad.triple)}
+    nodes = {node for quad in new if _graph(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
+    if found.joined_by or has_blank_node(new ^ old) or any(graph.about(node) for node in nodes - region.nodes):
+        return None
+    graph.change((old - new) | changed, new - old)
+    return _count(graph, new ^ old)
 
-    closure = Closure(premises)
-    known = premises | closure.worth_keeping()
-    facts = owl_dl.facts_of_rules(known)
-    facts_name = _content_name(facts)
-    if _derivations(graph).get(GRAPH_SWRL) == facts_name:
-        swrl = graph.triples(GRAPH_SWRL)
-    else:
-        swrl = owl_dl.swrl_conclusions(facts)
-    made = shacl_rules.conclusions(known | swrl, shacl_rules.shipped_rules())
-    shacl = {shacl_rules.graph_of(name): found for name, found in made.items()}
-    closure.add(swrl.union(*shacl.values()))
-    return {GRAPH_OWL_RL: closure.worth_keeping(), GRAPH_SWRL: swrl, **shacl}, {GRAPH_SWRL: facts_name}
 
-
-def _write(graph: KnowledgeGraph, contents: Contents, sources: Mapping[str, NamedNode]) -> list[str]:
-    """Make `contents` what is inferred, and say of what it was made; return the IRIs of the graphs that changed."""
-    derivations = {Triple(NamedNode(name), _DERIVED_FROM, source) for name, source in sources.items()}
-    new = _as_stored({**contents, GRAPH_REASONED: derivations})
+def _reason_over_all(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | None) -> Inferences:
+    premises = asserted(graph)
+    everything = content_name(premises)
+    if made_of(graph) == everything:
+        return _count(graph, ())
     old = {
         quad for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED) for quad in in_graph(graph.triples(name), name)
     }
-    differing = new ^ old
-    if any(isinstance(term, BlankNode) for quad in differing for term in (quad.subject, quad.object)):
-        return graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
-    graph.change(old - new, new - old)
-    names = {quad.graph_name.value for quad in differing if isinstance(quad.graph_name, NamedNode)}
-    return sorted(names - {GRAPH_REASONED})
+    found = _infer(ontology, premises - ontology.triples, old)
+    in_parts = changed is not None and not found.joined_by
+    found.made_of[NamedNode(GRAPH_OWL_RL)] = content_name(ontology.triples) if in_parts else everything
+    new = found.quads()
+    if has_blank_node(new ^ old):
+        graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
+        graph.change(changed or (), ())
+    else:
+        graph.change((old - new) | (changed or set()), new - old)
+    return _count(graph, new ^ old, found.joined_by)
 
 
-def _as_stored(contents: Contents) -> set[Quad]:
-    """Return the contents as quads, their literals in the form that the store gives back."""
-    store = Store()
-    for name, triples in contents.items():
-        store.extend(in_graph(triples, name))
-    return set(store)
+def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_by: str | None = None) -> _Conclusions:
+    """Conclude from the ontology and some parts; `before` is what was concluded of them when it was last done."""
+    closure = Closure(ontology.triples)
+    count = len(closure)
+    closure.add(premises)
+    joined_by = joined_by or parts.join(ontology, closure, count)
+    known = ontology.triples | premises | closure.worth_keeping()
+    facts = _facts_of_swrl(ontology, known, joined_by is not None)
+    swrl = _by_swrl(ontology, facts, before)
+    made = shacl_rules.conclusions(known | swrl, shacl_rules.shipped_rules())
+    shacl = {shacl_rules.graph_of(name): triples for name, triples in made.items()}
+    closure.add(swrl.union(*shacl.values()))
+    if joined_by is None and (joined_by := parts.join(ontology, closure, count)):
+        return _infer(ontology, premises, before, joined_by)
+    return _Conclusions(
+        {GRAPH_OWL_RL: closure.worth_keeping(), GRAPH_SWRL: swrl, **shacl},
+        {node: content_name(some) for node, some in facts.items()},
+        joined_by,
+    )
 
 
-def _inferred(graph: KnowledgeGraph) -> Contents:
-    return {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED)}
+def _facts_of_swrl(ontology: Ontology, known: set[Triple], joined: bool) -> dict[parts.Name, set[Triple]]:
+    """Return what the SWRL rules speak of, part by part, each by the first node that it speaks of."""
+    from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
 
-
-def _derivations(graph: KnowledgeGraph) -> dict[str, object]:
+    facts = owl_dl.facts_of_rules(known)
+    if joined:
+        return {NamedNode(GRAPH_SWRL): facts}
+    part_of = parts.parted(ontology, known)
+    common, of_parts = set[Triple](), dict[parts.Name, set[Triple]]()
+    for fact in facts:
+        nodes = ontology.nodes(fact)
+        (of_parts.setdefault(part_of(nodes[0]), set()) if nodes else common).add(fact)
     return {
-        str(it.subject.value): it.object for it in graph.triples(GRAPH_REASONED) if isinstance(it.subject, NamedNode)
+        min((node for fact in some for node in ontology.nodes(fact)), key=str): some | common
+        for some in of_parts.values()
     }
 
 
-def _content_name(triples: Iterable[Triple]) -> NamedNode:
+def _by_swrl(ontology: Ontology, facts: Mapping[parts.Name, set[Triple]], before: set[Quad]) -> set[Triple]:
+    """Return what the SWRL rules conclude, by Pellet where their facts are not those of before."""
+    from irtwin.knowledge import owl_dl
+
+    old = {quad.triple for quad in before if _graph(quad) == GRAPH_SWRL}
+    noted = {(quad.subject, quad.object) for quad in before if _graph(quad) == GRAPH_REASONED}
+    changed = {node for node, some in facts.items() if (node, content_name(some)) not in noted}
+    if not changed and NamedNode(GRAPH_SWRL) in facts:
+        return old
+    new = set[Triple]()
+    if changed:
+        new = owl_dl.swrl_conclusions(set().union(*(facts[node] for node in changed)))
+    spoken_of = {node for some in facts.keys() - changed for fact in facts[some] for node in ontology.nodes(fact)}
+    return new | {triple for triple in old if spoken_of.intersection(ontology.nodes(triple))}
+
+
+def _graph(quad: Quad) -> str:
+    return quad.graph_name.value if isinstance(quad.graph_name, NamedNode) else ""
+
+
+def made_of(graph: KnowledgeGraph) -> object:
+    """Return the name of what the closure was made of, or None."""
+    found = (it.object for it in graph.triples(GRAPH_REASONED) if it.subject == NamedNode(GRAPH_OWL_RL))
+    return next(found, None)
+
+
+def content_name(triples: Iterable[Triple]) -> NamedNode:
     """Return the name that triples and the rules have by their content."""
-    digest = hashlib.sha256()
-    for file in sorted(folder("rules").glob("*.*")):
-        digest.update(file.read_bytes())
+    digest = hashlib.sha256(_rules())
     for line in sorted(map(str, triples)):
         digest.update(line.encode())
     return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
 
 
-def _count(contents: Contents, changed: Iterable[str]) -> Inferences:
-    shacl = [triples for name, triples in contents.items() if name.startswith(GRAPH_SHACL)]
-    return Inferences(
-        owl_rl=len(contents.get(GRAPH_OWL_RL, ())),
-        swrl=len(contents.get(GRAPH_SWRL, ())),
-        shacl=len(set().union(*shacl)),
-        changed=tuple(changed),
-    )
+@cache
+def _rules() -> bytes:
+    return b"".join(file.read_bytes() for file in sorted(folder("rules").glob("*.*")))
+
+
+def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
+    counts = graph.query(_COUNT).rows[0]
+    names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
+    return Inferences(counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), joined_by)

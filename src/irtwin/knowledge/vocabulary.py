@@ -51,6 +51,7 @@ GRAPH_SWRL = f"{GRAPH_INFERRED}swrl"
 GRAPH_SHACL = f"{GRAPH_INFERRED}shacl"
 GRAPH_REASONED = f"{GRAPH}reasoned"  # of what the inferred graphs were made
 GRAPH_VALIDATION = f"{GRAPH}validation"
+GRAPH_CHANGED = f"{GRAPH}changed"  # individuals that are to be reasoned over or validated again
 
 
 def term(name: str) -> str:

@@ -1,0 +1,68 @@
+"""What changed since the graph was last reasoned over and validated, so that only that is looked at again.
+
+The individuals that a change speaks of are noted in the same transaction, once for who infers and once for who
+validates; each strikes out its own notes. Where a change cannot tell its individuals, what was inferred loses the name
+of what it was made of, and everything is done anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Store
+
+from irtwin.knowledge.vocabulary import (
+    GRAPH_CHANGED,
+    GRAPH_INFERRED,
+    GRAPH_OWL_RL,
+    GRAPH_REASONED,
+    GRAPH_VALIDATION,
+    PROV,
+    RDF,
+)
+
+DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
+NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
+
+_CHANGED = NamedNode(GRAPH_CHANGED)
+_REASONED = NamedNode(GRAPH_REASONED)
+_INFLUENCED_BY = NamedNode(PROV + "wasInfluencedBy")
+_READERS = (GRAPH_INFERRED, GRAPH_VALIDATION)
+_TYPE = NamedNode(RDF + "type")
+
+
+def notes(store: Store, quads: Iterable[Quad]) -> set[Quad]:
+    """Return the notes of a change of quads; none where everything is to be done anew in any case."""
+    asserted = [quad for quad in quads if is_asserted(quad)]
+    if not asserted or not made_of(store):
+        return set()
+    ends = {quad.subject for quad in asserted} | {quad.object for quad in asserted if quad.predicate != _TYPE}
+    return {_note(reader, node) for reader in _READERS for node in ends if not isinstance(node, Literal)}
+
+
+def noted(store: Store, reader: str) -> set[Quad]:
+    """Return the notes for GRAPH_INFERRED or GRAPH_VALIDATION; the objects are the individuals that changed."""
+    return set(store.quads_for_pattern(NamedNode(reader), _INFLUENCED_BY, None, _CHANGED))
+
+
+def nodes_of(noted: Iterable[Quad]) -> set[NamedNode | BlankNode]:
+    """Return the individuals that notes tell of."""
+    return {note.object for note in noted if isinstance(note.object, NamedNode | BlankNode)}
+
+
+def made_of(store: Store) -> set[Quad]:
+    """Return the quads that say of what the inferred graphs and the report of validation were made."""
+    return {
+        quad
+        for name in (GRAPH_OWL_RL, GRAPH_VALIDATION)
+        for quad in store.quads_for_pattern(NamedNode(name), DERIVED_FROM, None, _REASONED)
+    }
+
+
+def is_asserted(quad: Quad) -> bool:
+    """Whether a quad stands in a named graph that nobody inferred."""
+    return isinstance(quad.graph_name, NamedNode) and not quad.graph_name.value.startswith(NOT_ASSERTED)
+
+
+def _note(reader: str, node: object) -> Quad:
+    return Quad(NamedNode(reader), _INFLUENCED_BY, node, _CHANGED)  # type: ignore[arg-type]

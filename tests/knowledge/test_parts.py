@@ -1,0 +1,321 @@
+"""Reasoning over the parts that changed gives what reasoning over the whole graph gives."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyoxigraph import Literal, NamedNode, Quad, Triple
+
+import small_fleet
+from irtwin import workflow
+from irtwin.knowledge import owl_dl, parts, reasoning
+from irtwin.knowledge.graph import KnowledgeGraph, in_graph, read_turtle
+from irtwin.knowledge.owl_rl import Closure, Contradiction
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.vocabulary import (
+    GRAPH_ACTIVITY,
+    GRAPH_CHANGED,
+    GRAPH_INFERRED,
+    GRAPH_ONTOLOGY,
+    GRAPH_REASONED,
+    GRAPH_SOURCE,
+    OWL,
+    RDF,
+    RDFS,
+    XSD,
+    individual,
+    term,
+)
+from irtwin.resources import folder
+from irtwin.storage.database import Workspace
+
+SOURCE = GRAPH_SOURCE + "drawn"
+TYPE = RDF + "type"
+ROBOTS = ("r", "s")
+
+
+@pytest.fixture(autouse=True)
+def pellet(monkeypatch: pytest.MonkeyPatch) -> list[set[Triple]]:
+    """Pellet takes seconds to start; one rule in its stead keeps what it is asked."""
+    calls: list[set[Triple]] = []
+
+    def conclude(facts: set[Triple]) -> set[Triple]:
+        calls.append(facts)
+        by_predicate: dict[str, dict] = {}
+        for one in facts:
+            by_predicate.setdefault(one.predicate.value, {})[one.subject] = one.object
+        limits = [float(it.value) for it in by_predicate.get(term("Idle_Share_Limit"), {}).values()]
+        shares = by_predicate.get(term("Idle_Share"), {}).items()
+        idle = {run for run, share in shares for limit in limits if float(share.value) > limit}
+        return {Triple(run, NamedNode(TYPE), NamedNode(term("Idle_Heavy_Run"))) for run in idle}
+
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", conclude)
+    return calls
+
+
+def quad(subject: str, predicate: str, value, graph: str = SOURCE) -> Quad:
+    return Quad(
+        NamedNode(subject),
+        NamedNode(predicate),
+        value if isinstance(value, Literal) else NamedNode(value),
+        NamedNode(graph),
+    )
+
+
+LIMITS = term("default_Limits")
+EFFECT = "https://w3id.org/irtwin/effect/copper_loss"
+ONTOLOGY = [
+    quad(subject, predicate, value, GRAPH_ONTOLOGY)
+    for subject, predicate, value in [
+        (term("IR_RunProcess"), TYPE, OWL + "Class"),
+        (term("Idle_Heavy_Run"), RDFS + "subClassOf", term("IR_RunProcess")),
+        (term("IR_RunProcess"), RDFS + "subClassOf", term("Process")),
+        (term("Joint_Energy"), TYPE, OWL + "Class"),
+        (term("has_RunProcess"), OWL + "inverseOf", term("run_of")),
+        (term("has_RunProcess"), TYPE, OWL + "InverseFunctionalProperty"),
+        (term("has_Joint"), TYPE, OWL + "InverseFunctionalProperty"),
+        (term("run_of"), TYPE, OWL + "FunctionalProperty"),
+        (term("Idle_Share"), RDFS + "range", XSD + "double"),
+        (term("Run_Name"), RDFS + "range", XSD + "string"),
+        (term("of_Run"), TYPE, OWL + "ObjectProperty"),
+        (term("Joint_Number"), RDFS + "range", XSD + "integer"),
+        (term("of_Effect"), RDFS + "range", term("Effect")),
+        (term("before"), TYPE, OWL + "TransitiveProperty"),
+        (EFFECT, TYPE, term("Effect")),
+        (LIMITS, term("Idle_Share_Limit"), Literal(0.5)),
+    ]
+]
+
+
+def of_robot(robot: str) -> list[Quad]:
+    one, two = individual("run", robot + ".1"), individual("run", robot + ".2")
+    body, energy, joint = (individual(kind, robot) for kind in ("robot", "energy", "joint"))
+    return [
+        quad(body, term("has_RunProcess"), one),
+        quad(two, term("run_of"), body),
+        quad(one, TYPE, term("IR_RunProcess")),
+        quad(two, TYPE, term("IR_RunProcess")),
+        quad(one, term("Idle_Share"), Literal(0.7)),
+        quad(two, term("Idle_Share"), Literal(0.2)),
+        quad(one, term("before"), two),
+        quad(one, term("Run_Name"), Literal("morning")),
+        quad(energy, TYPE, term("Joint_Energy")),
+        quad(energy, term("of_Run"), one),
+        quad(energy, term("of_Joint"), joint),
+        quad(energy, term("of_Effect"), EFFECT),
+        quad(energy, term("Energy"), Literal(5.0)),
+        quad(joint, term("Joint_Number"), Literal(5)),
+    ]
+
+
+FACTS = [fact for robot in ROBOTS for fact in of_robot(robot)]
+JOINING = {  # by each of these, something follows for both robots
+    "a limit of its own": quad(individual("limits", "x"), term("Idle_Share_Limit"), Literal(0.1)),
+    "another limit of the ontology's": quad(LIMITS, term("Idle_Share_Limit"), Literal(0.1)),
+    "a class of runs": quad(term("IR_RunProcess"), RDFS + "subClassOf", individual("class", "Lazy")),
+    "a key": quad(term("IR_RunProcess"), OWL + "hasKey", individual("list", "x")),
+    "runs that are the same": quad(individual("run", "r.1"), OWL + "sameAs", individual("run", "s.1")),
+    "a robot that is an effect": quad(EFFECT, OWL + "sameAs", individual("robot", "r")),
+    "from the ontology to a run": quad(EFFECT, term("before"), individual("run", "s.1")),
+    "the ontology's joint": quad(individual("robot", "r"), term("has_Joint"), EFFECT),
+    "an energy of the ontology's run": quad(individual("energy", "r"), term("of_Run"), LIMITS),
+    "a property that is transitive": quad(term("of_Run"), TYPE, OWL + "TransitiveProperty"),
+    "a robot before the other": quad(individual("run", "r.2"), term("before"), individual("run", "s.1")),
+    "a datatype": quad(individual("joint", "r"), term("Joint_Kind"), XSD + "byte"),
+    "a type of a text": quad(term("Run_Name"), RDFS + "range", individual("class", "Name")),
+}
+
+
+def inferred(graph: KnowledgeGraph) -> dict[str, set]:
+    found = {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED)}
+    return {name: triples for name, triples in found.items() if triples}
+
+
+def conclusions(graph: KnowledgeGraph) -> dict[str, set]:
+    return {name: triples for name, triples in inferred(graph).items() if name != GRAPH_REASONED}
+
+
+def holding(quads: Iterable[Quad]) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
+    graph.replace(ONTOLOGY, GRAPH_ONTOLOGY)
+    graph.replace(quads, GRAPH_SOURCE)
+    return graph
+
+
+def anew(quads: Iterable[Quad]) -> KnowledgeGraph:
+    graph = holding(quads)
+    reason(graph)
+    return graph
+
+
+def as_one_part(graph: KnowledgeGraph) -> dict[str, set]:
+    """Return what follows from the whole graph, taken as one part."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parts, "join", lambda *_: "for comparison")
+        copy = KnowledgeGraph()
+        copy.replace(
+            (it for it in graph.quads() if not it.graph_name.value.startswith((GRAPH_INFERRED, GRAPH_REASONED))), ""
+        )
+        assert reason(copy).joined_by == "for comparison"
+        return conclusions(copy)
+
+
+def test_robots_are_parts_of_their_own() -> None:
+    graph = anew(FACTS)
+    assert reason(graph).joined_by is None
+    ontology = parts.Ontology(graph)
+    top = parts.parted(ontology, reasoning.asserted(graph))
+    assert len({top(node) for triple in graph.triples(SOURCE) for node in ontology.nodes(triple)}) == len(ROBOTS)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4),
+    st.lists(st.sampled_from([None, *JOINING.values()]), min_size=4, max_size=4),
+)
+def test_any_change_gives_what_the_whole_graph_gives(states: list[list[Quad]], joining: list[Quad | None]) -> None:
+    graph = holding([])
+    for drawn, join in zip(states, joining, strict=False):
+        quads = {*drawn, *([join] if join else [])}
+        before = conclusions(graph)
+        now = set(in_graph(graph.triples(SOURCE), SOURCE))
+        graph.change(now - quads, quads - now)
+        try:
+            outcome = reason(graph)
+        except Contradiction:
+            with pytest.raises(Contradiction):
+                anew(quads)
+            assert conclusions(graph) == {}
+            continue
+        assert inferred(graph) == inferred(anew(quads))
+        assert conclusions(graph) == as_one_part(graph)
+        assert not graph.triples(GRAPH_CHANGED + "/") and graph.changed(GRAPH_INFERRED) == set()
+        after = conclusions(graph)
+        assert set(outcome.changed) == {name for name in {*before, *after} if before.get(name) != after.get(name)}
+
+
+@pytest.mark.parametrize("joining", JOINING.values(), ids=JOINING)
+def test_what_joins_robots_is_seen(joining: Quad) -> None:
+    graph = anew(FACTS)
+    graph.change((), {joining})
+    reason(graph)
+    assert conclusions(graph) == as_one_part(graph)
+    graph.change({joining}, ())
+    reason(graph)
+    assert inferred(graph) == inferred(anew(FACTS))
+
+
+def test_only_the_part_that_changed_is_reasoned_over(
+    monkeypatch: pytest.MonkeyPatch, pellet: list[set[Triple]]
+) -> None:
+    graph = anew(FACTS)
+    pellet.clear()
+    given: set[Triple] = set()
+    add = Closure.add
+    monkeypatch.setattr(Closure, "add", lambda self, triples: (given.update(triples), add(self, triples))[1])
+    share = quad(individual("run", "r.2"), term("Idle_Share"), Literal(0.2))
+    graph.change({share}, {quad(individual("run", "r.2"), term("Idle_Share"), Literal(0.9))})
+    reason(graph)
+    said_of = {it.subject.value for it in given if it.subject.value.startswith("https://w3id.org/irtwin/id/")}
+    assert said_of == {one.subject.value for one in of_robot("r")}
+    assert [{it.subject.value for it in facts} & said_of for facts in pellet] == [
+        {individual("run", "r.1"), individual("run", "r.2")}
+    ]
+
+
+def test_pellet_rests_where_what_its_rules_speak_of_stays(pellet: list[set[Triple]]) -> None:
+    graph = anew(FACTS)
+    pellet.clear()
+    graph.change((), {quad(individual("run", "r.1"), term("Run_Name"), Literal("evening"))})
+    reason(graph)
+    assert pellet == []
+    assert inferred(graph)[f"{GRAPH_INFERRED}swrl"]
+
+
+def test_a_part_that_goes_takes_its_conclusions_along() -> None:
+    graph = anew(FACTS)
+    graph.change(set(of_robot("s")), ())
+    reason(graph)
+    assert inferred(graph) == inferred(anew(of_robot("r")))
+
+
+def test_a_contradiction_in_one_part_is_named_as_in_the_whole() -> None:
+    wrong = quad(individual("run", "r.1"), OWL + "differentFrom", individual("run", "r.1"))
+    graph = anew(FACTS)
+    graph.change((), {wrong})
+    with pytest.raises(Contradiction) as parted:
+        reason(graph)
+    with pytest.raises(Contradiction) as whole:
+        anew([*FACTS, wrong])
+    assert str(parted.value) == str(whole.value)
+    assert inferred(graph) == {}
+    graph.change({wrong}, ())
+    reason(graph)
+    assert inferred(graph) == inferred(anew(FACTS))
+
+
+def test_an_update_that_tells_no_individuals_has_all_done_anew() -> None:
+    graph = anew(FACTS)
+    graph.update("DELETE { ?run irt:Idle_Share ?s } WHERE { ?run irt:Idle_Share ?s }")
+    reason(graph)
+    assert inferred(graph) == inferred(anew([one for one in FACTS if one.predicate.value != term("Idle_Share")]))
+
+
+def test_an_update_of_one_individual_is_followed() -> None:
+    graph = anew(FACTS)
+    run = individual("run", "s.2")
+    graph.update(f"INSERT DATA {{ <{run}> irt:Idle_Share 0.8e0 }}")
+    assert graph.changed(GRAPH_INFERRED)
+    reason(graph)
+    assert conclusions(graph) == as_one_part(graph)
+
+
+def test_another_ontology_has_all_done_anew() -> None:
+    graph = anew(FACTS)
+    other = [one for one in ONTOLOGY if one.predicate.value != OWL + "inverseOf"]
+    graph.replace(other, GRAPH_ONTOLOGY)
+    reason(graph)
+    assert conclusions(graph) == as_one_part(graph)
+
+
+def test_nothing_is_noted_of_a_graph_that_was_never_reasoned_over() -> None:
+    graph = holding([])
+    graph.change((), FACTS)
+    assert graph.graphs(GRAPH_CHANGED) == []
+
+
+def one_by_one(quads: list[Quad], ontology: list[Quad]) -> KnowledgeGraph:
+    """Return a graph that took in the quads in three goes, reasoned over after each."""
+    graph = KnowledgeGraph()
+    graph.replace(ontology, GRAPH_ONTOLOGY)
+    reason(graph)
+    robots = sorted({one.subject.value for one in quads if one.object == NamedNode(term("Industrial_Robot"))})
+    left = set(quads)
+    for robot in [*(robot.rpartition("/")[2] for robot in robots), ""]:
+        some = {one for one in left if robot in one.subject.value or robot in str(one.object)}
+        graph.change((), some)
+        left -= some
+        assert reason(graph).joined_by is None
+    return graph
+
+
+@pytest.fixture(scope="module")
+def ontology() -> list[Quad]:
+    modules = sorted(folder("ontology").glob("*.ttl"))
+    return list(in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY))
+
+
+def test_two_robots_one_by_one(two_robots: list[Quad], ontology: list[Quad]) -> None:
+    graph = one_by_one(two_robots, ontology)
+    assert conclusions(graph) == as_one_part(graph)
+
+
+def test_a_fleet_one_by_one(tmp_path: Path, ontology: list[Quad]) -> None:
+    with Workspace(tmp_path) as place, KnowledgeGraph() as mapped:
+        small_fleet.fill(place)
+        workflow.map_rows(place, mapped)
+        quads = [one for one in mapped.quads() if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))]
+    graph = one_by_one(quads, ontology)
+    assert conclusions(graph) == as_one_part(graph)
