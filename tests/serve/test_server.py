@@ -59,7 +59,7 @@ def test_a_token_file_that_says_nothing(
 
 @pytest.mark.parametrize("timeout", ["inf", "nan", "1e300"])
 def test_a_query_has_a_day_at_most(tmp_path: Path, timeout: str) -> None:
-    assert "a query has at most a day, 86400 s" in refused("--workspace", tmp_path, "--timeout", timeout)
+    assert "give at most one day, 86400 s" in refused("--workspace", tmp_path, "--timeout", timeout)
 
 
 ELSEWHERE = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"}

@@ -277,10 +277,10 @@ class LiveTwin:
             except DamagedJournal as error:
                 aside = path.with_suffix(".damaged")
                 path.rename(aside)
-                self._announce(f"{error}; what it held is lost to the graph, the file is kept as {aside}")
+                self._announce(f"{error}; its samples are not in the graph; the file is kept as {aside}")
                 continue
             except ValueError:
-                self._announce(f"{path}: a crash cut it off before its first sample; dropped")
+                self._announce(f"{path}: a crash ended this journal before its first sample; it is deleted")
                 path.unlink()
                 continue
             self._announce(f"{header.run_id}: a crash ended this run; its {len(samples)} samples on disk are kept")
