@@ -181,7 +181,7 @@ def refuse(archive: Path, message: str) -> None:
 
 @pytest.mark.parametrize("name", ["../outside", "series/../../outside", "/tmp/outside", "irtwin.db", "graph/CURRENT"])
 def test_names_that_escape_are_refused(archive: Path, name: str) -> None:
-    refuse(altered(archive, lambda contents: contents.update({name: b"x"})), "does not belong into a workspace")
+    refuse(altered(archive, lambda contents: contents.update({name: b"x"})), "does not belong in a workspace")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.999])
@@ -226,7 +226,7 @@ def test_contents_that_are_not_those_of_the_list(archive: Path) -> None:
     ("name", "data", "message"),
     [
         ("graph.nq", b"<a", "its graph is damaged"),
-        ("rows/robot.jsonl", b"{}\n", "table robot is of another irtwin"),
+        ("rows/robot.jsonl", b"{}\n", "table robot was made by another irtwin version"),
         ("rows/robot.jsonl", b"[\n", "rows of table robot do not fit"),
         ("rows/joint.jsonl", None, "has no table joint"),
         ("rows/robot.jsonl", b"", "do not fit"),
@@ -258,7 +258,7 @@ def test_what_is_no_backup(tmp_path: Path) -> None:
 
 
 def test_nothing_is_overwritten(archive: Path, filled: Workspace, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is there already; restore into a new folder"):
+    with pytest.raises(InputError, match="already exists; restore into a new folder"):
         restore(archive, filled.folder)
     (tmp_path / "empty").mkdir()
     restore(archive, tmp_path / "empty")

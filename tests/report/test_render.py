@@ -170,6 +170,6 @@ def test_a_violated_constraint_is_shown(graph: KnowledgeGraph, page_of: PageOf):
 
 
 def test_an_unknown_robot_is_the_users_mistake(graph: KnowledgeGraph, tmp_path: Path):
-    with pytest.raises(InputError, match="the graph knows no such robot"):
+    with pytest.raises(InputError, match="this robot is not in the graph"):
         render(graph, "https://w3id.org/irtwin/id/robot/none", lambda path, checksum: None, tmp_path / "x.html")  # type: ignore[arg-type, return-value]
     assert not (tmp_path / "x.html").exists()

@@ -68,7 +68,7 @@ def test_kinematics_of_a_planar_elbow():
         (ARM.replace('type="continuous"', 'type="floating"'), 'type "floating" cannot be modelled'),
         (ARM.replace('<child link="upper"/>', '<child link="tool"/>'), "child of two joints"),
         (ARM.replace('<parent link="base"/>', '<parent link="fore"/>'), "several bases|loop"),
-        (ARM.replace('name="elbow"', 'name="shoulder"'), "stands there twice"),
+        (ARM.replace('name="elbow"', 'name="shoulder"'), "is defined twice"),
         (ARM.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="elbow"/>'), "mimics another joint"),
     ],
 )

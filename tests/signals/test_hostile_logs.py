@@ -90,7 +90,7 @@ def test_files_that_lead_nowhere(folder):
 def test_a_data_set_that_is_no_file(folder):
     (folder / "dataset.toml").unlink()
     (folder / "dataset.toml").symlink_to("/dev/zero")
-    assert "is no file" in refused(folder)
+    assert "is not a file" in refused(folder)
 
 
 def as_csv(folder: Path, content: bytes) -> Path:

@@ -96,7 +96,7 @@ class LiveTwin:
                 self._wait_for_room()
             self.check()
             if self._stop.is_set():
-                raise InputError("the watching is over: not stored")
+                raise InputError("watching has ended; not stored")
             run = self._runs.get(state.robot_id) or self._begin(state)
             is_next = run.is_next(state)
             doubted, run.doubted = run.doubted, None
@@ -113,7 +113,7 @@ class LiveTwin:
             else:
                 run.doubted = state
             if doubted is not None:
-                raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s off those around it; not stored")
+                raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours; not stored")
 
     def _take(self, run: WatchedRun, state: State) -> None:
         run.take(state)
