@@ -92,7 +92,11 @@ def test_what_cannot_be_diagnosed_is_refused(fault, tmp_path):
     ("tail", "options", "message"),
     [
         ("", ["--withhold", "phlogiston"], "--withhold phlogiston: there is no such effect; choose from rigid_body"),
-        ("", ["--withhold", "copper_loss"], "--withhold copper_loss: the twin does not have it; it has rigid_body"),
+        (
+            "",
+            ["--withhold", "copper_loss"],
+            "--withhold copper_loss: the twin does not have this effect; it has rigid_body",
+        ),
         (
             '[twin]\neffects = ["rigid_body", "phlogiston"]',
             [],

@@ -257,7 +257,7 @@ def test_limits_that_no_machine_has_are_refused(limit: str, message: str) -> Non
 
 @pytest.mark.filterwarnings("error")
 def test_a_robot_that_reaches_to_the_stars_is_refused() -> None:
-    with pytest.raises(InputError, match="reaches inf m, as no robot does; mend the origins"):
+    with pytest.raises(InputError, match="reaches inf m, which is not plausible; correct the origins"):
         excite(parse_urdf(TWO.urdf.replace("0.2 0 0", "1e300 0 0")), 5.0)
 
 

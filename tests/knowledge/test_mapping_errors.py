@@ -92,7 +92,7 @@ def test_faults_of_a_logical_table(tmp_path: Path, table: str, message: str) -> 
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        ("", r"no rr:TriplesMap in it"),
+        ("", r"has no rr:TriplesMap"),
         ("<#P> a rr:TriplesMap .", r"<P>: has 0 subject maps"),
         (f"<#P> {SUBJECT} .", r"rr:logicalTable is missing"),
         (

@@ -42,11 +42,11 @@ def test_values_follow_the_names() -> None:
 @pytest.mark.parametrize(
     ("said", "message"),
     [
-        (b"{", "no JSON"),
-        (b"POST /robot HTTP/1.1\r\n", "an HTTP request, as a web page may make it"),
-        (b"\xff\xfe", "no JSON"),
-        (b"[" * 60_000, "no JSON"),
-        (b"[1]", "no JSON object"),
+        (b"{", "not JSON"),
+        (b"POST /robot HTTP/1.1\r\n", "an HTTP request, which a web page may have sent"),
+        (b"\xff\xfe", "not JSON"),
+        (b"[" * 60_000, "not JSON"),
+        (b"[1]", "not a JSON object"),
         (b" " * (LONGEST_LINE + 1), "longer than"),
         (line(robot="S"), "no robot 'S' in the workspace.*known are R"),
         (line(robot=["R"]), "no robot"),
@@ -61,9 +61,9 @@ def test_values_follow_the_names() -> None:
         (line(position=[1, 10**400]), "2 numbers"),
         (b'{"robot": "R", "time": NaN, "position": [1, 2]}', "`time` is not a number"),
         (b'{"robot": "R", "time": 1, "position": [1, Infinity]}', "2 numbers"),
-        (line(velocity=5), "`velocity` is to hold"),
+        (line(velocity=5), "`velocity` must have"),
         (line(name=["a1"]), "`name` must list the joints of R: a1, a2"),
-        (line(name=[["a1"], "a2"]), "`name` is to name"),
+        (line(name=[["a1"], "a2"]), "`name` must list"),
         (line(power="x"), "`power` is not a number"),
     ],
 )
@@ -95,7 +95,7 @@ def test_clients_on_a_port() -> None:
                 client.sendall(b"".join(line(time=10 * number + step) + b"\n" for step in range(5)))
         for _ in range(3):
             assert done.acquire(timeout=10)
-        with pytest.raises(InputError, match=f"port {port} cannot be listened on"), listening(port, handle):
+        with pytest.raises(InputError, match=f"cannot listen on port {port}"), listening(port, handle):
             pass
     assert len(taken) == 15
 

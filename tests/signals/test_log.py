@@ -212,7 +212,7 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
         ('role = "reference"', 'role = "golden"', 'role = "golden"; use observed'),
         ("payload_mass = 1.5", "payload_mass = nan", "payload_mass should be a number"),
         ("[0, 0, 0.1]", "[0, 0]", "payload_com should be three numbers"),
-        ('repeat_of = "runs/one.csv"', 'repeat_of = "runs/two.csv"', "no other run of this data set"),
+        ('repeat_of = "runs/one.csv"', 'repeat_of = "runs/two.csv"', "is not another run of this data set"),
         ("started =", 'repeat_of = "runs/two.csv"\nstarted =', "repeat each other in a circle"),
         ('"runs/two.csv"', '"runs/three.csv"', "no such file"),
         ("2026-03-02T08:00:00", '"monday"', "started should be a TOML date"),

@@ -50,9 +50,9 @@ def load(path: Path) -> Twin:
     try:
         return from_json(path.read_text(encoding="utf-8"), path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a twin that irtwin saved") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name a twin that irtwin saved") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text; give a twin that irtwin saved") from error
+        raise InputError(f"{path}: not UTF-8 text; name a twin that irtwin saved") from error
 
 
 def to_json(twin: Twin) -> str:
@@ -87,10 +87,10 @@ def from_json(text: str, path: Path) -> Twin:
     try:
         document = json.loads(text)
     except ValueError as error:
-        raise InputError(f"{path}: not JSON ({error}); give a twin that irtwin saved") from error
+        raise InputError(f"{path}: not JSON ({error}); name a twin that irtwin saved") from error
     reader = _Reader(path, document, "")
     if reader.take("format", str) != _FORMAT:
-        raise InputError(f'{path}: "format" is not "{_FORMAT}"; give a twin that irtwin saved')
+        raise InputError(f'{path}: "format" is not "{_FORMAT}"; name a twin that irtwin saved')
     if reader.take("version", int) != _VERSION:
         raise InputError(f'{path}: "version" is not {_VERSION}; identify the twin again with this irtwin')
     twin = Twin(
@@ -116,7 +116,7 @@ class _Reader:
     def __init__(self, path: Path, values: Any, place: str):
         if not isinstance(values, dict):
             raise InputError(
-                f"{path}: {place or 'the document'} should be a JSON object; give a twin that irtwin saved"
+                f"{path}: {place or 'the document'} should be a JSON object; name a twin that irtwin saved"
             )
         self.path, self.values, self.place = path, values, place
 
