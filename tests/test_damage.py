@@ -175,7 +175,7 @@ def test_repair_says_which_files_are_lost(workspace: Path, unreasoned: None) -> 
     said = irtwin("repair", "--workspace", workspace)
     assert said.status == 2
     assert f"  series/{file.name} of " in said.err
-    assert "the graph is whole again, but files are lost (1)" in said.err
+    assert "the graph is rebuilt, but files are missing or altered (1)" in said.err
 
 
 def test_a_graph_in_use_is_not_repaired(workspace: Path) -> None:
@@ -184,7 +184,7 @@ def test_a_graph_in_use_is_not_repaired(workspace: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        assert "another process has the graph open; end it first" in one_line(workspace, "repair")
+        assert "another process has the graph open; stop it first" in one_line(workspace, "repair")
         process.kill()
 
 

@@ -33,7 +33,7 @@ def test_a_terminal_without_utf_8_is_no_reason_to_stop(settings, tmp_path):
 def test_a_full_disk_under_the_answer_is_one_line():
     with Path("/dev/full").open("w") as full:
         done = subprocess.run([*COMMAND, "query", "--format", "csv"], stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.stderr == "irtwin: the output: No space left on device; make room and try again\n"
+    assert done.stderr == "irtwin: the output: No space left on device; free some space and try again\n"
     assert done.returncode == 2
 
 

@@ -39,7 +39,7 @@ def workspace(tmp_path: Path) -> Path:
 
 def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(workspace: Path) -> None:
     out, said = irtwin("live", "--workspace", workspace).communicate(lines(50) + "junk\njunk\n", timeout=120)
-    assert said.count("refused: a line is no JSON") == 1
+    assert said.count("line refused: a line is not JSON") == 1
     assert "50 samples stored, 2 lines refused" in said
     archive = workspace.with_name("kept.zip")
     out, said = irtwin("backup", archive, "--workspace", workspace).communicate(timeout=120)

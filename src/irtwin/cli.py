@@ -36,7 +36,7 @@ def main() -> None:
         if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
             raise
         if error.errno != errno.EPIPE:  # else who read the answer has left, and needs no word
-            _say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; make room and try again")
+            _say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; free some space and try again")
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python flushes once more at its end
         sys.exit(2)
     except click.ClickException as error:
@@ -54,16 +54,16 @@ class _Number(click.FloatRange):
         """Return the number; fail where it is none, or not finite."""
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
-            self.fail(f"{value} is no finite number.", param, ctx)
+            self.fail(f"{value} is not a finite number.", param, ctx)
         return float(number)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="irtwin")
 def cli() -> None:
-    """A digital twin of an industrial robot's energy, held in a knowledge graph.
+    """Build a digital twin of an industrial robot's energy and keep it in a knowledge graph.
 
-    Start with `irtwin demo`: it takes the simulated logs of a KUKA KR6 R700 to a twin, a graph and a report.
+    Start with `irtwin demo`. It builds a twin, a graph and a report from simulated logs of a KUKA KR6 R700.
     """
 
 
@@ -72,10 +72,13 @@ _workspace = click.option(
     type=click.Path(path_type=Path, file_okay=False),
     default=_WORKSPACE,
     show_default=True,
-    help="Folder that holds database, series, graph and reports.",
+    help="Folder with the database, series, graph and reports.",
 )
 _database = click.option(
-    "--database", metavar="URL", envvar="IRTWIN_DATABASE", help="SQLAlchemy URL; SQLite in the workspace if not given."
+    "--database",
+    metavar="URL",
+    envvar="IRTWIN_DATABASE",
+    help="SQLAlchemy URL of the database. Default: SQLite in the workspace.",
 )
 _no_database = click.option("--database", hidden=True, expose_value=False)  # as other commands have; not needed to read
 _graph = click.option(
@@ -83,7 +86,7 @@ _graph = click.option(
     "graph_url",
     metavar="URL",
     envvar="IRTWIN_GRAPH",
-    help="Query URL of a SPARQL 1.1 server that keeps the graph; a folder of the workspace does if not given.",
+    help="Query URL of a SPARQL 1.1 server for the graph. Default: a folder in the workspace.",
 )
 
 
@@ -92,11 +95,11 @@ _graph = click.option(
 @_workspace
 @_database
 @_graph
-@click.option("--repair", is_flag=True, help="Drop bad samples, and say how many and which.")
+@click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | None, repair: bool) -> None:
-    """Take a data set to a twin, a graph and a report.
+    """Build a twin, a graph and a report from a data set.
 
-    DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file for each run.
+    DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
     """
     from irtwin.workflow import run as run_all
 
@@ -107,12 +110,12 @@ def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | N
 @cli.command()
 @_workspace
 def demo(workspace: Path) -> None:
-    """Do `run` on the KUKA KR6 R700 that ships with irtwin."""
+    """Run the example data set: simulated logs of a KUKA KR6 R700."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
     data_set = unpack_demo(workspace)
-    click.echo(f"The data set lies in {data_set}: take it as a pattern for your own.", err=True)
+    click.echo(f"The example data set is in {data_set}. Use it as a template for your own.", err=True)
     report = run_all(data_set, workspace, announce=_say)
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
     click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
@@ -120,15 +123,22 @@ def demo(workspace: Path) -> None:
 
 @cli.command()
 @click.argument("question", required=False)
-@click.option("--robot", metavar="NAME", help="Ask it of one robot, by its name.")
+@click.option("--robot", metavar="NAME", help="Ask about this robot only.")
 @_workspace
 @_no_database
 @_graph
-@click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", show_default=True)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["table", "json", "csv"]),
+    default="table",
+    show_default=True,
+    help="Output format.",
+)
 def query(question: str | None, robot: str | None, workspace: Path, graph_url: str | None, form: str) -> None:
-    """Ask the graph a question, by its name or in SPARQL.
+    """Ask the graph a question, by name or in SPARQL.
 
-    Without a QUESTION: list those that have names, theme by theme.
+    Without QUESTION, the named questions are listed by theme.
     """
     from irtwin import asking
     from irtwin.knowledge.no_network import leave_network
@@ -153,16 +163,22 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
 @cli.command()
 @click.argument("dataset", type=click.Path(path_type=Path))
 @click.option(
-    "--json", "out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Diagnosis to write."
+    "--json",
+    "out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="JSON file to write the diagnosis to.",
 )
-@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML page to write.")
+@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML file to write the report to.")
 @click.option(
-    "--save-twin", type=click.Path(path_type=Path, dir_okay=False), help="Twin with the causes added, to write."
+    "--save-twin",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="JSON file to write the twin to, with the causes added.",
 )
-@click.option("--withhold", metavar="EFFECT", multiple=True, help="Take an effect out of the twin first; repeatable.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the random draws behind the intervals.")
-@click.option("--repair", is_flag=True, help="Drop bad samples, and say how many and which.")
-@click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Keep the diagnosis there, too.")
+@click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
+@click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
+@click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Also store the diagnosis there.")
 @_database
 @_graph
 def diagnose(
@@ -177,9 +193,9 @@ def diagnose(
     database: str | None,
     graph_url: str | None,
 ) -> None:
-    """Say where a twin and its robot differ, and why.
+    """Find where a twin and its robot differ, and why.
 
-    Where the gap lies, which unmodelled effect causes it, and how far it shrinks once that effect is added.
+    The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     """
     from irtwin import workflow
     from irtwin.report.gap_line import line
@@ -204,16 +220,20 @@ def diagnose(
 @click.argument("twin", type=click.Path(path_type=Path))
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
-@click.option("--payload-mass", type=_Number(0.0, 1e5), help="kg; as the run's data set says if not given.")
+@click.option("--payload-mass", type=_Number(0.0, 1e5), help="Payload mass, kg. Default: from the run's data set.")
 @click.option(
-    "--payload-com", type=_Number(-10.0, 10.0), nargs=3, metavar="X Y Z", help="m in the flange frame; likewise."
+    "--payload-com",
+    type=_Number(-10.0, 10.0),
+    nargs=3,
+    metavar="X Y Z",
+    help="Payload's centre of mass in the flange frame, m. Default: from the run's data set.",
 )
 def predict(
     twin: Path, run: Path, out: Path, payload_mass: float | None, payload_com: tuple[float, float, float] | None
 ) -> None:
-    """Say what a saved twin expects of a run.
+    """Predict torque and power of a run with a saved twin.
 
-    Torque and power for the motion in RUN, by the TWIN that `irtwin diagnose --save-twin` wrote.
+    TWIN is a file that `irtwin diagnose --save-twin` wrote. RUN is a CSV or Parquet file with the motion.
     """
     from irtwin import modelling
 
@@ -227,9 +247,9 @@ def predict(
 @_database
 @_graph
 def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
-    """Make a diagnosis' twin the robot's own.
+    """Replace a robot's twin by the one of its diagnosis.
 
-    What the graph holds of the robot's energy is then populated anew; the page of it is written again.
+    The energy in the graph is then computed with the new twin, and the energy report is written again.
     """
     from irtwin import workflow
 
@@ -244,7 +264,7 @@ def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | No
 def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
     """Write the whole graph as one OWL file for Protégé.
 
-    Ontology, individuals and inferences, in RDF/XML.
+    The file holds ontology, individuals and inferences in RDF/XML.
     """
     from irtwin import asking
 
@@ -254,21 +274,21 @@ def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
 
 @cli.command()
 @click.argument("urdf", type=click.Path(path_type=Path))
-@click.option("--seconds", type=_Number(min=1.0), required=True, help="Length of the motion.")
+@click.option("--seconds", type=_Number(min=1.0), required=True, help="Duration of the motion, s.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV file to write.")
-@click.option("--rate", type=_Number(min=1.0), default=100.0, show_default=True, help="Samples per second.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Other seeds give other motions.")
+@click.option("--rate", type=_Number(min=1.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Each seed gives another motion.")
 @click.option(
     "--box",
     type=_Number(-1e3, 1e3),
     nargs=6,
     metavar="X Y Z X Y Z",
-    help="Two corners, m in the base frame, between which the flange stays; links stay above the floor anyway.",
+    help="Keep the flange in a box, given by two corners in the base frame, m. Links always stay above the floor.",
 )
 def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
-    """Design a motion that shows every base parameter.
+    """Design a motion that excites every base parameter.
 
-    A finite Fourier series that starts and ends at rest and keeps the limits of the joints, between the samples too.
+    The motion is a finite Fourier series. It starts and ends at rest and keeps the joint limits, between samples too.
     Ctrl-C keeps the best motion so far.
     """
     from irtwin.identification import excitation
@@ -285,12 +305,12 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
         )
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
-    ended = {motion.bounded: "Ended at its most work: ", motion.interrupted: "Stopped: "}.get(True)
-    click.echo(f"\n{ended}this is the best so far." if ended else "", err=True)
+    ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
+    click.echo(f"\n{ended}This is the best motion so far." if ended else "", err=True)
     click.echo(
         f"{out}: condition number {motion.condition_number:.1f}, "
-        f"{motion.limit_margin:.1%} of the joint limits to spare, "
-        + ("no wall in reach" if motion.clearance == math.inf else f"{motion.clearance:.3f} m to the nearest wall")
+        f"{motion.limit_margin:.1%} margin to the joint limits, "
+        + ("no wall within reach" if motion.clearance == math.inf else f"{motion.clearance:.3f} m to the nearest wall")
     )
 
 
@@ -300,7 +320,7 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     type=click.Path(path_type=Path, dir_okay=False),
     default=Path("irtwin-ontology.html"),
     show_default=True,
-    help="HTML page to write.",
+    help="HTML file to write.",
 )
 def docs(out: Path) -> None:
     """Write the ontology's documentation as one HTML page."""
@@ -314,11 +334,11 @@ def docs(out: Path) -> None:
 @click.argument("mapping", type=click.Path(path_type=Path))
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
-@click.option("--timeout", type=_Number(min=0.1), default=600.0, show_default=True, help="Seconds per triples map.")
+@click.option("--timeout", type=_Number(min=0.1), default=600.0, show_default=True, help="Limit per triples map, s.")
 def map_database(mapping: Path, database: str, out: Path, timeout: float) -> None:
-    """Turn a database into triples by an R2RML document.
+    """Map a database to triples with an R2RML document.
 
-    Any document on any database that SQLAlchemy reaches.
+    Works with any R2RML document and any database that SQLAlchemy supports.
     """
     from irtwin.knowledge.mapping import map_to_file
 
@@ -327,16 +347,18 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float) -> Non
 
 @cli.command()
 @_workspace
-@click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 takes a free one.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; others may ask it.")
-@click.option("--timeout", type=_Number(0.1, _DAY), default=30.0, show_default=True, help="Seconds per query.")
-@click.option("--memory", type=click.IntRange(64, 1 << 20), default=1024, show_default=True, help="MB per query.")
-@click.option("--token-file", type=click.Path(path_type=Path), help="Allows updates by who sends the token in it.")
+@click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 picks a free port.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--timeout", type=_Number(0.1, _DAY), default=30.0, show_default=True, help="Limit per query, s.")
+@click.option(
+    "--memory", type=click.IntRange(64, 1 << 20), default=1024, show_default=True, help="Limit per query, MB."
+)
+@click.option("--token-file", type=click.Path(path_type=Path), help="File with the token that permits updates.")
 def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
-    """Answer SPARQL over HTTP, at /sparql.
+    """Serve the graph as a SPARQL endpoint, at /sparql.
 
-    With a query page at /, and the ontology at its IRIs' paths. Read-only, unless the token for updates is given: in
-    a file, or in the environment as IRTWIN_TOKEN.
+    A query page is at /, and the ontology at the paths of its IRIs. The endpoint is read-only unless you give a token
+    for updates, in a file or in the environment variable IRTWIN_TOKEN.
     """
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
@@ -347,17 +369,17 @@ def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, to
 
 
 def _announce(address: str) -> None:
-    click.echo(f"Serving {address}; Ctrl-C stops.")
+    click.echo(f"Serving {address}. Press Ctrl-C to stop.")
 
 
 @cli.command()
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF file to write.")
-@click.option("--dl", is_flag=True, help="Check consistency and classify in OWL 2 DL instead, by HermiT.")
+@click.option("--dl", is_flag=True, help="Check consistency and classify with HermiT (OWL 2 DL) instead.")
 def reason(source: Path, out: Path, dl: bool) -> None:
-    """Write an RDF file and all that OWL 2 RL infers.
+    """Write an RDF file together with everything that OWL 2 RL infers.
 
-    The suffixes tell the formats. Where SOURCE contradicts itself: nothing is written, and the exit status is 3.
+    The file suffixes decide the formats. If SOURCE contradicts itself, nothing is written and the exit status is 3.
     """
     from irtwin.knowledge.owl_rl import Contradiction
     from irtwin.knowledge.owl_rl_file import close_file
@@ -375,12 +397,12 @@ def reason(source: Path, out: Path, dl: bool) -> None:
 @_workspace
 @_no_database
 @_graph
-@click.option("--json", "as_json", is_flag=True, help="Write nested objects instead of an outline.")
+@click.option("--json", "as_json", is_flag=True, help="Write nested JSON objects instead of an outline.")
 def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool) -> None:
-    """Say how a triple of the graph is known.
+    """Explain where a triple of the graph comes from.
 
-    By which rule, mapping or provider, from which facts, down to runs, files and checksums. TRIPLE is subject,
-    predicate and object: prefixed names, IRIs, or literals; `?` or nothing stands for anything.
+    The explanation names the rule, mapping or provider and the facts it used, down to runs, files and checksums.
+    TRIPLE is subject, predicate and object: prefixed names, IRIs or literals. `?` or a missing part matches anything.
     """
     import json
 
@@ -398,12 +420,13 @@ def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_
 @_workspace
 @_database
 @_graph
-@click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1.")
+@click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
 def live(workspace: Path, database: str | None, graph_url: str | None, port: int | None) -> None:
-    """Watch robots: store their samples, keep the graph current.
+    """Watch robots: store their samples and keep the graph up to date.
 
-    Reads one JSON object a line from standard input, fields as in ROS' JointState: robot, time (s since 1970),
-    position, velocity, effort, and if known temperature, power, name. Ctrl-C ends it; all samples read are stored.
+    Reads one JSON object per line from standard input. The fields are those of ROS' JointState: robot, time (s since
+    1970), position, velocity, effort, and optionally temperature, power and name. Ctrl-C stops; every sample that was
+    read is stored.
     """
     from irtwin.watch import watch
 
@@ -416,9 +439,9 @@ def live(workspace: Path, database: str | None, graph_url: str | None, port: int
 @_database
 @_graph
 def drop(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
-    """Forget a ROBOT, by its name.
+    """Remove a ROBOT from the workspace.
 
-    Its data set, twin, diagnosis, live runs and report, and all that the graph says of it.
+    Its runs, twin, diagnosis, live runs and report are deleted, and everything that the graph says about it.
     """
     from irtwin import upkeep
 
@@ -429,10 +452,10 @@ def drop(robot: str, workspace: Path, database: str | None, graph_url: str | Non
 @_workspace
 @_database
 def repair(workspace: Path, database: str | None) -> None:
-    """Make a damaged graph anew from the database.
+    """Rebuild a damaged graph from the database.
 
-    Says which series, twins and diagnoses are missing or altered: exit status 2 then. A damaged database comes back by
-    `restore`.
+    Lists the series, twins and diagnoses that are missing or altered; the exit status is then 2. A damaged database
+    needs `restore`.
     """
     from irtwin import upkeep
 
@@ -446,9 +469,9 @@ def repair(workspace: Path, database: str | None) -> None:
 @_database
 @_graph
 def backup(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
-    """Write a workspace into one ARCHIVE, while others may write.
+    """Write a workspace into one ARCHIVE, even while others write to it.
 
-    Graph, database (its rows, from a server too), series, twins, diagnoses and reports, each with its checksum.
+    It holds graph, database (also the rows of a server), series, twins, diagnoses and reports, with checksums.
     """
     from irtwin import workflow
 
@@ -462,9 +485,9 @@ def backup(archive: Path, workspace: Path, database: str | None, graph_url: str 
 @_database
 @_graph
 def restore(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
-    """Make a new workspace of an ARCHIVE that `backup` wrote.
+    """Create a new workspace from an ARCHIVE that `backup` wrote.
 
-    Nothing is restored of an archive that is damaged, and nothing is overwritten.
+    A damaged archive restores nothing, and nothing is overwritten.
     """
     from irtwin.knowledge.backup import restore as restore_all
 

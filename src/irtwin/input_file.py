@@ -11,11 +11,13 @@ from irtwin.errors import InputError
 def read_input(path: Path, most: int) -> bytes:
     """Return a file's content. Raises InputError where it cannot be read or has more than `most` bytes."""
     if check_file(path) > most:
-        raise InputError(f"{path}: is larger than the {most // 1_000_000} MB that are read of such a file")
+        raise InputError(
+            f"{path}: is larger than the {most // 1_000_000} MB limit for such a file; give a smaller file"
+        )
     try:
         return path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that is there") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name an existing file") from error
 
 
 def check_file(path: Path) -> int:
@@ -23,9 +25,9 @@ def check_file(path: Path) -> int:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path}: is no file; name one that holds the input")
+            raise InputError(f"{path}: is not a file; name the file with the input")
         return status.st_size
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that is there") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name an existing file") from error
     except ValueError as error:  # a null byte in the name
-        raise InputError(f"{str(path)!r}: is no file name: {error}") from error
+        raise InputError(f"{str(path)!r}: is not a file name: {error}") from error

@@ -42,7 +42,7 @@ def drop(
         robot_id = find_robot(place, robot)
         journals = of_robot(place.folder / LIVE, robot_id)
         if set(journals) - set(left_behind(place.folder / LIVE)):
-            raise InputError(f'{place.folder}: "{robot}" is being watched; end `irtwin live` first')
+            raise InputError(f'{place.folder}: "{robot}" is being watched; stop `irtwin live` first')
         place.drop_robot(robot_id)
         for file in (*journals, place.report_path(robot_id)):
             file.unlink(missing_ok=True)
@@ -65,7 +65,7 @@ def repair(
     with Workspace.existing(Path(workspace), database) as place, _nobody_else(place.graph_folder):
         with files.working_folder(place.folder, ".repair-") as folder:
             place.mapped_rows.unlink(missing_ok=True)
-            announce("Making the graph from the database")
+            announce("Rebuilding the graph from the database")
             with KnowledgeGraph(folder / "graph", place.folder) as graph:
                 graph.load_ontology()
                 map_rows(place, graph)
@@ -78,8 +78,8 @@ def repair(
         announce(f"  {line}")
     if lost:
         raise InputError(
-            f"{place.folder}: the graph is whole again, but files are lost ({len(lost)}); "
-            "run the data sets of these robots again, restore a backup, or take the robots out by `irtwin drop`"
+            f"{place.folder}: the graph is rebuilt, but files are missing or altered ({len(lost)}); "
+            "run the data sets of these robots again, restore a backup, or remove the robots with `irtwin drop`"
         )
 
 
@@ -93,7 +93,7 @@ def _nobody_else(folder: Path) -> Iterator[None]:
         try:
             fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            raise InputError(f"{folder}: another process has the graph open; end it first") from None
+            raise InputError(f"{folder}: another process has the graph open; stop it first") from None
         yield
 
 
@@ -105,7 +105,7 @@ def _carry_over(old: Path, new: KnowledgeGraph, announce: Callable[[str], None])
         with told(old), KnowledgeGraph.as_it_stands(old) as before:
             written = [quad for quad in before.quads() if not _made(_name(quad))]
     except InputError:
-        announce(f"  the graph could not be read; what SPARQL updates had written may still be in {_DAMAGED}/")
+        announce(f"  the old graph could not be read; it is kept in {_DAMAGED}/, with what SPARQL updates had written")
         return False
     if written:
         new.replace(written, *{_name(quad) for quad in written})

@@ -41,7 +41,7 @@ def watch(
     def refuse(reason: str) -> None:
         refused[reason] += 1
         if refused[reason] == 1 and len(refused) <= _MOST_REASONS:
-            announce(f"refused: {reason}")
+            announce(f"line refused: {reason}")
 
     with (
         told_when_full(workspace),
@@ -61,8 +61,8 @@ def watch(
         if port is None:
             threading.Thread(target=take_standard_input, daemon=True).start()
         with nullcontext() if port is None else listening(port, take) as actual:
-            announce("reading standard input" if actual is None else f"listening on 127.0.0.1:{actual}")
+            announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
             while not done.wait(0.2):
                 twin.check()
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
-    announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited {twin.waited:.1f} s")
+    announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")

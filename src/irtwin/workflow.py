@@ -111,7 +111,7 @@ def diagnose(
         announce("Writing the report")
         render_alone(data_set, document, found.evidence, report)
     if workspace is not None:
-        announce("Keeping the diagnosis")
+        announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
         twin = None if found.twin is None else to_json(found.twin)
         with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
@@ -194,7 +194,7 @@ def _take_in(place: Workspace, data_set: DataSet, announce: Announce) -> str:
     announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
     with staged(place, robot_id) as apart:
         announce(f"  {ingest(apart, data_set)}")
-        announce("Populating what the graph lacks")
+        announce("Running the data providers")
         try:
             _populate_apart(apart, announce)
         except InputError as error:
@@ -214,7 +214,7 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
     """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other."""
 
     def set_aside(robot_id: str, reason: InputError) -> None:
-        announce(f"  {robot_id} is set aside: {reason}; `irtwin drop {robot_id}` takes it out")
+        announce(f"  {robot_id} is set aside: {reason}; remove it with `irtwin drop {robot_id}`")
 
     return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
 
@@ -223,9 +223,11 @@ def conclude(graph: KnowledgeGraph, announce: Announce) -> None:
     """Reason over the graph and check its constraints; say what was found."""
     announce("Reasoning")
     inferred = reason(graph)
-    announce(f"  {inferred.owl_rl} triples by OWL 2 RL, {inferred.swrl} by SWRL, {inferred.shacl} by SHACL rules")
+    announce(f"  {inferred.owl_rl} triples from OWL 2 RL, {inferred.swrl} from SWRL, {inferred.shacl} from SHACL rules")
     if inferred.joined_by:
-        announce(f"  reasoned over all robots together, as of all of them speaks: {inferred.joined_by}")
+        announce(
+            f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"
+        )
     for violation in validate(graph):
         announce(f"  {violation}")
 

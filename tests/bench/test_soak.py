@@ -1,4 +1,4 @@
-"""A short soak of the endpoint; the long one's figures stand in docs/decisions/endpoint.md."""
+"""A short soak of the endpoint; the figures of the long one are in docs/findings/endpoint.md."""
 
 from __future__ import annotations
 

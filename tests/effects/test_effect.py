@@ -190,11 +190,11 @@ def test_a_joint_feels_the_links_that_it_carries():
 @pytest.mark.parametrize(
     "effects, message",
     [
-        (["rigid_body", "magic"], 'there is no effect "magic"; use some of rigid_body'),
-        (["rigid_body", "rigid_body"], 'effect "rigid_body" stands there twice; name it once'),
+        (["rigid_body", "magic"], 'there is no effect "magic"; choose from rigid_body'),
+        (["rigid_body", "rigid_body"], 'effect "rigid_body" is listed twice; list it once'),
         (
             [catalogue()["cable_drag"].on("elbow")],
-            'effect "cable_drag": there is no joint "elbow"; use some of joint_1',
+            'effect "cable_drag": there is no joint "elbow"; choose from joint_1',
         ),
     ],
 )

@@ -48,7 +48,7 @@ REFUSED = {
     "only reference runs": (lambda: runs("reference"), 'dataset.toml: no run has role = "observed"'),
     "neither torque nor power": (
         lambda: runs(torque=nothing, power=nothing),
-        "observed_0.parquet: neither torque nor power can be told; log tau_, i_ or power",
+        "observed_0.parquet: has neither torque nor power; log tau_, i_ or power",
     ),
     "too short": (
         lambda: [replace(run, signals=run.signals.rows(slice(26))) for run in runs(seeds=range(3))],
@@ -95,8 +95,12 @@ def test_what_cannot_be_diagnosed_is_refused(fault, tmp_path):
 @pytest.mark.parametrize(
     ("tail", "options", "message"),
     [
-        ("", ["--withhold", "phlogiston"], "--withhold phlogiston: there is no such effect; use some of rigid_body"),
-        ("", ["--withhold", "copper_loss"], "--withhold copper_loss: the twin does not have it; it has rigid_body"),
+        ("", ["--withhold", "phlogiston"], "--withhold phlogiston: there is no such effect; choose from rigid_body"),
+        (
+            "",
+            ["--withhold", "copper_loss"],
+            "--withhold copper_loss: the twin does not have this effect; it has rigid_body",
+        ),
         (
             '[twin]\neffects = ["rigid_body", "phlogiston"]',
             [],
@@ -129,7 +133,9 @@ def test_bad_samples_are_named_and_repaired(tmp_path):
     data = write(tmp_path / "data", ROBOT, holed)
     said = irtwin("diagnose", data, "--json", tmp_path / "out.json")
     assert said.status == 2
-    assert "observed_0.parquet, row 5, column tau_joint_2: is not a finite number; mend it, or use --repair" in said.err
+    assert (
+        "observed_0.parquet, row 5, column tau_joint_2: is not a finite number; correct it, or use --repair" in said.err
+    )
     said = irtwin("diagnose", data, "--json", tmp_path / "out.json", "--repair")
     assert said.status == 0
     assert "samples dropped, column tau_joint_2 is not a finite number: row 5" in said.err

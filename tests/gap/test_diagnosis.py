@@ -146,7 +146,11 @@ def test_the_same_data_give_the_same_diagnosis():
 
 @pytest.mark.parametrize(
     ("withhold", "message"),
-    [(["glue"], "no such effect"), (["copper_loss"], "the twin does not have it"), (["rigid_body"], "without bodies")],
+    [
+        (["glue"], "no such effect"),
+        (["copper_loss"], "the twin does not have this effect"),
+        (["rigid_body"], "rigid bodies cannot be withheld"),
+    ],
 )
 def test_withholding_what_cannot_be(withhold, message):
     with pytest.raises(InputError, match=message):

@@ -132,5 +132,5 @@ def test_bodies_that_no_robot_has_are_refused(spoilt, message):
 
 def test_a_payload_that_no_robot_carries_is_refused():
     made = [replace(run, payload_mass=1e300) for run in runs(arm(2), 2)]
-    with pytest.raises(InputError, match=r'run "run_0": a payload of 1e\+300 kg; give 0 to'):
+    with pytest.raises(InputError, match=r'run "run_0": the payload is 1e\+300 kg; give 0 to'):
         diagnose(data_set(arm(2), made))

@@ -116,12 +116,12 @@ def test_a_fault_is_one_line_and_leaves_nothing(folder, tmp_path, fault):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--payload-mass", "nan"], 'run "bare": a payload of nan kg; give 0 to 100000 kg'),
-        (["--payload-mass", "inf"], "a payload of inf kg; give 0 to 100000 kg"),
-        (["--payload-mass", "1e300"], "a payload of 1e+300 kg"),
+        (["--payload-mass", "nan"], 'run "bare": the payload is nan kg; give 0 to 100000 kg'),
+        (["--payload-mass", "inf"], "the payload is inf kg; give 0 to 100000 kg"),
+        (["--payload-mass", "1e300"], "the payload is 1e+300 kg"),
         (["--payload-mass", "-1"], "-1"),
-        (["--payload-com", "0", "nan", "0"], "a payload at 0, nan, 0 m; give its place in the flange frame"),
-        (["--payload-com", "0", "0", "-inf"], "a payload at 0, 0, -inf m"),
+        (["--payload-com", "0", "nan", "0"], "the payload is at 0, nan, 0 m; give it in the flange frame"),
+        (["--payload-com", "0", "0", "-inf"], "the payload is at 0, 0, -inf m"),
     ],
 )
 def test_a_payload_that_cannot_be_is_refused(folder, tmp_path, options, message):

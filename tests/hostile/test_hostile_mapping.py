@@ -27,7 +27,7 @@ def objects(what: str) -> str:
 
 
 DATABASE = "the database refuses it"
-ENDLESS = "<M>: its SQL has not ended after 2 s; mend it"
+ENDLESS = "<M>: its SQL has not ended after 2 s; correct it"
 NUMBERS = "WITH RECURSIVE number(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM number)"
 SQL = {
     "drop": (query("DROP TABLE person"), DATABASE),
@@ -151,9 +151,9 @@ def test_databases(refused: Callable[..., str], folder: Path, database: str, mes
 
 def test_what_is_no_file(refused: Callable[..., str], folder: Path) -> None:
     os.mkfifo(folder / "input.ttl")
-    assert "is no file" in refused("mapping", str(folder), "")
+    assert "is not a file" in refused("mapping", str(folder), "")
     (folder / "input.ttl").unlink()
     (folder / "input.ttl").symlink_to("/dev/zero")
-    assert "is no file" in refused("mapping", str(folder), "")
+    assert "is not a file" in refused("mapping", str(folder), "")
     (folder / "input.ttl").unlink()
     assert "cannot be read" in refused("mapping", str(folder), "")

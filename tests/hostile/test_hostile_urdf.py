@@ -58,7 +58,7 @@ MALFORMED = {
     "link twice": (GOOD.replace("<joint", LINK.format("a") + "<joint"), "two links are named"),
     "no moving joint": (GOOD.replace("revolute", "fixed"), "no joint moves"),
     "joint without a name": (GOOD.replace('name="j"', ""), 'a joint has no "name"'),
-    "joint twice": (GOOD.replace("</robot>", f"{JOINT}</robot>"), "stands there twice"),
+    "joint twice": (GOOD.replace("</robot>", f"{JOINT}</robot>"), "is defined twice"),
     "unknown parent": (GOOD.replace('parent link="a"', 'parent link="x"'), "parent link .* is not defined"),
     "unknown child": (GOOD.replace('child link="b"', 'child link="x"'), "child link .* is not defined"),
     "loop": (GOOD.replace('child link="b"', 'child link="a"'), "loop|several bases"),
@@ -114,13 +114,13 @@ def test_what_is_no_file(refused: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "latin").write_bytes('<robot name="é"/>'.encode("latin-1"))
     (tmp_path / "wide").write_bytes(GOOD.encode("utf-16"))
     (tmp_path / "round").symlink_to(tmp_path / "round")
-    assert "is no file" in refused("urdf", str(tmp_path), "pipe")
-    assert "is no file" in refused("urdf", str(tmp_path), "/dev/zero")
-    assert "is no file" in refused("urdf", str(tmp_path), ".")
+    assert "is not a file" in refused("urdf", str(tmp_path), "pipe")
+    assert "is not a file" in refused("urdf", str(tmp_path), "/dev/zero")
+    assert "is not a file" in refused("urdf", str(tmp_path), ".")
     assert "is larger than" in refused("urdf", str(tmp_path), "large")
     assert "is not UTF-8" in refused("urdf", str(tmp_path), "bytes")
     assert "is not UTF-8" in refused("urdf", str(tmp_path), "latin")
     assert "is not UTF-8" in refused("urdf", str(tmp_path), "wide")
     assert "cannot be read" in refused("urdf", str(tmp_path), "round")
     assert "cannot be read" in refused("urdf", str(tmp_path), "none")
-    assert "is no file name" in refused("urdf", str(tmp_path), "no\0ne")
+    assert "is not a file name" in refused("urdf", str(tmp_path), "no\0ne")

@@ -181,7 +181,7 @@ def refuse(archive: Path, message: str) -> None:
 
 @pytest.mark.parametrize("name", ["../outside", "series/../../outside", "/tmp/outside", "irtwin.db", "graph/CURRENT"])
 def test_names_that_escape_are_refused(archive: Path, name: str) -> None:
-    refuse(altered(archive, lambda contents: contents.update({name: b"x"})), "does not belong into a workspace")
+    refuse(altered(archive, lambda contents: contents.update({name: b"x"})), "does not belong in a workspace")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.999])
@@ -216,17 +216,17 @@ def test_contents_that_are_not_those_of_the_list(archive: Path) -> None:
     def other(contents: dict[str, bytes]) -> None:
         contents["graph.nq"] = b"#" + contents["graph.nq"][1:]
 
-    refuse(altered(archive, longer, sums=False), "not those of its list")
+    refuse(altered(archive, longer, sums=False), "do not match its list")
     refuse(altered(archive, other, sums=False), r"graph\.nq is damaged, its checksum differs")
-    refuse(altered(archive, lambda contents: contents.update(more=b""), sums=False), "not those of its list")
-    refuse(altered(archive, lambda contents: contents.pop("graph.nq"), sums=False), "not those of its list")
+    refuse(altered(archive, lambda contents: contents.update(more=b""), sums=False), "do not match its list")
+    refuse(altered(archive, lambda contents: contents.pop("graph.nq"), sums=False), "do not match its list")
 
 
 @pytest.mark.parametrize(
     ("name", "data", "message"),
     [
         ("graph.nq", b"<a", "its graph is damaged"),
-        ("rows/robot.jsonl", b"{}\n", "table robot is of another irtwin"),
+        ("rows/robot.jsonl", b"{}\n", "table robot was made by another irtwin version"),
         ("rows/robot.jsonl", b"[\n", "rows of table robot do not fit"),
         ("rows/joint.jsonl", None, "has no table joint"),
         ("rows/robot.jsonl", b"", "do not fit"),
@@ -248,17 +248,17 @@ def test_what_is_no_backup(tmp_path: Path) -> None:
             target.writestr("a.txt", "a")
             if manifest is not None:
                 target.writestr("manifest.json", manifest)
-        refuse(foreign, "no irtwin backup|damaged")
+        refuse(foreign, "not an irtwin backup|damaged")
     with zipfile.ZipFile(foreign, "w") as target:
         target.writestr("manifest.json", '{"format": "irtwin backup", "version": 2, "software": "irtwin 9"}')
     refuse(foreign, "made by another irtwin.*irtwin 9")
     refuse(tmp_path / "none.zip", "cannot be read")
     (tmp_path / "text.zip").write_text("hello")
-    refuse(tmp_path / "text.zip", "no backup at all")
+    refuse(tmp_path / "text.zip", "or not a backup")
 
 
 def test_nothing_is_overwritten(archive: Path, filled: Workspace, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is there already; restore into a new folder"):
+    with pytest.raises(InputError, match="already exists; restore into a new folder"):
         restore(archive, filled.folder)
     (tmp_path / "empty").mkdir()
     restore(archive, tmp_path / "empty")

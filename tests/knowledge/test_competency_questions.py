@@ -68,7 +68,7 @@ def test_there_are_fifty_questions_and_more_and_each_theme_has_some() -> None:
 
 
 def test_a_robot_that_is_not_there_is_told(graph: KnowledgeGraph) -> None:
-    with pytest.raises(InputError, match=r"no robot is called 'Arm_Q': did you mean Arm_"):
+    with pytest.raises(InputError, match=r"there is no robot 'Arm_Q': did you mean Arm_"):
         ask(graph, "energy_per_run", "Arm_Q")
     with pytest.raises(InputError, match="known are Arm_A, Arm_B, Arm_C, Arm_D"):
         ask(graph, "energy_per_run", "xyzzy")
@@ -76,7 +76,7 @@ def test_a_robot_that_is_not_there_is_told(graph: KnowledgeGraph) -> None:
 
 @pytest.mark.parametrize("question", ["fleet_totals", "SELECT * { ?s ?p ?o }", "nothing"])
 def test_what_is_not_asked_of_one_robot_is_told(graph: KnowledgeGraph, question: str) -> None:
-    with pytest.raises(InputError, match="is not asked of one robot: leave the robot out"):
+    with pytest.raises(InputError, match="does not ask about one robot; leave --robot out"):
         ask(graph, question, "Arm_A")
 
 

@@ -124,7 +124,7 @@ def test_written_as_outline_and_as_json(reasoned: KnowledgeGraph) -> None:
 @pytest.mark.parametrize(
     ("pattern", "message"),
     [
-        ("id:run/nobody irt:Payload ?", "holds no triple id:run/nobody"),
+        ("id:run/nobody irt:Payload ?", "has no triple id:run/nobody"),
         ("? ? ?", "more than 100 triples fit"),
         ("irt:a irt:b irt:c irt:d", "more than subject, predicate and object"),
         ("irt:a { irt:c", "not a SPARQL query"),

@@ -187,5 +187,5 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 def test_where_to_write_must_exist(tmp_path: Path) -> None:
     for out in (tmp_path / "none" / "out.nq", tmp_path):
-        with pytest.raises(InputError, match="not a file that can be written"):
+        with pytest.raises(InputError, match="cannot be written"):
             map_to_file(tmp_path / "a.ttl", "sqlite:///a.db", out)

@@ -79,7 +79,7 @@ def test_faults_of_a_subject_map(tmp_path: Path, subject: str, message: str) -> 
         ("rr:sqlVersion rr:SQL2008", r"give either rr:tableName or rr:sqlQuery"),
         ('rr:sqlQuery "SELECT * FROM person" ; rr:sqlVersion rr:SQL1979', r"rr:SQL1979 is no SQL version identifier"),
         ('rr:sqlQuery "SELECT FROM"', r"the database refuses it"),
-        ('rr:sqlQuery "SELECT id, id FROM person"', r"column id comes more than once"),
+        ('rr:sqlQuery "SELECT id, id FROM person"', r"column id occurs more than once"),
         ('rr:sqlQuery "SELECT * FROM person; DROP TABLE person"', r"more than one statement"),
         ('rr:sqlQuery "DELETE FROM person"', r"the database refuses it"),
         ('rr:sqlQuery "SELECT * FROM person) ; DELETE FROM person --"', r"more than one statement"),
@@ -92,7 +92,7 @@ def test_faults_of_a_logical_table(tmp_path: Path, table: str, message: str) -> 
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        ("", r"no rr:TriplesMap in it"),
+        ("", r"has no rr:TriplesMap"),
         ("<#P> a rr:TriplesMap .", r"<P>: has 0 subject maps"),
         (f"<#P> {SUBJECT} .", r"rr:logicalTable is missing"),
         (

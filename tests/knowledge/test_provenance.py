@@ -29,5 +29,5 @@ def test_thing_that_nobody_computed_ends_the_chain(graph: KnowledgeGraph) -> Non
 
 
 def test_unknown_thing_is_refused(graph: KnowledgeGraph) -> None:
-    with pytest.raises(InputError, match="the graph does not know it"):
+    with pytest.raises(InputError, match="not in the graph"):
         trace(graph, individual("run", "nobody"))

@@ -85,8 +85,8 @@ def test_functions_work_within_patterns_sums_and_filters(graph: KnowledgeGraph) 
     ("call", "fault"),
     [
         ("series:mean(RUN, 'powr', 10, 11)", "id:run/KUKA_KR6_R700.work: there is no channel 'powr'; there are power"),
-        ("series:mean(id:nobody, 'power', 10, 11)", "id:nobody: the graph knows no measured series of it"),
-        ("series:mean(RUN, 'power', 10, 11, 'modelled')", "the graph knows no modelled series of it"),
+        ("series:mean(id:nobody, 'power', 10, 11)", "id:nobody: the graph has no measured series of this run"),
+        ("series:mean(RUN, 'power', 10, 11, 'modelled')", "the graph has no modelled series of this run"),
         ("series:mean(RUN, 'power', 11, 10)", "ends before it begins"),
         ("series:mean(RUN, 'power', 'a', 10)", "is a number of seconds or an xsd:dateTime"),
         ("series:mean(RUN, 'power', true, 10)", "is a number of seconds or an xsd:dateTime"),
@@ -118,7 +118,7 @@ def test_no_file_outside_the_workspace_is_read(graph: KnowledgeGraph, tmp_path: 
         )
         table = other.query("SELECT (series:mean(<urn:run>, 'power', 0, 1) AS ?value) {}")
     assert table[0]["value"] is None
-    assert "leads out of the workspace" in "".join(table.faults)
+    assert "leads outside the workspace" in "".join(table.faults)
 
 
 def test_every_function_is_described_in_the_ontology() -> None:

@@ -154,7 +154,7 @@ def test_what_the_workspace_lacks_is_named(workspace: Workspace) -> None:
 def test_a_changed_document_is_told(workspace: Workspace) -> None:
     found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
     (workspace.folder / found.twin_file).write_text("{}")
-    with pytest.raises(InputError, match="changed since it was written"):
+    with pytest.raises(InputError, match="was changed after it was written"):
         adopt(workspace, ROBOT)
     (workspace.folder / found.twin_file).unlink()
     with pytest.raises(InputError, match="cannot be read"):

@@ -52,16 +52,16 @@ def test_values_follow_the_names() -> None:
 @pytest.mark.parametrize(
     ("said", "message"),
     [
-        (b"{", "no JSON"),
-        (b"POST /robot HTTP/1.1\r\n", "an HTTP request, as a web page may make it"),
-        (b"\xff\xfe", "no JSON"),
-        (b"[" * 60_000, "no JSON"),
-        (b"[1]", "no JSON object"),
+        (b"{", "not JSON"),
+        (b"POST /robot HTTP/1.1\r\n", "an HTTP request, which a web page may have sent"),
+        (b"\xff\xfe", "not JSON"),
+        (b"[" * 60_000, "not JSON"),
+        (b"[1]", "not a JSON object"),
         (b" " * (LONGEST_LINE + 1), "longer than"),
         (line(robot="S"), "no robot 'S' in the workspace.*known are R"),
         (line(robot=["R"]), "no robot"),
-        (line(time=...), "`time` is no number"),
-        (line(time="5"), "`time` is no number"),
+        (line(time=...), "`time` is not a number"),
+        (line(time="5"), "`time` is not a number"),
         (line(time=-1), "since 1970"),
         (line(time=1e18), "since 1970"),
         (line(position=...), "`position` is missing"),
@@ -69,12 +69,12 @@ def test_values_follow_the_names() -> None:
         (line(position=[1, None]), "2 numbers"),
         (line(position=[1, True]), "2 numbers"),
         (line(position=[1, 10**400]), "2 numbers"),
-        (b'{"robot": "R", "time": NaN, "position": [1, 2]}', "`time` is no number"),
+        (b'{"robot": "R", "time": NaN, "position": [1, 2]}', "`time` is not a number"),
         (b'{"robot": "R", "time": 1, "position": [1, Infinity]}', "2 numbers"),
-        (line(velocity=5), "`velocity` is to hold"),
-        (line(name=["a1"]), "`name` is to name the joints of R: a1, a2"),
-        (line(name=[["a1"], "a2"]), "`name` is to name"),
-        (line(power="x"), "`power` is no number"),
+        (line(velocity=5), "`velocity` must have"),
+        (line(name=["a1"]), "`name` must list the joints of R: a1, a2"),
+        (line(name=[["a1"], "a2"]), "`name` must list"),
+        (line(power="x"), "`power` is not a number"),
     ],
 )
 def test_what_is_no_state_is_refused(said: bytes, message: str) -> None:
@@ -88,7 +88,7 @@ def test_a_bad_line_stops_nothing() -> None:
     stream = io.BytesIO(line(time=1) + b"\n\nnonsense\n" + b"x" * (3 * LONGEST_LINE) + b"\n" + line(time=2))
     feed(lines_of(stream), READER, taken.append, refused.append)
     assert [state.time for state in taken] == [1.0, 2.0]
-    assert refused == ["a line is no JSON", f"a line is longer than {LONGEST_LINE} bytes"]
+    assert refused == ["a line is not JSON", f"a line is longer than {LONGEST_LINE} bytes"]
 
 
 def test_clients_on_a_port() -> None:
@@ -105,7 +105,7 @@ def test_clients_on_a_port() -> None:
                 client.sendall(b"".join(line(time=10 * number + step) + b"\n" for step in range(5)))
         for _ in range(3):
             assert done.acquire(timeout=10)
-        with pytest.raises(InputError, match=f"port {port} cannot be listened on"), listening(port, handle):
+        with pytest.raises(InputError, match=f"cannot listen on port {port}"), listening(port, handle):
             pass
     assert len(taken) == 15
 

@@ -161,11 +161,11 @@ def test_states_that_are_not_later_are_refused(place: Workspace, graph: Knowledg
     with LiveTwin(place, graph) as twin:
         twin.receive(state(5))
         for number in (5, 4):
-            with pytest.raises(InputError, match="no later time"):
+            with pytest.raises(InputError, match="not later than"):
                 twin.receive(state(number))
         twin.receive(state(6))
     assert live_run(place).sample_count == 2
-    with pytest.raises(InputError, match="watching is over"):
+    with pytest.raises(InputError, match="watching has ended"):
         twin.receive(state(7))
 
 
@@ -188,7 +188,7 @@ def test_a_state_of_a_wrong_time_is_refused_by_itself(place: Workspace, graph: K
         for number in range(50):
             twin.receive(state(number))
         twin.receive(moved(50, wrong))
-        with pytest.raises(InputError, match="more than 60 s off those around it"):
+        with pytest.raises(InputError, match="more than 60 s away from its neighbours"):
             twin.receive(state(51))
         for number in range(52, 150):
             twin.receive(state(number))

@@ -1,4 +1,4 @@
-"""What the terminal says of a diagnosis."""
+"""What the terminal says of a diagnosis: its largest cause first."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from irtwin.report.gap_line import line
         (
             "attributed",
             "reference",
-            "attributed: stribeck friction on joint_a3 and viscous friction on joint_a3 changed since the reference "
+            "attributed: viscous friction on joint_a3 and stribeck friction on joint_a3 changed since the reference "
             "runs",
         ),
         (
             "attributed",
             "simulated",
-            "attributed: the simulator lacks stribeck friction on joint_a3 and viscous friction on joint_a3",
+            "attributed: the simulator lacks viscous friction on joint_a3 and stribeck friction on joint_a3",
         ),
         (
             "ambiguous",
@@ -40,5 +40,5 @@ def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
     diagnosis = gap_cases.diagnosis("attributed")
     diagnosis["causes"][1] |= {"scope": "missing", "joints": [], "effect": "base_tilt"}
     assert line(diagnosis, "simulated") == (
-        "attributed: the twin lacks base tilt; the simulator lacks stribeck friction on joint_a3"
+        "attributed: the simulator lacks stribeck friction on joint_a3; the twin lacks base tilt"
     )

@@ -10,9 +10,18 @@ from irtwin.report.questions import Answer, Question
 
 def answers(scope, simulated, referenced):
     """A diagnosis with one cause, payload, of the whole robot."""
+    return answers_of({"payload": scope}, simulated, referenced)
+
+
+def answers_of(causes, simulated=False, referenced=True, verdict="attributed", rivals=()):
+    """A diagnosis with causes of the whole robot, the largest first; `causes`: the scope of each."""
     rows = {
-        "diagnosis": [{"verdict": "attributed", "against_simulator": simulated, "referenced": referenced}],
-        "causes": [{"rank": 1, "effect": "payload", "label": "payload", "confidence": 0.9, "scope": scope}],
+        "diagnosis": [{"verdict": verdict, "against_simulator": simulated, "referenced": referenced}],
+        "causes": [
+            {"rank": rank, "effect": name, "label": name, "confidence": 0.9, "scope": scope}
+            for rank, (name, scope) in enumerate(causes.items(), start=1)
+        ],
+        "rivals": [{"rank": rank, "rival": name, "label": name} for rank, name in rivals],
     }
     names = ("diagnosis", "causes", "cause_joints", "rivals", "locations", "closed")
     return {name: Answer(Question(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
@@ -30,3 +39,19 @@ def answers(scope, simulated, referenced):
 )
 def test_a_cause_is_set_against_the_runs_that_lack_it(scope, simulated, referenced, said):
     assert said in sentence(answers(scope, simulated, referenced))
+
+
+def test_the_largest_cause_comes_first_whatever_its_scope():
+    said = sentence(answers_of({"payload": "changed", "base tilt": "missing", "backlash": "changed"}))
+    assert said == (
+        "Payload (confidence 90\u00a0%) and backlash (confidence 90\u00a0%) changed since the reference runs; "
+        "the twin lacks base tilt (confidence 90\u00a0%)."
+    )
+
+
+def test_an_ambiguous_verdict_names_the_largest_cause_first():
+    causes = {"payload": "missing", "backlash": "missing"}
+    said = sentence(answers_of(causes, verdict="ambiguous", rivals=((2, "joint elasticity"),)))
+    assert said == (
+        "There is a gap, and these data cannot tell its causes apart: payload; either backlash or joint elasticity."
+    )

@@ -94,7 +94,7 @@ ENCODED = urlencode({"query": "ASK {}"})
         ("GET", "query=%ff", None, None, 400, "not UTF-8"),
         ("GET", "&".join(["a=1"] * 2000), None, None, 400, "more than 1000 parameters"),
         ("GET", "query=", None, None, 400, "not a SPARQL query"),
-        ("GET", "query=ASK{}&default-graph-uri=not+an+iri", None, None, 400, "names no graph"),
+        ("GET", "query=ASK{}&default-graph-uri=not+an+iri", None, None, 400, "is not the name of a graph"),
         ("POST", "", FORM, "nothing=1", 400, "one of `query` and `update`"),
         ("POST", "", FORM, f"{ENCODED}&update=CLEAR+ALL", 400, "one of `query` and `update`"),
         ("POST", "", FORM, b"query=\xff", 400, "not UTF-8, from byte 6"),

@@ -40,7 +40,7 @@ def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         message = refused("--workspace", new_graph().parent, "--port", port)
-    assert f"cannot listen on 127.0.0.1, port {port}: Address already in use; --port 0 takes a free one" in message
+    assert f"cannot listen on 127.0.0.1, port {port}: Address already in use; --port 0 picks a free one" in message
 
 
 def test_a_host_that_is_not_ours(new_graph: Callable[[], Path]) -> None:

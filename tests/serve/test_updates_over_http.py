@@ -90,7 +90,7 @@ def test_the_dataset_of_an_update_is_what_its_patterns_are_asked_of(writable) ->
 @pytest.mark.parametrize(
     ("text", "graph", "message"),
     [
-        ("WITH <http://e/g> DELETE { ?s ?p ?o } WHERE { ?s ?p ?o }", "http://e/g", "say it once"),
+        ("WITH <http://e/g> DELETE { ?s ?p ?o } WHERE { ?s ?p ?o }", "http://e/g", "use only one"),
         ("DELETE WHERE { ?s ?p ?o }", "no IRI", "a graph's name is no IRI"),
     ],
 )

@@ -54,7 +54,7 @@ def rewrite(folder: Path, line: str, instead: str) -> None:
         ("0x" + "f" * 6000, r"run.payload_mass is a number beyond 1e\+300"),
         ("1e999", "should be a number of at least 0, not inf"),
         ("nan", "should be a number of at least 0, not nan"),
-        ('"\\u0000"', "run.payload_mass has a null character"),
+        ('"\\u0000"', "run.payload_mass contains a null character"),
         ('"' + "x" * 5000 + '"', "should be a number of at least 0, not 'xxx"),
         ("\x00", "not valid TOML"),
     ],
@@ -77,7 +77,7 @@ def test_a_folder_whose_name_no_disk_takes(tmp_path):
 @pytest.mark.parametrize("year", ["0001", "1899", "2201", "9999"])
 def test_a_run_of_no_age(folder, year):
     rewrite(folder, "^role.*$", f"started = {year}-12-31T23:59:59+14:00")
-    assert "started lies in no year from 1900 to 2200" in refused(folder)
+    assert "started must be in the years 1900 to 2200" in refused(folder)
 
 
 def test_files_that_lead_nowhere(folder):
@@ -90,7 +90,7 @@ def test_files_that_lead_nowhere(folder):
 def test_a_data_set_that_is_no_file(folder):
     (folder / "dataset.toml").unlink()
     (folder / "dataset.toml").symlink_to("/dev/zero")
-    assert "is no file" in refused(folder)
+    assert "is not a file" in refused(folder)
 
 
 def as_csv(folder: Path, content: bytes) -> Path:

@@ -153,7 +153,7 @@ def test_a_failing_replacement_leaves_the_earlier_state(workspace: Workspace) ->
 
 def test_a_document_stays_inside_the_workspace(workspace: Workspace) -> None:
     workspace.ingest(*rows.data_set())
-    with pytest.raises(InputError, match="leads out of the workspace"):
+    with pytest.raises(InputError, match="leads outside the workspace"):
         workspace.replace_activity(rows.activity("a", "p"), [], [], documents={"../escaped.json": b""})
     assert not (workspace.folder.parent / "escaped.json").exists()
 
@@ -188,7 +188,7 @@ def test_a_workspace_must_exist_to_be_read(tmp_path: Path) -> None:
 
 def test_a_workspace_where_a_file_stands(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot make the workspace"):
+    with pytest.raises(InputError, match="cannot create the workspace"):
         Workspace(tmp_path / "file")
 
 

@@ -41,5 +41,5 @@ def test_a_missing_series_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", ["../outside.parquet", "/etc/passwd", "series/../../outside"])
 def test_no_path_leads_out_of_the_workspace(tmp_path: Path, path: str) -> None:
-    with pytest.raises(InputError, match="leads out of the workspace"):
+    with pytest.raises(InputError, match="leads outside the workspace"):
         read_series(tmp_path / "workspace", path, "0")

@@ -1,4 +1,4 @@
-"""What gives way between motor and link: play and elasticity, through the swing of one mass behind a spring."""
+"""Play and elasticity between motor and link: the link is one mass that swings behind a spring."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _free(load: np.ndarray, motion: Motion, gap: float) -> np.ndarray:
 
 
 class _Compliance(JointEffect):
-    """What both have in common: a swing that the predicted load drives, and that is over after two seconds."""
+    """What both share: a swing that the predicted load drives and that has died away after two seconds."""
 
     channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
@@ -151,7 +151,7 @@ class Backlash(_Compliance):
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
     ) -> tuple[Quantity, ...]:
-        """Return b: what is lost grows with its cube root's square, torque times time; by way, with its square."""
+        """Return b. The torque lost grows as b^(2/3), or as b^2 for the form `by_way`; the coefficient scales it."""
         power = 0.5 if self.by_way else 1.5
         return tuple(
             quantity("b", joint.name, value, joint.unit, deviation, lambda lost: self.b * max(lost, 0.0) ** power)

@@ -82,11 +82,11 @@ class RigidBody(Effect):
 def _check_payload(motion: Motion) -> None:
     mass, com = motion.payload_mass, motion.payload_com
     if not 0 <= mass <= _HEAVIEST:
-        raise InputError(f'run "{motion.run}": a payload of {mass:g} kg; give 0 to {_HEAVIEST:g} kg')
+        raise InputError(f'run "{motion.run}": the payload is {mass:g} kg; give 0 to {_HEAVIEST:g} kg')
     if not all(abs(part) <= _FARTHEST for part in com):
         shown = ", ".join(f"{part:g}" for part in com)
         raise InputError(
-            f'run "{motion.run}": a payload at {shown} m; give its place in the flange frame, within {_FARTHEST:g} m'
+            f'run "{motion.run}": the payload is at {shown} m; give it in the flange frame, within {_FARTHEST:g} m'
         )
 
 

@@ -36,7 +36,7 @@ class Stack:
         known = catalogue()
         for effect in effects:
             if isinstance(effect, str) and effect not in known:
-                raise InputError(f'there is no effect "{effect}"; use some of {", ".join(known)}')
+                raise InputError(f'there is no effect "{effect}"; choose from {", ".join(known)}')
         self.robot = robot
         self.effects = tuple(known[effect] if isinstance(effect, str) else effect for effect in effects)
         self.ids = tuple(dict.fromkeys(effect.id for effect in self.effects))
@@ -52,13 +52,13 @@ class Stack:
             for joint in effect.joints or ():
                 if joint not in names:
                     raise InputError(
-                        f'effect "{effect.id}": there is no joint "{joint}"; use some of {", ".join(names)}'
+                        f'effect "{effect.id}": there is no joint "{joint}"; choose from {", ".join(names)}'
                     )
         seen = set()
         for effect, term in (*self.torque_terms, *self.power_terms):
             key = (effect.id, term.joint, term.link, term.name, effect.runs)
             if key in seen:
-                raise InputError(f'effect "{effect.id}" stands there twice; name it once')
+                raise InputError(f'effect "{effect.id}" is listed twice; list it once')
             seen.add(key)
             if not (abs(term.expected) <= _LARGEST and term.spread <= _LARGEST):
                 raise InputError(

@@ -92,9 +92,9 @@ def excite(
     contradictory or the box is out of reach.
     """
     if not 0.5 <= seconds <= 3600:
-        raise InputError(f"an exciting motion of {seconds:g} s: ask for 0.5 to 3600 s")
+        raise InputError(f"an exciting motion cannot last {seconds:g} s; give 0.5 to 3600 s")
     if not (math.isfinite(rate) and 1 <= rate <= 10_000):
-        raise InputError(f"a rate of {rate:g} Hz: ask for 1 to 10000 Hz")
+        raise InputError(f"the rate cannot be {rate:g} Hz; give 1 to 10000 Hz")
     most = _MOST // (20 + 6 * len(robot.joints))
     if seconds * rate > most:
         raise InputError(
@@ -242,7 +242,7 @@ class _Search:
         best = float(clearance.max())
         if best <= 4 * self._workspace.resolution:
             raise InputError(
-                f"{self._robot.name}: no posture within the joint limits was found with every link above the floor"
+                f"{self._robot.name}: found no posture within the joint limits with every link above the floor"
                 + (
                     ", z = 0 of the base frame; raise the first joint's origin in the URDF"
                     if self._box is None

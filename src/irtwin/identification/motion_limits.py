@@ -82,7 +82,9 @@ def _limits(robot: str, joint: Joint) -> tuple[float, float, float, float]:
         raise InputError(f"{where} has the acceleration limit {acceleration:g}; it must be positive")
     for what, size in (("range", upper - lower), ("speed limit", joint.velocity), ("acceleration limit", acceleration)):
         if not _SMALLEST <= size <= _LARGEST / FULL_SPEED_AFTER:
-            raise InputError(f"{where} has a {what} of {size:g}, as no machine has; mend its <limit> in the URDF")
+            raise InputError(
+                f"{where} has a {what} of {size:g}, which is not plausible; correct its <limit> in the URDF"
+            )
     return lower, upper, joint.velocity, acceleration
 
 
@@ -106,7 +108,9 @@ class Workspace:
             self._levers = _levers(robot, limits)
         self.reach = max(0.01, float(max(lever.max() for lever in self._levers)))  # m
         if not self.reach <= _FARTHEST:
-            raise InputError(f"{robot.name}: reaches {self.reach:g} m, as no robot does; mend the origins in the URDF")
+            raise InputError(
+                f"{robot.name}: reaches {self.reach:g} m, which is not plausible; correct the origins in the URDF"
+            )
         self.resolution = self.reach / 1000  # m: what the proof of clearance gives away
         self._walls = self._floor(robot, limits) + self._box(robot, box)
         self._frames = sorted({wall.frame for wall in self._walls})

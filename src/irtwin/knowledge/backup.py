@@ -73,7 +73,7 @@ def restore(archive: Path, folder: Path, database: str | None = None, graph_url:
     Raises InputError where the archive is damaged or not ours, or where there is something already.
     """
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already; restore into a new folder")
+        raise InputError(f"{folder}: already exists; restore into a new folder")
     folder.absolute().parent.mkdir(parents=True, exist_ok=True)
     with files.working_folder(folder.absolute().parent, ".irtwin-restore-") as working:
         held = working / "workspace"
@@ -138,7 +138,9 @@ def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> 
     if connection.execute(select(func.count()).select_from(table)).scalar_one():
         raise InputError(f"table {table.name} of the database holds rows already; give an empty database")
     if not file.is_file():
-        raise InputError(f"{archive}: has no table {table.name}: it is of another irtwin; restore it with that one")
+        raise InputError(
+            f"{archive}: has no table {table.name}: made by another irtwin version; restore it with that one"
+        )
     try:
         with file.open(encoding="utf-8") as lines:
             for rows in _in_chunks(_row(table, archive, line) for line in lines):
@@ -153,7 +155,7 @@ def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> 
 def _row(table: Table, archive: Path, line: str) -> dict[str, Any]:
     row = json.loads(line)
     if set(row) != set(table.columns.keys()):
-        raise InputError(f"{archive}: table {table.name} is of another irtwin; restore it with that one")
+        raise InputError(f"{archive}: table {table.name} was made by another irtwin version; restore it with that one")
     moments = [column.name for column in table.columns if isinstance(column.type, Moment) and row[column.name]]
     return {**row, **{name: datetime.fromisoformat(row[name]) for name in moments}}
 

@@ -60,10 +60,10 @@ def damaged(folder: Path, reason: str) -> str:
     """Return the line that says so, of the graph in a folder."""
     return (
         f"{folder}: the graph is damaged ({reason[:160]}); what the database holds is not lost: "
-        f"`irtwin repair --workspace {folder.parent}` makes the graph anew of it"
+        f"`irtwin repair --workspace {folder.parent}` rebuilds the graph from it"
     )
 
 
 def full(folder: Path, reason: str) -> InputError:
     """Return the error of a disk that takes no more."""
-    return InputError(f"{folder}: the disk is full ({reason[:160]}); make room and do it again, nothing is lost")
+    return InputError(f"{folder}: the disk is full ({reason[:160]}); free some space and try again; nothing is lost")

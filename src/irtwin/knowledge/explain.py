@@ -47,9 +47,9 @@ def explain(graph: KnowledgeGraph, pattern: str) -> tuple[Explanation, ...]:
     """
     triples = _matching(graph, pattern)
     if not triples:
-        raise InputError(f"the graph holds no triple {pattern}: see what it holds with irtwin query")
+        raise InputError(f"the graph has no triple {pattern}; see what it has with `irtwin query`")
     if len(triples) > MOST_TRIPLES:
-        raise InputError(f"more than {MOST_TRIPLES} triples fit {pattern}: say more of the one that is to be explained")
+        raise InputError(f"more than {MOST_TRIPLES} triples fit {pattern}: be more specific")
     return tuple(Explainer(graph).triple(triple) for triple in sorted(triples, key=str))
 
 
@@ -193,7 +193,7 @@ def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
     terms = [_sparql(term, f"?_{place}") for place, term in enumerate(_TERM.findall(pattern))]
     terms += [f"?_{place}" for place in range(len(terms), 3)]
     if len(terms) > 3:
-        raise InputError(f"{pattern}: is more than subject, predicate and object; put a text between quotation marks")
+        raise InputError(f"{pattern}: is more than subject, predicate and object; put text in quotation marks")
     text = " ".join(terms)
     found = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} }} LIMIT {MOST_TRIPLES + 1}")
     return list(cast(QueryTriples, found))

@@ -375,11 +375,11 @@ def _graph_name(iri: str) -> NamedNode:
     try:
         return NamedNode(iri)
     except ValueError as error:
-        raise InputError(f"{iri!r} names no graph: {error}") from error
+        raise InputError(f"{iri!r} is not the name of a graph: {error}") from error
 
 
 def _counted(answers: Iterable[Any]) -> Iterator[Any]:
     for count, answer in enumerate(answers):
         if count == MOST_ROWS:
-            raise InputError(f"the query has more than {MOST_ROWS:,} answers: add a LIMIT, or ask for less")
+            raise InputError(f"the query has more than {MOST_ROWS:,} answers: add a LIMIT or narrow the query")
         yield answer

@@ -64,9 +64,7 @@ def trace(graph: KnowledgeGraph, thing: str) -> tuple[Step, ...]:
     the graph does not know the IRI.
     """
     if not graph.query(_MENTIONED, {"thing": thing})[0]["answer"]:
-        raise InputError(
-            f"{thing}: the graph does not know it; ask for IRIs with: irtwin query 'SELECT ?s {{ ?s ?p ?o }}'"
-        )
+        raise InputError(f"{thing}: not in the graph; list IRIs with: irtwin query 'SELECT ?s {{ ?s ?p ?o }}'")
     return tuple(_back(graph, thing, 0, set()))
 
 

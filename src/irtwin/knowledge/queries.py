@@ -57,7 +57,7 @@ def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table
         return graph.query(_text(question))
     named = named_questions().get(question)
     if named is None or not named.of_robot:
-        raise InputError(f"{question!r} is not asked of one robot: leave the robot out")
+        raise InputError(f"{question!r} does not ask about one robot; leave --robot out")
     return graph.query(named.text, {"arm": _robot_iri(graph, robot)})
 
 
@@ -97,7 +97,7 @@ def _robot_iri(graph: KnowledgeGraph, name: str) -> str:
         near = get_close_matches(name, found, n=1)
         known = ", ".join(list(found)[:10]) + (", ..." if len(found) > 10 else "")
         raise InputError(
-            f"no robot is called {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
+            f"there is no robot {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
         )
     return str(found[name])
 
@@ -110,4 +110,4 @@ def _text(question: str) -> str:
         return question
     near = get_close_matches(question, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-    raise InputError(f"no question is called {question!r}: {hint}")
+    raise InputError(f"there is no question {question!r}: {hint}")

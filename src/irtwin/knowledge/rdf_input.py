@@ -35,7 +35,7 @@ def read_rdf(path: Path, form: RdfFormat) -> bytes:
 def refuse(path: Path, error: SyntaxError | MemoryError) -> NoReturn:
     """Turn what a parser says of a file into an InputError."""
     if isinstance(error, MemoryError):
-        raise InputError(f"{path}: holds a term of more than 16 MB; keep such content in a file of its own") from None
+        raise InputError(f"{path}: has a term of more than 16 MB; keep such content in a separate file") from None
     line = f", line {error.lineno}" if error.lineno else ""
     raise InputError(f"{path}{line}: {error.msg}") from error
 

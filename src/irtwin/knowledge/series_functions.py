@@ -95,7 +95,7 @@ class _Asker:
             if kind in map(to_python, self._objects(series, "Series_Kind")):
                 for file in self._objects(series, "File"):
                     return open_series(inside(self._workspace, str(to_python(file))))
-        raise InputError(f"{shorten(run.value)}: the graph knows no {kind} series of it")
+        raise InputError(f"{shorten(run.value)}: the graph has no {kind} series of this run")
 
     def _seconds(self, run: NamedNode, series: SeriesWindows, moment: Term) -> float:
         """Return a moment on the clock of the run's log."""
@@ -107,7 +107,7 @@ class _Asker:
         for start in map(to_python, self._objects(run, "Start_Time")):
             if isinstance(start, datetime):
                 return series.begin + (_in_utc(value) - _in_utc(start)).total_seconds()
-        raise InputError(f"{shorten(run.value)}: the graph knows no time at which it began; give seconds")
+        raise InputError(f"{shorten(run.value)}: the graph does not know when this run began; give seconds")
 
     def _objects(self, subject: Any, name: str) -> Iterable[Any]:
         quads = self._store.quads_for_pattern(subject, NamedNode(term(name)), None, DefaultGraph())

@@ -120,7 +120,7 @@ class SparqlServer:
             raise InputError(f"{url}: the server refuses the {kind}: {error.code} {error.reason}. {said}") from None
         except (URLError, HTTPException, OSError) as error:
             reason = error.reason if isinstance(error, URLError) else error
-            raise InputError(f"{url}: no SPARQL server answers there: {reason}") from None
+            raise InputError(f"{url}: no SPARQL server answers: {reason}") from None
 
 
 def is_url(place: object) -> bool:

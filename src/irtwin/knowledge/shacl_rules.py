@@ -88,7 +88,9 @@ def conclusions(triples: Iterable[Triple], rules: Iterable[ShaclRule]) -> dict[s
                 store.extend(in_graph(some))
         if len(store) == before:
             return made
-    raise InputError(f"the SHACL rules still find something new after {MOST_ROUNDS} rounds: do they make blank nodes?")
+    raise InputError(
+        f"the SHACL rules still find something new after {MOST_ROUNDS} rounds; check whether they create blank nodes"
+    )
 
 
 @cache

@@ -34,7 +34,7 @@ def using(text: str, default_graphs: Sequence[str], named_graphs: Sequence[str],
     except SyntaxError as error:
         raise InputError(f"not a SPARQL update: {error}") from error
     if fault_without(text, ("using", "with"), parse_update, base) is not None:
-        raise InputError("the update says USING or WITH, and the request using-graph-uri: say it once")
+        raise InputError("the update has USING or WITH and the request has using-graph-uri; use only one")
     places = [found.start() for found in _WHERE.finditer(text)]
     if len(places) > MOST_PLACES:
         raise InputError(f"an update with using-graph-uri says WHERE at most {MOST_PLACES} times")

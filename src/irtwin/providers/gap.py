@@ -88,7 +88,7 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
         raise InputError(f"{robot_id}: no diagnosis in {workspace.folder}; run `irtwin diagnose` with it first")
     if found.twin_file is None or found.twin_sha256 is None:
         raise InputError(
-            f"{robot_id}: its diagnosis ({found.verdict}) added nothing to the twin; there is none to adopt"
+            f"{robot_id}: its diagnosis ({found.verdict}) added nothing to the twin, so there is nothing to adopt"
         )
     text = workspace.read_document(found.twin_file, found.twin_sha256).decode()
     twin = from_json(text, inside(workspace.folder, found.twin_file))
@@ -145,7 +145,7 @@ def _check_joints(workspace: Workspace, robot_id: str, diagnosis: Json) -> None:
     named |= {joint for cause in diagnosis["causes"] for joint in cause["joints"]}
     if named - known:
         raise InputError(
-            f"{robot_id} has no joint {', '.join(sorted(named - known))}; diagnose the robot's own data set"
+            f"{robot_id} has no joint {', '.join(sorted(named - known))}; diagnose a data set of this robot"
         )
 
 

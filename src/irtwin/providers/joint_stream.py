@@ -71,10 +71,10 @@ class StateReader:
             said = json.loads(line)
         except (ValueError, RecursionError):
             if _HTTP.match(line):
-                raise InputError("an HTTP request, as a web page may make it: its connection is ended") from None
-            raise InputError("a line is no JSON") from None
+                raise InputError("an HTTP request, which a web page may have sent; its connection is closed") from None
+            raise InputError("a line is not JSON") from None
         if not isinstance(said, dict):
-            raise InputError("a line is no JSON object")
+            raise InputError("a line is not a JSON object")
         name = said.get("robot")
         robot = self._ids.get(_nfc(name)) if isinstance(name, str) else None
         if robot is None:
@@ -84,7 +84,7 @@ class StateReader:
         order = self._order(robot, said.get("name"))
         time = _number(said, "time")
         if not 0.0 <= time <= _LATEST:
-            raise InputError("`time` is no time in s since 1970")
+            raise InputError("`time` is not a time in s since 1970")
         velocity, effort, temperature = (_numbers(said, name, order) for name in _PER_JOINT)
         if "position" not in said:
             raise InputError("`position` is missing")
@@ -103,7 +103,7 @@ class StateReader:
         if names is None:
             return tuple(range(len(joints)))
         if not isinstance(names, list) or sorted(map(str, names)) != sorted(joints):
-            raise InputError(f"`name` is to name the joints of {self._names[robot]}: {', '.join(joints)}")
+            raise InputError(f"`name` must list the joints of {self._names[robot]}: {', '.join(joints)}")
         key = (robot, tuple(names))
         if key not in self._orders:
             self._orders[key] = tuple(names.index(joint) for joint in joints)
@@ -157,7 +157,7 @@ def listening(port: int, handle: Callable[[Iterator[bytes]], None]) -> Iterator[
     try:
         server = Server(("127.0.0.1", port), Handler)
     except OSError as error:
-        raise InputError(f"port {port} cannot be listened on: {error.strerror}") from None
+        raise InputError(f"cannot listen on port {port}: {error.strerror}") from None
     with server:
         threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True).start()
         try:
@@ -173,7 +173,7 @@ def _nfc(name: str) -> str:
 def _number(said: Mapping[str, Any], name: str) -> float:
     value = said.get(name)
     if not _is_number(value, _GREATEST[name]):
-        raise InputError(f"`{name}` is no number within {_GREATEST[name]:g}")
+        raise InputError(f"`{name}` is not a number within {_GREATEST[name]:g}")
     return float(value)
 
 
@@ -187,5 +187,5 @@ def _numbers(said: Mapping[str, Any], name: str, order: Sequence[int]) -> tuple[
     values = said[name]
     most = _GREATEST[name]
     if not isinstance(values, list) or len(values) != len(order) or not all(_is_number(it, most) for it in values):
-        raise InputError(f"`{name}` is to hold {len(order)} numbers within {most:g}, one for each joint")
+        raise InputError(f"`{name}` must have {len(order)} numbers within {most:g}, one for each joint")
     return tuple([float(values[place]) for place in order])

@@ -99,7 +99,7 @@ class LiveTwin:
                 self._wait_for_room()
             self.check()
             if self._stop.is_set():
-                raise InputError("the watching is over: not stored")
+                raise InputError("watching has ended; not stored")
             if (stored := self._times.run_at(state.robot_id, state.time)) is not None:
                 raise InputError(f"{state.robot_id}: the stored run {stored} covers this time; not stored again")
             run = self._runs.get(state.robot_id) or self._begin(state)
@@ -118,7 +118,7 @@ class LiveTwin:
             else:
                 run.doubted = state
             if doubted is not None:
-                raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s off those around it; not stored")
+                raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours; not stored")
 
     def _take(self, run: WatchedRun, state: State) -> None:
         run.take(state)
@@ -284,10 +284,10 @@ class LiveTwin:
             except DamagedJournal as error:
                 aside = path.with_suffix(".damaged")
                 path.rename(aside)
-                self._announce(f"{error}; what it held is lost to the graph, the file is kept as {aside}")
+                self._announce(f"{error}; its samples are not in the graph; the file is kept as {aside}")
                 continue
             except ValueError:
-                self._announce(f"{path}: a crash cut it off before its first sample; dropped")
+                self._announce(f"{path}: a crash ended this journal before its first sample; it is deleted")
                 path.unlink()
                 continue
             self._announce(f"{header.run_id}: a crash ended this run; its {len(samples)} samples on disk are kept")

@@ -39,7 +39,7 @@ def load_provider(name: str) -> Provider:
     if not found:
         raise InputError(
             f'provider "{name}" is declared in the ontology, but no installed package registers it as an entry '
-            f"point of {GROUP}; install the package that does, or take the declaration out"
+            f"point of {GROUP}; install that package, or remove the declaration"
         )
     provider: Provider = found[0].load()
     return provider

@@ -78,12 +78,12 @@ def check_name(workspace: Workspace, name: str) -> None:
         if (robot_id == identifier(name)) != same:
             raise InputError(
                 f'{workspace.folder}: robot "{known}" has the identifier {robot_id} of an earlier irtwin, which does '
-                f'not tell it from others; take it out by `irtwin drop "{known}"` and run its data set again'
+                f'not tell it from others; remove it with `irtwin drop "{known}"` and run its data set again'
             )
         if not same and _folded(known) == _folded(name):
             raise InputError(
                 f'{workspace.folder}: robot "{name}" differs from "{known}" there in upper and lower case or in the '
-                f"form of letters alone; write it alike if it is the same robot, give it another name if not"
+                f"form of letters alone; use the same spelling for the same robot, another name for another"
             )
 
 

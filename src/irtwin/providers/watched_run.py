@@ -51,7 +51,7 @@ class WatchedRun:
         if self.newest is None:
             return True
         if -HOLE < state.time - self.newest.time <= 0:
-            raise InputError(f"{state.robot_id}: a state of no later time than the one before; not stored")
+            raise InputError(f"{state.robot_id}: a state that is not later than the one before; not stored")
         return 0 < state.time - self.newest.time <= HOLE
 
     def take(self, state: State) -> None:

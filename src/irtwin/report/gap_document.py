@@ -48,14 +48,20 @@ def channels(document: Document) -> list[str]:
     return list(dict.fromkeys((cause.get("evidence") or {}).get("channel", "torque") for cause in document["causes"]))
 
 
-def ranked(answers: Answers, document: Document) -> Answers:
-    """Return the answers with causes in the order of their shares, channel by channel."""
+def largest_first(document: Document) -> list[int]:
+    """Return the ranks of the causes in the order of their shares, channel by channel."""
     parts, order = shares(document), channels(document)
-    of_rank = {
+    place = {
         rank: (order.index((cause.get("evidence") or {}).get("channel", "torque")), -parts.get(rank, 0.0), rank)
         for rank, cause in enumerate(document["causes"], start=1)
     }
-    rows = tuple(sorted(answers["causes"].rows, key=lambda row: of_rank[row["rank"]]))
+    return sorted(place, key=lambda rank: place[rank])
+
+
+def ranked(answers: Answers, document: Document) -> Answers:
+    """Return the answers with the largest cause first."""
+    order = largest_first(document)
+    rows = tuple(sorted(answers["causes"].rows, key=lambda row: order.index(row["rank"])))
     return {**answers, "causes": replace(answers["causes"], rows=rows)}
 
 

@@ -119,7 +119,7 @@ def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
         {
             "type": "scatter",
             "mode": "markers",
-            "name": "what the twin leaves",
+            "name": "residual",
             "x": x,
             "y": list(curve["residual"]),
             "marker": {"color": MEASURED, "size": 5},
@@ -195,7 +195,7 @@ def by_cause(answers: Answers) -> Figure | None:
     place_of = {row["rank"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
     rows = sorted(rows, key=lambda row: place_of[row["rank"]])
     data = []
-    for name, part, colour in (("alone", "alone", AFTER), ("all causes but it", "without", PALETTE[4])):
+    for name, part, colour in (("cause alone", "alone", AFTER), ("all causes but this one", "without", PALETTE[4])):
         of_part = [row for row in rows if row["part"] == part]
         bars = {
             "type": "bar", "name": name, "x": [plain(f"{place_of[row['rank']]}. {row['label']}") for row in of_part],
@@ -245,8 +245,8 @@ def budget(answers: Answers, document: Evidence) -> Figure | None:
                 {channel: given[channel]["closed"] * share / whole},
                 _CAUSES[place % len(_CAUSES)],
             )
-    bar("closeable, without a name", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
-    bar("neither", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
+    bar("could be closed, cause unknown", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
+    bar("not closed", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
     xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
     layout = {"barmode": "stack", "xaxis": xaxis, "yaxis": {"type": "category", "autorange": "reversed"}}
     legend = {

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from irtwin.report.gap_document import largest_first
 from irtwin.report.wording import listed
 
-_LACKS = {"missing": "the twin lacks {}"}
 _CHANGED = {"reference": "{} changed since the reference runs", "simulated": "the simulator lacks {}"}
 
 
 def line(diagnosis: Mapping[str, Any], against: str | None) -> str:
-    """Return the verdict and its causes; `against` is the role of the runs that the observed ones are held against."""
-    said = []
-    for scope, words in (_LACKS | {"changed": _CHANGED.get(against or "", "{} changed")}).items():
-        causes = [_named(cause) for cause in diagnosis["causes"] if cause["scope"] == scope]
-        said += [words.format(listed(causes))] if causes else []
+    """Return the verdict and its causes, the largest first; `against`: role of the runs compared with, if any."""
+    words = {"missing": "the twin lacks {}", "changed": _CHANGED.get(against or "", "{} changed")}
+    named: dict[str, list[str]] = {}
+    for rank in largest_first(diagnosis):
+        cause = diagnosis["causes"][rank - 1]
+        named.setdefault(cause["scope"], []).append(_named(cause))
+    said = [words[scope].format(listed(causes)) for scope, causes in named.items()]
     return f"{diagnosis['verdict']}: {'; '.join(said) or 'no cause named'}"
 
 

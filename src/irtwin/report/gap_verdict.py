@@ -9,26 +9,27 @@ from irtwin.report.questions import Answers, Row
 
 
 def sentence(answers: Answers) -> str:
-    """Return the verdict in plain words."""
+    """Return the verdict in plain words, the largest cause first."""
     diagnosis = answers["diagnosis"].rows[0]
     verdict = wording.local_name(diagnosis["verdict"])
     if verdict == "no_gap":
-        return "The twin explains the data down to their noise floor: there is no gap to close."
+        return "There is no gap: the twin explains the data down to the noise floor."
     if verdict == "unexplained":
-        return f"There is a gap{_where(answers)}, and no effect of the catalogue closes it."
+        return f"There is a gap{_where(answers)}, and no effect in the catalogue closes it."
     if verdict == "ambiguous":
-        return f"There is a gap{_where(answers)}, and these data do not tell its causes apart: {_classes(answers)}."
-    causes = [_cause(row, answers) for row in answers["causes"].rows]
-    lacking = [name for name, scope in causes if scope == "missing"]
-    changed = [name for name, scope in causes if scope != "missing"]
-    said = [f"the twin lacks {wording.listed(lacking)}"] if lacking else []
-    said += [_changed(wording.listed(changed), diagnosis)] if changed else []
-    text = "; ".join(said)
-    return f"{text[:1].upper()}{text[1:]}{_closes(answers)}."
+        return f"There is a gap{_where(answers)}, and these data cannot tell its causes apart: {_classes(answers)}."
+    named: dict[bool, list[str]] = {}  # by whether the twin lacks them, in the order of the largest cause
+    for row in answers["causes"].rows:
+        named.setdefault(row["scope"] == "missing", []).append(_cause(row, answers))
+    text = "; ".join(
+        f"the twin lacks {wording.listed(names)}" if missing else _changed(wording.listed(names), diagnosis)
+        for missing, names in named.items()
+    )
+    return f"{text[:1].upper()}{text[1:]}.{_closes(answers)}"
 
 
 def _changed(named: str, diagnosis: Row) -> str:
-    """Say what tells the observed runs from the others: simulated ones never had it, reference ones had not yet."""
+    """Say which runs lack the causes: simulated runs never had them, reference runs did not have them yet."""
     if not diagnosis["against_simulator"]:
         return f"{named} changed since the reference runs"
     if diagnosis["referenced"]:
@@ -47,7 +48,7 @@ def joints_of(rank: int, answers: Answers) -> list[str]:
 
 
 def rivals_of(rank: int, answers: Answers) -> list[str]:
-    """Return the effects that explain the data as well as a cause."""
+    """Return the effects that explain the data as well as a cause does."""
     return [
         str(row["label"] or wording.local_name(row["rival"]).replace("_", " "))
         for row in answers["rivals"].rows
@@ -55,10 +56,10 @@ def rivals_of(rank: int, answers: Answers) -> list[str]:
     ]
 
 
-def _cause(row: Row, answers: Answers) -> tuple[str, str]:
+def _cause(row: Row, answers: Answers) -> str:
     joints = joints_of(row["rank"], answers)
     place = f" on {wording.listed(joints)}" if joints else ""
-    return f"{effect_name(row)}{place} (confidence {wording.share(row['confidence'])})", row["scope"]
+    return f"{effect_name(row)}{place} (confidence {wording.share(row['confidence'])})"
 
 
 def _class_of(row: Row, answers: Answers) -> list[str]:
@@ -68,17 +69,17 @@ def _class_of(row: Row, answers: Answers) -> list[str]:
 
 
 def _classes(answers: Answers) -> str:
-    """Say which effects stand for one another, a class for each cause; and the causes that stand alone."""
+    """Return the causes, the largest first, each with the effects that explain the data as well."""
     classes: dict[frozenset[str], list[str]] = {}
     for row in answers["causes"].rows:
         names = _class_of(row, answers)
         classes.setdefault(frozenset(names), names)
-    several = [_alternatives(names) for names in classes.values() if len(names) > 1]
-    alone = [names[0] for names in classes.values() if len(names) == 1]
-    if len(several) == 1 and not alone:
-        return f"{several[0]} would explain it equally well"
-    said = "; ".join(f"either {one}" for one in several)
-    return f"{said}; and besides {wording.listed(alone)}" if alone else said
+    said = [_alternatives(names) for names in classes.values()]
+    if len(said) == 1:
+        return f"{said[0]} would explain it equally well"
+    return "; ".join(
+        f"either {one}" if len(names) > 1 else one for one, names in zip(said, classes.values(), strict=True)
+    )
 
 
 def _alternatives(names: Sequence[str]) -> str:
@@ -90,7 +91,7 @@ def _where(answers: Answers) -> str:
     if first is None:
         return ""
     of = f" of {first['joint']}" if first["joint"] else ""
-    regime = f", foremost in the regime “{first['regime']}”" if first["regime"] else ""
+    regime = f", mostly in the regime “{first['regime']}”" if first["regime"] else ""
     return f" in the {first['channel']}{of}{regime}"
 
 
@@ -100,4 +101,4 @@ def _closes(answers: Answers) -> str:
         return ""
     ends = f" (95 % interval {wording.share(row['lower'])} to {wording.share(row['upper'])})"
     within = "" if row["lower"] is None else ends
-    return f"; with that in the twin, {wording.share(row['closed'])}{within} of the gap closes on runs held out"
+    return f" Adding this to the twin closes {wording.share(row['closed'])} of the gap on held-out runs{within}."

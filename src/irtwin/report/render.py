@@ -44,7 +44,7 @@ def render(
     bindings = _bindings(graph, robot_iri)
     answers = ask(graph, _questions(), bindings)
     if answers["robot"].first is None:
-        raise InputError(f"{robot_iri}: the graph knows no such robot; ingest its data set first")
+        raise InputError(f"{robot_iri}: this robot is not in the graph; ingest its data set first")
     opens = opening_run(answers)
     scene = None
     if draw_scene is not None and opens is not None:

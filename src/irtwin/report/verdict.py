@@ -1,4 +1,4 @@
-"""What the page says first: the robot's twin judged in one sentence."""
+"""The headline of the energy report: how good the twin is, in one sentence."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def energy(answers: Answers) -> Judged | None:
 def sentence(answers: Answers) -> str:
     """Return the verdict in plain words."""
     if answers["twin"].first is None:
-        return "No twin of this robot has been identified yet: this page shows what was recorded."
+        return "No twin of this robot has been identified yet. This page shows what was recorded."
     explained, missed = torque(answers), energy(answers)
     if explained and missed:
         return f"The twin {_explains(explained, answers)} and {_misses(missed)}."
@@ -51,7 +51,7 @@ def sentence(answers: Answers) -> str:
         return f"The twin {explains}. No electrical power was measured, so its energy is not checked."
     if missed:
         return f"The twin {_misses(missed)}. No joint torque was measured, so its torque is not checked."
-    return "The twin was identified, but nothing that was measured can check it."
+    return "The twin was identified, but no measurement can check it."
 
 
 def _explains(judged: Judged, answers: Answers) -> str:

@@ -63,7 +63,7 @@ def _parse(text: str, source: str) -> Element:
         line, column = error.position
         raise InputError(f"{source}, line {line}, column {column + 1}: not well-formed XML ({error.msg})") from error
     except DefusedXmlException as error:
-        raise InputError(f"{source}: a DTD or an entity stands in it; take out the <!DOCTYPE ...>") from error
+        raise InputError(f"{source}: contains a DTD or an entity; remove the <!DOCTYPE ...>") from error
     except (LookupError, ValueError) as error:
         raise InputError(f"{source}: not readable as XML ({_first_line(error)}); save the URDF as UTF-8") from error
     if root.tag != "robot":
@@ -145,7 +145,7 @@ def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joi
         name = _attribute(element, "name", source, "a joint")
         where = f'{source}: joint "{name}"'
         if name in seen:
-            raise InputError(f"{where} stands there twice; give each joint its own name")
+            raise InputError(f"{where} is defined twice; give each joint its own name")
         seen.add(name)
         for end in ("parent", "child"):
             child = element.find(end)
@@ -186,7 +186,7 @@ def _held(root: Element, source: str) -> tuple[str, ...]:
 def _joint(element: Element, name: str, kind: str, where: str) -> Joint:
     axis = element.find("axis")
     if axis is not None and not any(_numbers(axis.get("xyz"), 3, where)):
-        raise InputError(f"{where}: its axis is zero")
+        raise InputError(f"{where}: its axis is zero; give a direction")
     limit = element.find("limit")
 
     def value(key: str, otherwise: float) -> float:
@@ -211,7 +211,7 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
     roots = [link for link in links if link not in parents]
     if len(roots) != 1:
         what = "no link is the base (the joints form a loop)" if not roots else f"several bases: {', '.join(roots)}"
-        raise InputError(f"{source}: {what}; all links must hang on one base")
+        raise InputError(f"{source}: {what}; all links must be connected to one base")
     depths = {roots[0]: 0}
     for link in links:
         way: list[str] = []

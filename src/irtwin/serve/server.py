@@ -123,7 +123,7 @@ def _bind(host: str, port: int) -> socket.socket:
         listening.listen()
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot listen on {host}, port {port}: {reason}; --port 0 takes a free one") from None
+        raise InputError(f"cannot listen on {host}, port {port}: {reason}; --port 0 picks a free one") from None
     return listening
 
 

@@ -94,7 +94,9 @@ def _standing(q: np.ndarray, rate: float) -> np.ndarray:
 def _even_time(run: Run) -> np.ndarray:
     time = run.signals.time
     if len(holes(time)):
-        raise InputError(f"{run.file}: has a hole in time after {time[holes(time)[0] - 1]:.12g} s; make two runs of it")
+        raise InputError(
+            f"{run.file}: has a hole in time after {time[holes(time)[0] - 1]:.12g} s; split it into two runs"
+        )
     return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / interval(time)) + 1)
 
 

@@ -198,7 +198,9 @@ def _started(table: Table) -> datetime | None:
     if not isinstance(value, datetime):
         raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {shown(value)}")
     if not _EARLIEST <= value.year <= _LATEST:
-        raise InputError(f"{table.file}: {table.name} started lies in no year from {_EARLIEST} to {_LATEST}: {value}")
+        raise InputError(
+            f"{table.file}: {table.name} started must be in the years {_EARLIEST} to {_LATEST}, not {value}"
+        )
     return value if value.tzinfo else value.replace(tzinfo=UTC)
 
 
@@ -216,7 +218,7 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
             target = files.get((file.parent / run.repeat_of).resolve())
             if target is None or target == run.name:
                 raise InputError(
-                    f'{file}: run "{run.name}" repeat_of = "{run.repeat_of}" is no other run of this data set'
+                    f'{file}: run "{run.name}" repeat_of = "{run.repeat_of}" is not another run of this data set'
                 )
             run = replace(run, repeat_of=target)
         resolved.append(run)
@@ -232,4 +234,6 @@ def _check_circles(repeats: Mapping[str, str | None], file: Path) -> None:
             seen.append(at)
             at = repeats[at]
         if at is not None:
-            raise InputError(f"{file}: runs {' and '.join(seen)} repeat each other in a circle; one of them came first")
+            raise InputError(
+                f"{file}: runs {' and '.join(seen)} repeat each other in a circle; remove repeat_of from the first one"
+            )

@@ -80,7 +80,7 @@ def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bo
         _check_unit(columns["time"], columns[f"q_{joint.name}"], joint, path)
     signals = _signals(columns, robot, path)
     if measured and signals.torque is None and signals.power is None:
-        raise InputError(f"{path}: neither torque nor power can be told; {_remedy(signals)}")
+        raise InputError(f"{path}: has neither torque nor power; {_remedy(signals)}")
     return signals, repairs + dropped
 
 
@@ -132,7 +132,7 @@ def _check_size(rows: int, columns: int, path: Path) -> None:
 def _read_csv(path: Path, robot: Robot, repair: bool) -> tuple[pa.Table, int, list[str]]:
     text = read_input(path, _LARGEST_CSV).rstrip()
     if not text:
-        raise InputError(f"{path}: is empty; a run has a line of column names and a line for each sample")
+        raise InputError(f"{path}: is empty; a run has one line of column names and one line per sample")
     if b"\n" not in text:
         raise InputError(f"{path}: has no sample below its first line; an empty run cannot be used")
     _check_characters(text, path)
@@ -160,7 +160,7 @@ def _read_csv(path: Path, robot: Robot, repair: bool) -> tuple[pa.Table, int, li
     if wrong and not repair:
         line, what = wrong[0]
         last = ", the last one: the file was cut off" if line == text.count(b"\n") + 1 else ""
-        raise InputError(f"{path}, line {line}{last}: {what}; mend it, or use --repair to drop such samples")
+        raise InputError(f"{path}, line {line}{last}: {what}; correct it, or use --repair to drop such samples")
     lines = ", ".join(str(line) for line, _ in wrong[:10]) + (" ..." if len(wrong) > 10 else "")
     _check_size(table.num_rows, len(known), path)
     said = f"{path}: {len(wrong)} samples dropped, wrong number of values: line {lines}"
@@ -187,7 +187,7 @@ def _known(columns: Sequence[str], robot: Robot, path: Path) -> list[str]:
         raise InputError(f"{path}: {len(names)} columns; a run has at most {_MOST_COLUMNS}")
     repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
-        raise InputError(f"{path}: column {repeated[0]} stands there twice; keep one")
+        raise InputError(f"{path}: column {repeated[0]} occurs twice; keep one")
     per_joint = {f"{kind}_{joint}" for kind in REACH if kind not in _WHOLE_ROBOT for joint in robot.joint_names}
     for name in names:
         kind, _, joint = name.partition("_")
@@ -231,7 +231,7 @@ def _bad_samples(columns: dict[str, np.ndarray], where: _Where, repair: bool) ->
             return
         rows = np.flatnonzero(bad)
         if not repair:
-            raise InputError(f"{where(rows[0], column)}: {what}; mend it, or use --repair to drop such samples")
+            raise InputError(f"{where(rows[0], column)}: {what}; correct it, or use --repair to drop such samples")
         shown = ", ".join(where(row, column).split(", ")[-2] for row in rows[:10]) + (" ..." if len(rows) > 10 else "")
         dropped.append(f"{where.path}: {len(rows)} samples dropped, column {column} {what}: {shown}")
         keep[rows] = False
@@ -263,7 +263,7 @@ def _check_unit(time: np.ndarray, q: np.ndarray, joint: Joint, path: Path) -> No
     if too_far or unbounded or (too_fast and np.abs(q).max() > 2 * np.pi):
         raise InputError(
             f"{path}: column q_{joint.name} spans {np.ptp(q):.3g} at up to {speed:.3g} per second, "
-            f"far beyond the joint's limits in rad: plainly degrees; convert it to rad"
+            f"far beyond the joint's limits in rad: it looks like degrees; convert it to rad"
         )
 
 

@@ -49,10 +49,10 @@ class Table:
         path = folder / text
         real = real_path(path)
         if real is None:
-            raise InputError(f'{self.file}: {self.name} {key} = "{text[:200]}" is no path that can be followed')
+            raise InputError(f'{self.file}: {self.name} {key} = "{text[:200]}" is not a usable path')
         if not real.is_relative_to(folder.resolve()):
             raise InputError(
-                f'{self.file}: {self.name} {key} = "{text}" leads out of the data set; copy the file into it'
+                f'{self.file}: {self.name} {key} = "{text}" leads outside the data set; copy the file into it'
             )
         if not real.is_file():
             raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
@@ -92,7 +92,7 @@ def _check_values(value: Any, file: Path, name: str, depth: int) -> None:
     if isinstance(value, int) and not -_GREATEST <= value <= _GREATEST:
         raise InputError(f"{file}: {name} is a number beyond {_GREATEST:g}")
     if isinstance(value, str) and "\0" in value:
-        raise InputError(f"{file}: {name} has a null character in it")
+        raise InputError(f"{file}: {name} contains a null character")
     if isinstance(value, dict):
         for key, inner in value.items():
             _check_values(key, file, f"a key of {name}", depth)

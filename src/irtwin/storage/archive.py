@@ -56,10 +56,10 @@ def unpack(archive: Path, folder: Path, names: re.Pattern[str]) -> Iterator[tupl
         listed = _manifest(archive, source)
         for name in listed:
             if not names.fullmatch(name):
-                raise InputError(f"{archive}: the name {name!r} does not belong into a workspace; nothing was restored")
+                raise InputError(f"{archive}: the name {name!r} does not belong in a workspace; nothing was restored")
         room = shutil.disk_usage(folder).free
         if sum(size for _, size in listed.values()) > room:
-            raise InputError(f"{archive}: needs more room than the {room >> 20} MB that are free; make room")
+            raise InputError(f"{archive}: needs more than the {room >> 20} MB that are free; free some space")
         for name, (checksum, _) in listed.items():
             file = folder / name
             file.parent.mkdir(exist_ok=True)
@@ -77,28 +77,30 @@ def _reading(archive: Path) -> Iterator[zipfile.ZipFile]:
     except OSError as error:
         raise InputError(f"{archive}: cannot be read: {error.strerror}") from None
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-        raise InputError(f"{archive}: damaged, or no backup at all ({error}); use another one") from None
+        raise InputError(f"{archive}: damaged, or not a backup ({error}); use another one") from None
 
 
 def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, int]]:
     """Return checksum and size of each file, in the order of the archive; what the ZIP says itself must agree."""
     entries = {entry.filename: entry for entry in source.infolist()}
     manifest = entries.pop(_MANIFEST, None)
-    foreign = InputError(f"{archive}: no irtwin backup; `irtwin backup FILE` makes one")
+    foreign = InputError(f"{archive}: not an irtwin backup; make one with `irtwin backup FILE`")
     if manifest is None or manifest.file_size > _MOST_MANIFEST:
         raise foreign
     said = json.loads(source.read(manifest))
     if not isinstance(said, dict) or said.get("format") != _FORMAT["format"]:
         raise foreign
     if said.get("version") != _FORMAT["version"]:
-        raise InputError(f"{archive}: made by another irtwin ({said.get('software')}); restore it with that one")
+        raise InputError(
+            f"{archive}: made by another version of irtwin ({said.get('software')}); restore it with that version"
+        )
     try:
         listed = {str(name): (str(one["sha256"]), int(one["size"])) for name, one in said["files"].items()}
     except (AttributeError, KeyError, TypeError, ValueError):
         raise foreign from None
     agree = len(source.infolist()) == len(listed) + 1 and set(entries) == set(listed)
     if not agree or any(entries[name].file_size != size for name, (_, size) in listed.items()):
-        raise InputError(f"{archive}: damaged: its files are not those of its list; use another backup")
+        raise InputError(f"{archive}: damaged: its files do not match its list; use another backup")
     return listed
 
 

@@ -42,7 +42,9 @@ class Workspace:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{folder}: cannot make the workspace: {error.strerror}; choose another folder") from None
+            raise InputError(
+                f"{folder}: cannot create the workspace: {error.strerror}; choose another folder"
+            ) from None
         if url is None:
             _check_that_nothing_is_lost(folder)
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
@@ -69,8 +71,8 @@ class Workspace:
             robots = session.scalar(select(func.count()).select_from(Robot))
         if robots and not (self.graph_folder / "CURRENT").is_file():
             raise InputError(
-                f"{self.graph_folder}: the graph is missing, or a part of its files; nothing of the database is lost: "
-                f"`irtwin repair --workspace {self.folder}` makes the graph anew of it (where a server keeps the "
+                f"{self.graph_folder}: the graph or some of its files are missing; the database is intact: "
+                f"`irtwin repair --workspace {self.folder}` rebuilds the graph from it (if a server keeps the "
                 "graph, give --graph)"
             )
 
@@ -178,7 +180,7 @@ class Workspace:
         except OSError as error:
             raise InputError(f"{self.folder / path}: cannot be read ({error.strerror}); {again}") from None
         if hashlib.sha256(content).hexdigest() != checksum:
-            raise InputError(f"{self.folder / path}: changed since it was written; {again}")
+            raise InputError(f"{self.folder / path}: was changed after it was written; {again}")
         return content
 
     def remove_orphans(self) -> None:

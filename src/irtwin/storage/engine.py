@@ -31,7 +31,7 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
     """
     address = _address(url)
     if must_exist and address.get_backend_name() == "sqlite" and not Path(address.database or "").is_file():
-        raise InputError(f"{address.database}: no such SQLite database; give the path of one")
+        raise InputError(f"{address.database}: there is no such SQLite database; give the path of an existing one")
     try:
         engine = create_engine(address)
     except (ModuleNotFoundError, NoSuchModuleError) as error:
@@ -117,7 +117,9 @@ def _tell(url: URL, error: BaseException) -> None:
     if any(text in reason for text in _DAMAGE):
         raise InputError(_damaged(url, reason)) from error
     if any(text in reason for text in _FULL):
-        raise InputError(f"{url.database}: cannot be written ({reason}); make room, nothing was changed") from error
+        raise InputError(
+            f"{url.database}: cannot be written ({reason}); free some space; nothing was changed"
+        ) from error
 
 
 def _damaged(url: URL, reason: str) -> str:

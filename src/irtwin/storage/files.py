@@ -24,7 +24,7 @@ def told_when_full(place: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in _FULL:
             raise
-        raise InputError(f"{place}: cannot be written ({error.strerror}); make room and do it again") from error
+        raise InputError(f"{place}: cannot be written ({error.strerror}); free some space and try again") from error
 
 
 @contextmanager
@@ -87,10 +87,10 @@ def write(path: Path, content: bytes) -> None:
 def check_place(path: Path) -> None:
     """Raise InputError where no file can be written, before the work whose result it is to hold."""
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it")
+        raise InputError(f"{path}: is a folder; name a file")
     folder = next(folder for folder in path.absolute().parents if folder.exists())
     if not (folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)):
-        raise InputError(f"{path}: cannot be written, as {folder} is no folder that one may write to")
+        raise InputError(f"{path}: cannot be written, because {folder} is not a writable folder")
 
 
 def _sync(path: Path) -> None:

@@ -78,7 +78,9 @@ class SeriesWindows:
         self._check(channel)
         time, values = self._samples(channel, start, end, MOST_SAMPLES + 1)
         if len(time) > MOST_SAMPLES:
-            raise InputError(f"the window holds more than {MOST_SAMPLES:,} samples: ask for less, or for their mean")
+            raise InputError(
+                f"the window holds more than {MOST_SAMPLES:,} samples: give a shorter window, or ask for the mean"
+            )
         return list(zip(time.tolist(), values.tolist(), strict=True))
 
     def _totals(self, channel: str, start: float, end: float) -> tuple[int, float, float, float]:

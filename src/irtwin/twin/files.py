@@ -171,7 +171,7 @@ def _effect(path: Path, place: int, document: Any) -> Effect:
     name = reader.take("id", str)
     known = catalogue().get(name)
     if known is None:
-        raise InputError(f'{path}: there is no effect "{name}"; use some of {", ".join(catalogue())}')
+        raise InputError(f'{path}: there is no effect "{name}"; choose from {", ".join(catalogue())}')
     if isinstance(document, str):
         return known
     shape = reader.inner("shape").values

@@ -25,7 +25,7 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     file = data_set.folder / "dataset.toml"
     observed = [run for run in data_set.runs if run.role == "observed"]
     if not observed:
-        raise InputError(f'{file}: no run has role = "observed"; mark those whose gap is to be diagnosed')
+        raise InputError(f'{file}: no run has role = "observed"; give that role to the runs to be diagnosed')
     seen = [motions[run.name] for run in observed]
     if not any(motion.torque is not None or motion.power is not None for motion in seen):
         raise InputError(f"{file}: {_nothing_measured(seen)}")

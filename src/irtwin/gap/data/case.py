@@ -103,11 +103,11 @@ def twin_effects(data_set: DataSet, withhold: Sequence[str]) -> tuple[str, ...]:
     known = catalogue()
     for effect in withhold:
         if effect not in known:
-            raise InputError(f"--withhold {effect}: there is no such effect; use some of {', '.join(known)}")
+            raise InputError(f"--withhold {effect}: there is no such effect; choose from {', '.join(known)}")
         if effect not in effects:
-            raise InputError(f"--withhold {effect}: the twin does not have it; it has {', '.join(effects)}")
+            raise InputError(f"--withhold {effect}: the twin does not have this effect; it has {', '.join(effects)}")
         if known[effect].bodies:
-            raise InputError(f"--withhold {effect}: a twin without bodies explains nothing; withhold another effect")
+            raise InputError(f"--withhold {effect}: the rigid bodies cannot be withheld; withhold another effect")
     return tuple(effect for effect in effects if effect not in withhold)
 
 

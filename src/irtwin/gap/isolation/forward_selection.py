@@ -20,7 +20,7 @@ from irtwin.gap.regression.transient import is_transient
 _ROUNDS = 12
 _MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
 _OF_FLOOR = 0.25  # of a floor's square, besides, in power: other forms of losses make 0.23 of it in healthy robots
-_IMITATED = 0.5  # of a floor's square, besides, of what friction of another form imitates
+_IMITATED = 0.5  # of a floor squared: the least that an effect must explain if friction of another form imitates it
 _ALPHA = 0.02  # of the whole catalogue
 _MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
 _LEAST_T = 2.3  # mean gain over its standard error between groups

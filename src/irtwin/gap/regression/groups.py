@@ -34,7 +34,7 @@ class Grouping:
         """
         observed = np.array([block.run in self.observed for block in blocks])
         if not observed.any():
-            raise InputError("no observed run is longer than the filter with a joint that moves; log longer ones")
+            raise InputError("in no observed run does a joint move for longer than the filter; log longer runs")
         labels = [(block.run in self.observed, self.label[block.run]) for block in blocks]
         if self.few(block.run for block in blocks):
             labels = [(*label, k) for label, k in zip(labels, _stretches(blocks), strict=True)]  # type: ignore[misc]

@@ -60,7 +60,7 @@ def map_to_file(
     seconds: how long a triples map may take. Raises InputError as `map_database` does.
     """
     if out.is_dir() or not out.parent.is_dir():
-        raise InputError(f"{out}: not a file that can be written; name one in a folder that is there")
+        raise InputError(f"{out}: cannot be written; name a file in an existing folder")
     engine = open_engine(database_url, must_exist=True)
     try:
         with files.temporary_beside(out.parent) as temporary:

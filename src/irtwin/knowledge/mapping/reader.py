@@ -84,7 +84,7 @@ class _Reader:
                 nodes[node] = None
             nodes |= dict.fromkeys(self.graph.objects(node, "parentTriplesMap"))
         if not nodes:
-            raise InputError(f"{self.path}: no rr:TriplesMap in it")
+            raise InputError(f"{self.path}: has no rr:TriplesMap; name an R2RML document")
         return {node: self.triples_map(node) for node in nodes}
 
     def triples_map(self, node: Node) -> TriplesMap:

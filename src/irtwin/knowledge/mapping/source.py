@@ -93,7 +93,7 @@ def describe(connection: Connection, table: LogicalTable) -> Source:
     result.close()
     repeated = _repeated(names, connection.dialect.name)
     if repeated:
-        raise InputError(f"{table.where}: column {repeated} comes more than once; give each its own name by AS")
+        raise InputError(f"{table.where}: column {repeated} occurs more than once; rename it with AS")
     columns: dict[str, Natural] = dict.fromkeys(names, by_value)
     if connection.dialect.name == "sqlite":
         columns |= _declared(connection, sql, table.where)
@@ -180,7 +180,9 @@ def _late(connection: Connection) -> bool:
 
 def _endless(connection: Connection, where: str) -> InputError:
     seconds = connection.info["seconds"]
-    return InputError(f"{where}: its SQL has not ended after {seconds:g} s; mend it, or give it more time by --timeout")
+    return InputError(
+        f"{where}: its SQL has not ended after {seconds:g} s; correct it, or give it more time with --timeout"
+    )
 
 
 def _refused(connection: Connection, where: str, error: DBAPIError) -> InputError:
