@@ -15,6 +15,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.damage import told
 from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.validation import validate
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
 from irtwin.providers.records import find_robot
 from irtwin.storage import files
@@ -51,6 +52,7 @@ def drop(
         graph.load_ontology()
         map_rows(place, graph)
         reason(graph)
+        validate(graph)  # what was wrong with it goes too
 
 
 def repair(

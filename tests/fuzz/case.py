@@ -8,7 +8,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 from logs import DataPlan, RunPlan, data_sets
-from robots import Axis, RobotPlan
+from drawn_robots import Axis, RobotPlan
 from spoil import spoils
 from streams import StreamPlan, streams
 

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 from hypothesis import strategies as st
-from robots import RobotPlan, joint_names, robots, urdf
+from drawn_robots import RobotPlan, joint_names, robots, urdf
 
 from irtwin.errors import InputError
 from irtwin.robot.urdf import parse_urdf
