@@ -107,13 +107,20 @@ def test_odd_signals_are_diagnosed(changes, tmp_path):
         ),
         ({"torque": lambda t: t * [1, 0], "power": nothing}, 6.0, "run_0.csv: the torque of joint_2, by column"),
         ({"power": lambda power: np.full_like(power, 80.0)}, 6.0, "run_0.csv: column power does not change"),
-        ({"power": nothing}, 0.2, "samples are left of all runs to find 28 coefficients of the twin"),
+        ({"power": nothing}, 0.2, "the observed runs last 0.19 s together, too short to tell a gap from none"),
     ],
     ids=["no torque", "a dead channel", "constant power", "short runs"],
 )
 def test_what_would_pass_for_no_gap_is_refused(changes, seconds, message):
     with pytest.raises(InputError, match=message):
         diagnose(data_set(arm(2), runs(arm(2), 1, seconds, **changes)))
+
+
+def test_fewer_samples_than_coefficients_are_refused():
+    made = runs(arm(2), 1, 1.2, power=nothing)
+    few = [replace(run, signals=run.signals.rows(slice(None, None, 6))) for run in made]
+    with pytest.raises(InputError, match="samples are left of all runs to find 28 coefficients of the twin"):
+        diagnose(data_set(arm(2), few))
 
 
 @pytest.mark.parametrize(
