@@ -6,9 +6,9 @@ import json
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import Any
 
+from drawn_robots import Axis, RobotPlan
 from hypothesis import strategies as st
 from logs import DataPlan, RunPlan, data_sets
-from drawn_robots import Axis, RobotPlan
 from spoil import spoils
 from streams import StreamPlan, streams
 
