@@ -16,8 +16,8 @@ from pathlib import Path
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad, RdfFormat, Store, Triple, parse, serialize
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.owl_rl import Closure, Contradiction
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID
 
 TWO_ROBOTS = Path(__file__).parents[1] / "tests/knowledge/data/two_robots.trig"

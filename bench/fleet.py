@@ -21,9 +21,9 @@ from typing import Any
 
 from pyoxigraph import DefaultGraph, Quad, Store
 
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.shacl_rules import shipped_rules
+from irtwin.knowledge.shacl.rules import shipped_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, PREFIXES
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace

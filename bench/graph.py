@@ -25,7 +25,7 @@ from pyoxigraph import DefaultGraph, RdfFormat, Store, serialize
 
 import fleet
 from graph_engines import ENGINES, Engine
-from irtwin.knowledge.queries import named_questions
+from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import ID, IRT, OWL, RDFS
 
 QUESTIONS = [

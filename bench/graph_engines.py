@@ -50,13 +50,13 @@ class Irtwin(Engine):
     """On disk, as in a workspace: each triple in its named graph and in the union."""
 
     def __init__(self, folder: Path) -> None:
-        from irtwin.knowledge.graph import KnowledgeGraph
+        from irtwin.knowledge.store.graph import KnowledgeGraph
 
         super().__init__(folder)
         self.graph = KnowledgeGraph(folder / "graph")
 
     def load(self, file: Path) -> None:
-        from irtwin.knowledge.graph import in_graph
+        from irtwin.knowledge.store.graph import in_graph
 
         self.graph.replace(in_graph((quad.triple for quad in parse(path=file)), GRAPH), GRAPH)
 
@@ -70,7 +70,7 @@ class Irtwin(Engine):
         self.graph.change(_quads(removed), _quads(added))
 
     def close(self, file: Path) -> set[str]:
-        from irtwin.knowledge.owl_rl import closure
+        from irtwin.knowledge.owl_rl.closure import closure
 
         return {str(triple) for triple in closure(quad.triple for quad in _quads(file.read_bytes()))}
 
@@ -79,7 +79,7 @@ class IrtwinInMemory(Irtwin):
     """As in a test or a notebook."""
 
     def __init__(self, folder: Path) -> None:
-        from irtwin.knowledge.graph import KnowledgeGraph
+        from irtwin.knowledge.store.graph import KnowledgeGraph
 
         Engine.__init__(self, folder)
         self.graph = KnowledgeGraph()

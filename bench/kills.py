@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import data_sets
 import small_robots
 import synthetic
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import named_files
 from irtwin.storage.series import is_whole

@@ -27,12 +27,12 @@ import numpy as np
 from sqlalchemy import select
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.providers.joint_stream import StateReader, feed, listening
-from irtwin.providers.live import LiveTwin
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.live.joint_stream import StateReader, feed, listening
+from irtwin.live.live_twin import LiveTwin
+from irtwin.live.watch import SWITCH
 from irtwin.storage.database import LIVE, Workspace
 from irtwin.storage.schema import Joint, Robot, Run
-from irtwin.watch import SWITCH
 
 RATE = 83.0  # Hz
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]

@@ -15,8 +15,8 @@ from pathlib import Path
 from pyoxigraph import Store
 from sqlalchemy import Engine
 
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database, refresh
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.engine import open_engine
 
 MAPPING = """

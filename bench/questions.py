@@ -12,8 +12,8 @@ import sys
 import time
 from pathlib import Path
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.queries import Question, ask, named_questions
+from irtwin.knowledge.questions.queries import Question, ask, named_questions
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 ROBOT = "R001"
 

@@ -15,7 +15,7 @@ import duckdb
 import numpy as np
 import pyarrow as pa
 
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.series import write_series
 
 FACTS = """PREFIX irt: <https://w3id.org/irtwin#> INSERT DATA {{ GRAPH <urn:g> {{

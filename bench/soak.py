@@ -28,8 +28,8 @@ import httpx
 import psutil
 from pyoxigraph import Literal, NamedNode, Triple
 
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.queries import named_questions
+from irtwin.knowledge.questions.queries import named_questions
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 
 LIVE = "http://example.com/soak"
 TOO_MUCH = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"

@@ -16,7 +16,7 @@ import httpx
 import psutil
 from pyoxigraph import RdfFormat, parse
 
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
 TWO_ROBOTS = Path(__file__).parent / "knowledge/data/two_robots.trig"

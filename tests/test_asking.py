@@ -14,7 +14,7 @@ from endpoint import make_graph
 from irtwin import workflow
 from irtwin.asking import ask, explain, export, questions
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 
 ROBOTS = "SELECT ?robot { ?robot a irt:Industrial_Robot }"

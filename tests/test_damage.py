@@ -14,8 +14,8 @@ from sqlalchemy import select
 
 from data_sets import irtwin
 from irtwin import upkeep
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import refresh
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers.records import ingest
 from irtwin.resources import folder as resource
 from irtwin.signals.log import read_data_set

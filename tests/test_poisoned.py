@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from data_sets import irtwin
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers import planner
 from irtwin.providers.provider import Made, load_provider
 from irtwin.providers.records import ingest

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import rows
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 
 

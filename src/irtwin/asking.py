@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from irtwin.errors import InputError
-from irtwin.knowledge import queries
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.snapshot import Snapshot
-from irtwin.knowledge.table import Table
+from irtwin.knowledge.questions import queries
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.store.table import Table
 
 if TYPE_CHECKING:
-    from irtwin.knowledge.explanation import Explanation
+    from irtwin.knowledge.explain.explanation import Explanation
 
 WORKSPACE = Path("irtwin-workspace")
 
@@ -32,7 +32,7 @@ def ask(
 
 def explain(triple: str, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> tuple[Explanation, ...]:
     """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
-    from irtwin.knowledge.explain import explain as explain_triples
+    from irtwin.knowledge.explain.explain import explain as explain_triples
 
     with _graph(Path(workspace), graph_url) as graph:
         return explain_triples(graph, triple)
@@ -40,7 +40,7 @@ def explain(triple: str, workspace: Path | str = WORKSPACE, *, graph_url: str | 
 
 def export(owl: Path, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> None:
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
-    from irtwin.knowledge.export import export_owl
+    from irtwin.knowledge.store.export import export_owl
 
     with _graph(Path(workspace), graph_url) as graph:
         export_owl(graph, owl)

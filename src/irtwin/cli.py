@@ -141,8 +141,8 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
     Without QUESTION, the named questions are listed by theme.
     """
     from irtwin import asking
-    from irtwin.knowledge.no_network import leave_network
-    from irtwin.knowledge.queries import to_csv, to_json
+    from irtwin.knowledge.questions.queries import to_csv, to_json
+    from irtwin.knowledge.store.no_network import leave_network
 
     if question is None:
         answer = asking.questions()
@@ -198,7 +198,7 @@ def diagnose(
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     """
     from irtwin import workflow
-    from irtwin.report.gap_line import line
+    from irtwin.report.gap.headline import line
 
     found = workflow.diagnose(
         dataset,
@@ -324,7 +324,7 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
 )
 def docs(out: Path) -> None:
     """Write the ontology's documentation as one HTML page."""
-    from irtwin.report.ontology import write_page
+    from irtwin.report.ontology.page import write_page
 
     write_page(out)
     click.echo(out)
@@ -381,8 +381,8 @@ def reason(source: Path, out: Path, dl: bool) -> None:
 
     The file suffixes decide the formats. If SOURCE contradicts itself, nothing is written and the exit status is 3.
     """
-    from irtwin.knowledge.owl_rl import Contradiction
-    from irtwin.knowledge.owl_rl_file import close_file
+    from irtwin.knowledge.owl_rl.closure import Contradiction
+    from irtwin.knowledge.owl_rl.file import close_file
 
     try:
         inferred = close_file(source, out, dl=dl)
@@ -407,7 +407,7 @@ def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_
     import json
 
     from irtwin import asking
-    from irtwin.knowledge.explanation import to_json, to_text
+    from irtwin.knowledge.explain.explanation import to_json, to_text
 
     found = asking.explain(" ".join(triple), workspace, graph_url=graph_url)
     if as_json:
@@ -428,7 +428,7 @@ def live(workspace: Path, database: str | None, graph_url: str | None, port: int
     1970), position, velocity, effort, and optionally temperature, power and name. Ctrl-C stops; every sample that was
     read is stored.
     """
-    from irtwin.watch import watch
+    from irtwin.live.watch import watch
 
     watch(workspace, database=database, graph_url=graph_url, port=port, announce=_say)
 
@@ -489,7 +489,7 @@ def restore(archive: Path, workspace: Path, database: str | None, graph_url: str
 
     A damaged archive restores nothing, and nothing is overwritten.
     """
-    from irtwin.knowledge.backup import restore as restore_all
+    from irtwin.knowledge.store.backup import restore as restore_all
 
     restore_all(archive, workspace, database, graph_url)
     click.echo(workspace)

@@ -12,10 +12,10 @@ from pyoxigraph import Quad
 
 from irtwin.asking import WORKSPACE
 from irtwin.errors import InputError
-from irtwin.knowledge.damage import told
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.validation import validate
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.damage import told
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
 from irtwin.providers.records import find_robot
 from irtwin.storage import files

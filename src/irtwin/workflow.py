@@ -16,20 +16,20 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.knowledge.backup import backup as keep
-from irtwin.knowledge.explain import explain_one
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.explain.explain import explain_one
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.snapshot import Snapshot, kept
-from irtwin.knowledge.validation import validate
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.backup import backup as keep
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.snapshot import Snapshot, kept
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
 from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, robot_iri
-from irtwin.report.gap import render_alone
-from irtwin.report.render import render
-from irtwin.report.scene import draw_scene
+from irtwin.report.energy.page import render
+from irtwin.report.energy.scene import draw_scene
+from irtwin.report.gap.page import render_alone
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write

@@ -14,10 +14,10 @@ SOURCE = Path(irtwin.__file__).parent
 # words that happen to be an effect's id as well
 OTHER_MEANINGS = {
     "gap/experiment/programmes.py": {"payload"},  # a kind of programme
-    "report/gap_document.py": {"payload"},
+    "report/gap/document.py": {"payload"},
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows
     "gap/localisation/locations.py": {"mechanical_power"},
-    "providers/joint_stream.py": {"payload"},  # a field of a message
+    "live/joint_stream.py": {"payload"},  # a field of a message
     "signals/log.py": {"rotor_inertia"},  # a key of the data sheet
     "twin/files.py": {"rotor_inertia"},
 }

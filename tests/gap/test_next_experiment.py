@@ -24,7 +24,7 @@ from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
-from irtwin.report.gap_figures import experiment
+from irtwin.report.gap.figures import experiment
 from synthetic import arm, measure, swing
 
 ROBOT = arm(2)

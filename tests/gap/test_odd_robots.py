@@ -11,7 +11,7 @@ import pytest
 
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
-from irtwin.report.gap import render_alone
+from irtwin.report.gap.page import render_alone
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import DataSet, Run

@@ -16,9 +16,9 @@ from sqlalchemy import func, select
 import rows
 from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.knowledge.backup import backup, restore
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.store.backup import backup, restore
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base, Series

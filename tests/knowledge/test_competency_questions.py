@@ -10,10 +10,10 @@ import pytest
 
 import small_fleet
 from irtwin.errors import InputError
-from irtwin.knowledge import shacl_rules
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.queries import THEMES, ask, named_questions, to_csv
+from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
+from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace

@@ -2,7 +2,7 @@
 
 import pytest
 
-from irtwin.knowledge.datatypes import IllTyped, datatypes_of, is_datatype, value
+from irtwin.knowledge.owl_rl.datatypes import IllTyped, datatypes_of, is_datatype, value
 from irtwin.knowledge.vocabulary import RDF, XSD
 
 

@@ -7,11 +7,11 @@ import pytest
 from pyoxigraph import Quad
 
 from irtwin.errors import InputError
-from irtwin.knowledge import explain as explaining
-from irtwin.knowledge.explain import explain
-from irtwin.knowledge.explanation import Explanation, to_json, to_text
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.explain import explain as explaining
+from irtwin.knowledge.explain.explain import explain
+from irtwin.knowledge.explain.explanation import Explanation, to_json, to_text
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
 

@@ -6,10 +6,10 @@ import rdflib
 from rdflib.namespace import OWL, RDF
 
 from irtwin.knowledge import owl_dl  # noqa: F401  tells owlready2 where Java is
-from irtwin.knowledge.export import export_owl
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.validation import validate
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.export import export_owl
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 IRT = rdflib.Namespace("https://w3id.org/irtwin#")
 

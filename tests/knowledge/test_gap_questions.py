@@ -9,12 +9,12 @@ from pyoxigraph import RdfFormat, parse
 
 import gap_cases
 import rows
-from irtwin.knowledge import shacl_rules
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.queries import ask
+from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import check_consistency
-from irtwin.knowledge.validation import validate
+from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.resources import folder

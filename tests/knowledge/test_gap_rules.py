@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from pyoxigraph import RdfFormat, parse
 
-from irtwin.knowledge import shacl_rules
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 SOURCE = "https://w3id.org/irtwin/graph/source/rules"
 MODEL, AGAIN = "model the effect", "identify the twin again"

@@ -6,8 +6,8 @@ import pytest
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad
 
 from irtwin.errors import InputError
-from irtwin.knowledge import graph as graph_module
-from irtwin.knowledge.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.store import graph as graph_module
+from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, individual, term
 
 A, B = "https://example.org/g/a", "https://example.org/g/b"

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 # Writes without end: each step makes a new graph of 50 facts, or lets one of three graphs count on; says which is done.
 WRITER = """
 import itertools, sys
 from pathlib import Path
 from pyoxigraph import Literal, NamedNode, Quad
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 def quads(graph, number):
     name, value = NamedNode(f"https://example.org/g/{graph}"), NamedNode("https://example.org/value")

@@ -12,9 +12,9 @@ import pytest
 from pyoxigraph import Store
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.keywords import refuse_service, refuse_service_and_load
-from irtwin.knowledge.no_network import leave_network
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.keywords import refuse_service, refuse_service_and_load
+from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.vocabulary import PREFIXES
 from sparql_family import Family, Listener, listener
 
@@ -147,7 +147,7 @@ def test_a_family_of_harmless_texts_is_let_through(count: int) -> None:
 UNCHECKED = """
 import json, sys
 from pyoxigraph import Store
-from irtwin.knowledge.no_network import leave_network
+from irtwin.knowledge.store.no_network import leave_network
 
 if json.loads(sys.argv[1]):
     assert leave_network()

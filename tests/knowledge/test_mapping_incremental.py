@@ -15,9 +15,9 @@ from sqlalchemy import Engine
 from test_mapping import PREFIXES
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database, refresh
 from irtwin.knowledge.mapping.remembered import RememberedRows
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.storage.engine import open_engine
 

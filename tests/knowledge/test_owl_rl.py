@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Store, Triple, parse
 
 from irtwin.errors import InputError
-from irtwin.knowledge import owl_rl
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.owl_rl import Closure, Contradiction, closure
+from irtwin.knowledge.owl_rl import closure as owl_rl
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction, closure
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE
 
 CASES = Path(__file__).parents[2] / "../shared/conformance/owl2rl"

@@ -11,9 +11,9 @@ from pyoxigraph import Literal, NamedNode, Quad, Triple
 import small_fleet
 from irtwin import workflow
 from irtwin.knowledge import owl_dl, parts, reasoning
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph, read_turtle
-from irtwin.knowledge.owl_rl import Closure, Contradiction
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_CHANGED,

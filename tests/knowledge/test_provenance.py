@@ -1,8 +1,8 @@
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.provenance import trace
+from irtwin.knowledge.explain.provenance import trace
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, PROVIDER, individual
 
 

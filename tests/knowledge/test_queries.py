@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.queries import ask, to_csv, to_json
-from irtwin.knowledge.table import Table
+from irtwin.knowledge.questions.queries import ask, to_csv, to_json
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.table import Table
 
 
 def test_sparql_is_asked_as_it_is(graph: KnowledgeGraph) -> None:

@@ -6,9 +6,10 @@ import rdflib
 from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
-from irtwin.knowledge import owl_dl, shacl_rules
-from irtwin.knowledge.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import check_consistency, reason
+from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,

@@ -7,8 +7,8 @@ from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_OWL_RL,

@@ -13,8 +13,8 @@ import pytest
 import rows
 from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.storage.database import Workspace
 

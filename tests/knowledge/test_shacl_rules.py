@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pyoxigraph import RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
-from irtwin.knowledge.shacl_rules import conclusions, read_rules, rules_of
-from irtwin.knowledge.shapes import Shapes
+from irtwin.knowledge.shacl.rules import conclusions, read_rules, rules_of
+from irtwin.knowledge.shacl.shapes import Shapes
 
 PREFIXES = """
 @prefix ex: <https://example.org/> . @prefix sh: <http://www.w3.org/ns/shacl#> .

@@ -3,9 +3,9 @@ import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 
 from irtwin.knowledge import owl_dl
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.validation import validate
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, individual, term
 
 RUN = individual("run", "Arm_A.fit_1")

@@ -11,8 +11,8 @@ from pyoxigraph import Literal, NamedNode, Triple
 
 from endpoint import make_graph
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.snapshot import Snapshot, kept
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.snapshot import Snapshot, kept
 
 VALUES = "SELECT ?v { ?s <http://e/v> ?v } ORDER BY ?v"
 
@@ -52,7 +52,7 @@ def test_a_view_lasts_when_its_files_are_removed(folder: Path) -> None:
 
 
 def test_what_a_killed_reader_left_is_removed_and_what_is_in_use_is_not(folder: Path) -> None:
-    reader = "import sys; from pathlib import Path; from irtwin.knowledge.snapshot import Snapshot\n"
+    reader = "import sys; from pathlib import Path; from irtwin.knowledge.store.snapshot import Snapshot\n"
     reader += "with Snapshot(Path(sys.argv[1])): print('open', flush=True); sys.stdin.read()"
     with subprocess.Popen(
         [sys.executable, "-c", reader, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -98,8 +98,8 @@ def test_what_a_killed_writer_kept_is_seen_no_more(folder: Path) -> None:
     writer = """
 import sys
 from pathlib import Path
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.snapshot import kept
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.snapshot import kept
 folder = Path(sys.argv[1])
 with KnowledgeGraph(folder) as graph, kept(folder):
     graph.update("DELETE WHERE { ?s <http://e/v> ?v } ; INSERT DATA { <http://e/s> <http://e/v> 2 }")

@@ -20,9 +20,9 @@ import rdflib
 from pyoxigraph import Literal, NamedNode, Quad
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.queries import ask, named_questions
-from irtwin.knowledge.server import TOKEN, SparqlServer
+from irtwin.knowledge.questions.queries import ask, named_questions
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.sparql_server import TOKEN, SparqlServer
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, term
 
 A, B = "https://example.org/g/a", "https://example.org/g/b"

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from irtwin.knowledge import store_files
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store import store_files
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 
 @pytest.fixture

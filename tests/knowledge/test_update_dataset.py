@@ -6,7 +6,7 @@ import pytest
 from pyoxigraph import DefaultGraph, Literal, NamedNode, Quad, Store
 
 from irtwin.errors import InputError
-from irtwin.knowledge.update_dataset import using
+from irtwin.knowledge.store.update_dataset import using
 
 S, P = NamedNode("http://e/s"), NamedNode("http://e/p")
 

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from pyoxigraph import DefaultGraph, Literal, NamedNode, Quad, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.updates import keeping_union
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.updates import keeping_union
 from irtwin.knowledge.vocabulary import GRAPH_UPDATE, PREFIXES
 
 A, B = "http://e/a", "http://e/b"

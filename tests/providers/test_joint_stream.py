@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.providers.joint_stream import LONGEST_LINE, State, StateReader, feed, lines_of, listening
+from irtwin.live.joint_stream import LONGEST_LINE, State, StateReader, feed, lines_of, listening
 
 READER = StateReader({"R": ["a1", "a2"]})
 GOOD: dict[str, Any] = {"robot": "R", "time": 5.5, "position": [0.1, 0.2]}

@@ -19,12 +19,12 @@ from sqlalchemy import select
 import rows
 from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
-from irtwin.providers import live
-from irtwin.providers.joint_stream import State
-from irtwin.providers.live import LiveTwin
+from irtwin.live import live_twin as live
+from irtwin.live.joint_stream import State
+from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
 
@@ -290,8 +290,8 @@ import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from test_live import state
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.providers.live import LiveTwin
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 
 with Workspace(Path(sys.argv[1])) as place, KnowledgeGraph(place.graph_folder) as graph:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers import planner, provider
 from irtwin.providers.planner import Declaration, declarations, in_order, lacking
 

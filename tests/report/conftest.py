@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from robots import Factory, PageOf
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.report.render import render
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy.page import render
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pyarrow as pa
 from pyoxigraph import NamedNode, Quad, RdfFormat, parse
 
 from irtwin import resources
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.questions import Answers, ask, read_questions
 
 ID = "https://w3id.org/irtwin/id/"

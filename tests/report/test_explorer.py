@@ -3,7 +3,7 @@ import pyarrow as pa
 from robots import Factory, answers, power_only, six_axis
 from test_sampling import unpack
 
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.explorer import Columns, explorer, opening_run
 
 

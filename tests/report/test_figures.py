@@ -3,8 +3,8 @@ import json
 import pytest
 from robots import Factory, answers, power_only, six_axis
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.report.figures import figures, plain
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy.figures import figures, plain
 
 
 def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gap_cases
-from irtwin.report.gap_line import line
+from irtwin.report.gap.headline import line
 
 
 @pytest.mark.parametrize(

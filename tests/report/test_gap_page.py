@@ -16,13 +16,13 @@ import pytest
 import gap_cases
 import rows
 from irtwin.errors import InputError
-from irtwin.knowledge import shacl_rules
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.providers.records import robot_iri
-from irtwin.report.gap import render_gap
+from irtwin.report.gap.page import render_gap
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Joint

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from irtwin.report.gap_verdict import sentence
+from irtwin.report.gap.verdict import sentence
 from irtwin.report.questions import Answer, Question
 
 

@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from pyoxigraph import NamedNode, RdfFormat, parse
 
 from irtwin.cli import cli
-from irtwin.report.class_tree import Node, class_tree
-from irtwin.report.ontology import page, read_modules
+from irtwin.report.ontology.class_tree import Node, class_tree
+from irtwin.report.ontology.page import page, read_modules
 from irtwin.resources import folder
 
 IRT = "https://w3id.org/irtwin#"

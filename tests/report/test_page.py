@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from robots import power_only, six_axis
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.report.render import render
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy.page import render
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 playwright = pytest.importorskip("playwright.sync_api")

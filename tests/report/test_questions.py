@@ -5,7 +5,7 @@ import pytest
 from robots import power_only, six_axis
 
 from irtwin import resources
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.questions import ask, read_questions
 
 FOLDER = resources.folder("reports") / "energy"

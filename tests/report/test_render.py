@@ -7,9 +7,9 @@ from pyoxigraph import NamedNode, Triple
 from robots import Factory, PageOf, power_only, six_axis
 
 from irtwin.errors import InputError
-from irtwin.knowledge.explanation import Explanation
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.report.render import content_policy, render
+from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy.page import content_policy, render
 
 HOSTILE = "<script>alert(1)</script>\"'&</title>"
 

@@ -1,8 +1,8 @@
 import pyarrow as pa
 import pytest
 
+from irtwin.report.energy.scene import draw_scene
 from irtwin.report.explorer import Columns
-from irtwin.report.scene import draw_scene
 from irtwin.robot.urdf import parse_urdf
 
 ARM = """<robot name="arm"><link name="base"/><link name="mid"/><link name="tip"><inertial><mass value="1"/>

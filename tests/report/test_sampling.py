@@ -3,7 +3,7 @@ import base64
 import numpy as np
 import pytest
 
-from irtwin.report.sampling import Packed, extremes, pack
+from irtwin.report.energy.sampling import Packed, extremes, pack
 
 
 def unpack(packed: Packed) -> np.ndarray:

@@ -1,7 +1,7 @@
 from robots import answers, six_axis
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.report import tables
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy import tables
 
 
 def test_joint_parameters_make_a_matrix_and_the_rest_lists(graph: KnowledgeGraph):

@@ -1,8 +1,8 @@
 import pytest
 from robots import Factory, answers, power_only, six_axis
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.report import verdict
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy import verdict
 from irtwin.report.questions import Answers
 
 

@@ -8,8 +8,8 @@ from rdflib.plugins.stores.sparqlstore import SPARQLStore
 from SPARQLWrapper import CSV, JSON, POST, RDFXML, TSV, TURTLE, XML, SPARQLWrapper
 from SPARQLWrapper.SPARQLExceptions import QueryBadFormed
 
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.queries import named_questions
+from irtwin.knowledge.questions.queries import named_questions
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import IRT, PREFIXES
 
 ROBOTS = f"SELECT ?robot WHERE {{ ?robot a <{IRT}Industrial_Robot> }} ORDER BY ?robot"

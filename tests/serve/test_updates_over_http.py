@@ -13,7 +13,7 @@ import pytest
 import rdflib
 from rdflib.plugins.stores.sparqlstore import SPARQLUpdateStore
 
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 VALUES = "SELECT ?o { <http://e/s> <http://e/p> ?o } ORDER BY ?o"
 
@@ -128,8 +128,8 @@ def test_another_process_holding_the_graph_makes_updates_wait(writable) -> None:
 
 WRITER = """
 import sys, time
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.graph import in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import in_graph
 from pyoxigraph import Literal, NamedNode, Triple
 
 with KnowledgeGraph(sys.argv[1]) as graph:

@@ -10,8 +10,8 @@ from pyoxigraph import Literal, NamedNode
 from sqlalchemy import Engine, create_engine
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping import map_database, refresh
+from irtwin.knowledge.store.graph import KnowledgeGraph
 
 pytestmark = pytest.mark.system
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from irtwin.knowledge.graph import read_turtle
+from irtwin.knowledge.store.graph import read_turtle
 from irtwin.resources import folder
 
 pytest.importorskip("jpype")

@@ -20,8 +20,8 @@ from rdflib.plugins.sparql import prepareQuery
 from rdflib.plugins.sparql.algebra import traverse
 from rdflib.plugins.sparql.parserutils import CompValue
 
-from irtwin.knowledge.graph import read_turtle
-from irtwin.knowledge.shacl_rules import shipped_rules
+from irtwin.knowledge.shacl.rules import shipped_rules
+from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.vocabulary import PREFIXES, RDF, SH
 from irtwin.resources import folder
 

@@ -16,9 +16,9 @@ import owlready2.reasoning as reasoning
 from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import read_turtle
 from irtwin.knowledge.literals import to_milliseconds
-from irtwin.knowledge.owl_rl import Contradiction
+from irtwin.knowledge.owl_rl.closure import Contradiction
+from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF
 from irtwin.resources import folder
 

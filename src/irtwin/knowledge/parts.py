@@ -21,12 +21,13 @@ from dataclasses import dataclass, field
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Triple
 
-from irtwin.knowledge import datatypes, locality
-from irtwin.knowledge.changes import is_asserted
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.owl_rl import Closure, show
-from irtwin.knowledge.owl_rl_program import program
-from irtwin.knowledge.terms import Node
+from irtwin.knowledge import locality
+from irtwin.knowledge.owl_rl import datatypes
+from irtwin.knowledge.owl_rl.closure import Closure, show
+from irtwin.knowledge.owl_rl.program import program
+from irtwin.knowledge.owl_rl.terms import Node
+from irtwin.knowledge.store.changes import is_asserted
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_REASONED, OWL, RDF
 
 Name = NamedNode | BlankNode

@@ -16,12 +16,13 @@ from functools import cache
 
 from pyoxigraph import NamedNode, Quad, Store, Triple
 
-from irtwin.knowledge import parts, shacl_rules
-from irtwin.knowledge.blank_nodes import has_blank_node
-from irtwin.knowledge.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
-from irtwin.knowledge.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.owl_rl import Closure
+from irtwin.knowledge import parts
+from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
+from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.store.blank_nodes import has_blank_node
+from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import (
     GRAPH_CHANGED,
     GRAPH_INFERRED,

@@ -9,7 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import version
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers.provider import load_provider
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Activity

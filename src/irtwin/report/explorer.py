@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from irtwin.report.energy.sampling import Samples, extremes, pack
 from irtwin.report.questions import Answers, Row
-from irtwin.report.sampling import Samples, extremes, pack
 
 ReadSeries = Callable[[str, str], pa.Table]  # path in the workspace, checksum
 

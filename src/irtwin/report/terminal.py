@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from irtwin.knowledge import table as answers
+from irtwin.knowledge.store import table as answers
 
 
 def show(answer: answers.Table, in_sections: bool = False) -> None:

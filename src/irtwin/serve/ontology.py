@@ -10,7 +10,7 @@ from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
 from starlette.requests import Request
 from starlette.responses import Response
 
-from irtwin.knowledge.graph import read_turtle
+from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF
 from irtwin.resources import folder
 from irtwin.serve import negotiation
@@ -37,7 +37,7 @@ def module(request: Request) -> Response:
 
 @cache
 def _documentation() -> str:
-    from irtwin.report.ontology import page, read_modules  # a second to import, for browsers only
+    from irtwin.report.ontology.page import page, read_modules  # a second to import, for browsers only
 
     return page(read_modules(folder("ontology")))
 

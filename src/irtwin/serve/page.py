@@ -10,7 +10,7 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import Response
 
-from irtwin.knowledge.queries import named_questions
+from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve.protocol import Refusal
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from irtwin.knowledge.linked import remove_left_behind
+from irtwin.knowledge.store.linked import remove_left_behind
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.turns import Displaced, Turns
 from irtwin.serve.worker import FRAME

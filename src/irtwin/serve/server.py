@@ -18,7 +18,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
-from irtwin.knowledge.snapshot import Snapshot
+from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.serve import ontology, page
 from irtwin.serve.connections import Connection
 from irtwin.serve.endpoint import Endpoint, refused

@@ -11,9 +11,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.no_network import leave_network
-from irtwin.knowledge.snapshot import OLDEST
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.no_network import leave_network
+from irtwin.knowledge.store.snapshot import OLDEST
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.worker import limit_memory

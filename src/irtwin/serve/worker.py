@@ -19,9 +19,9 @@ from typing import IO, Any, cast
 from pyoxigraph import QueryResultsFormat, QueryTriples, RdfFormat, serialize
 
 from irtwin.errors import InputError
-from irtwin.knowledge.graph import KnowledgeGraph
-from irtwin.knowledge.no_network import leave_network
-from irtwin.knowledge.snapshot import Snapshot
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.no_network import leave_network
+from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal

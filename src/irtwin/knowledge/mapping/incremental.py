@@ -21,13 +21,13 @@ from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import Connection, Engine
 
 from irtwin.errors import InputError
-from irtwin.knowledge.blank_nodes import has_blank_node
-from irtwin.knowledge.graph import KnowledgeGraph
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.remembered import ENTRY, DamagedRows, Entries, RememberedRows
 from irtwin.knowledge.mapping.source import read, schema_version
 from irtwin.knowledge.mapping.terms import Row
+from irtwin.knowledge.store.blank_nodes import has_blank_node
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, OWL
 
 _MAPPED = (GRAPH_SOURCE, GRAPH_ACTIVITY)

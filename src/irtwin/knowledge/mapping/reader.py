@@ -25,7 +25,7 @@ from irtwin.knowledge.mapping.document import (
     TriplesMap,
 )
 from irtwin.knowledge.mapping.identifiers import parse_identifier, parse_table, parse_template
-from irtwin.knowledge.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.rdf_input import read_rdf, refuse
 
 _RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
 # BCP 47, as far as it is in use: no language of five letters or more is registered.

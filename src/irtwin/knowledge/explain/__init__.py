@@ -1,0 +1,1 @@
+"""From a triple back to what it was made of."""

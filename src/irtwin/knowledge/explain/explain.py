@@ -1,0 +1,237 @@
+"""From a triple back to what it was made of: rule, mapping or provider, facts, runs, files and checksums."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache
+from typing import TypeGuard, cast
+
+from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge.explain import provenance
+from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.explain.mapping import mapping_of
+from irtwin.knowledge.explain.rules import premises
+from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
+from irtwin.knowledge.reasoning import around, not_closed
+from irtwin.knowledge.shacl.rules import ShaclRule, graph_of, shipped_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
+from irtwin.knowledge.vocabulary import (
+    GRAPH_ACTIVITY,
+    GRAPH_INFERRED,
+    GRAPH_ONTOLOGY,
+    GRAPH_SOURCE,
+    GRAPH_SWRL,
+    ID,
+    PREFIXES,
+    shorten,
+)
+from irtwin.resources import folder
+
+MOST_TRIPLES = 100
+HOPS = 2  # from a statement's terms, before all of the graph is searched for its premises
+
+_TERM = re.compile(r'"(?:[^"\\]|\\.)*"(?:\^\^\S+|@[\w-]+)?|<[^<>\s]*>|\S+')
+_WILDCARDS = {"?", "*", "_"}
+_ABOVE = "what is said above"
+_RECORDED = "what was recorded"
+
+
+def explain(graph: KnowledgeGraph, pattern: str) -> tuple[Explanation, ...]:
+    """Explain each triple that fits a pattern: subject, predicate, object.
+
+    Terms are IRIs, prefixed names or literals as Turtle writes them; `?` or nothing stands for anything. InputError
+    where the pattern is none, or fits no triple of the graph, or more than MOST_TRIPLES.
+    """
+    triples = _matching(graph, pattern)
+    if not triples:
+        raise InputError(f"the graph has no triple {pattern}; see what it has with `irtwin query`")
+    if len(triples) > MOST_TRIPLES:
+        raise InputError(f"more than {MOST_TRIPLES} triples fit {pattern}: be more specific")
+    return tuple(Explainer(graph).triple(triple) for triple in sorted(triples, key=str))
+
+
+def explain_one(graph: KnowledgeGraph, subject: str, predicate: str, object: str) -> Explanation | None:
+    """Explain one triple of IRIs; None where the graph does not hold it."""
+    triple = Triple(NamedNode(subject), NamedNode(predicate), NamedNode(object))
+    return Explainer(graph).triple(triple) if graph.holds(triple) else None
+
+
+class Explainer:
+    """Explains triples of one graph. What it has explained once it refers to after that."""
+
+    def __init__(self, graph: KnowledgeGraph):
+        self._graph = graph
+        self._told: set[object] = set()
+        self._closures: list[Closure] = []
+        self._has_whole = False
+
+    def triple(self, triple: Triple) -> Explanation:
+        """Explain a triple that the graph holds."""
+        what = _show(triple)
+        if triple in self._told:
+            return Explanation(what, _ABOVE)
+        self._told.add(triple)
+        graphs = sorted(self._graph.graphs_with(triple))
+        stated = [name for name in graphs if not name.startswith(GRAPH_INFERRED)]
+        if stated:
+            return self._stated(triple, stated[0])
+        for rule in shipped_rules():
+            found = premises(self._graph, rule, triple) if graph_of(rule.name) in graphs else None
+            if found is not None:
+                return self._by_rule(triple, rule, found, swrl=GRAPH_SWRL in graphs)
+        if GRAPH_SWRL in graphs:
+            return Explanation(what, "the SWRL rules of rules/, run by Pellet")
+        return self._inferred(tuple(triple))
+
+    def individual(self, iri: str) -> Explanation:
+        """Explain an individual: the activities that made it, what they used, and the file that it is."""
+        what = shorten(iri)
+        if iri in self._told:
+            return Explanation(what, _ABOVE)
+        self._told.add(iri)
+        file, checksum = provenance.file_of(self._graph, iri)
+        makers = provenance.makers(self._graph, iri)
+        used = [thing for maker in makers for thing in provenance.used_by(self._graph, maker["activity"])]
+        return Explanation(
+            what,
+            " and ".join(map(_maker, makers)) or _RECORDED,
+            (*map(self.individual, dict.fromkeys(used)), *self._runs_recorded_as(iri)),
+            file=file,
+            checksum=checksum,
+        )
+
+    def _runs_recorded_as(self, series: str) -> Iterator[Explanation]:
+        """Name the run that samples were read from, and its own file."""
+        for run in provenance.recorded_of(self._graph, series):
+            file, checksum = provenance.file_of(self._graph, run)
+            yield Explanation(shorten(run), _RECORDED, file=file, checksum=checksum)
+
+    def _stated(self, triple: Triple, name: str) -> Explanation:
+        what = _show(triple)
+        if name.startswith(GRAPH_ACTIVITY):
+            activity = f"{ID}activity/{name.removeprefix(GRAPH_ACTIVITY)}"
+            used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
+            return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
+        if name.startswith(GRAPH_SOURCE):
+            file, checksum = self._file_near(triple)
+            return Explanation(what, mapping_of(triple), file=file, checksum=checksum)
+        if name == GRAPH_ONTOLOGY:
+            return Explanation(what, "the ontology", file=_module(triple))
+        return Explanation(what, f"what was written into {shorten(name)}")
+
+    def _by_rule(self, triple: Triple, rule: ShaclRule, found: Iterable[Triple], *, swrl: bool) -> Explanation:
+        by = f'the rule "{rule.label}", in SHACL' + (" and in SWRL" if swrl else "")
+        return Explanation(_show(triple), by, tuple(map(self.triple, found)), rule.comment or None)
+
+    def _inferred(self, statement: Statement) -> Explanation:
+        """Explain what OWL 2 RL inferred; steps that are the rules' own way to walk a list are left out."""
+        for closure in self._closures_for(statement):
+            derivation = closure.why(statement)
+            if derivation is not None:
+                said = _without_helpers(closure, derivation.premises)
+                return Explanation(
+                    _show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, said))
+                )
+        return Explanation(_show(statement), "OWL 2 RL: so it is with everything")
+
+    def _closures_for(self, statement: Statement) -> Iterator[Closure]:
+        """Yield closures that may hold a statement: of the graph around the first one's terms, then of all of it."""
+        yield from self._closures
+        if not self._closures:
+            ontology, near = self._graph.triples(GRAPH_ONTOLOGY), set[Triple]()
+            nodes = {term for term in statement if isinstance(term, NamedNode)}
+            for _ in range(HOPS):
+                near |= around(self._graph, nodes)
+                self._closures.append(Closure(ontology | near))
+                yield self._closures[-1]
+                nodes = {term for triple in near for term in triple if _is_individual(term)}
+        if not self._has_whole:
+            self._has_whole = True
+            self._closures.append(Closure(not_closed(self._graph)))
+            yield self._closures[-1]
+
+    def _premise(self, statement: Statement) -> Explanation:
+        if statement in self._told:
+            return Explanation(_show(statement), _ABOVE)
+        subject, predicate, object = statement
+        if not isinstance(subject, Literal) and isinstance(predicate, NamedNode):
+            triple = Triple(subject, predicate, object)
+            if self._graph.holds(triple):
+                return self.triple(triple)
+        self._told.add(statement)
+        return self._inferred(statement)
+
+    def _file_near(self, triple: Triple) -> tuple[str | None, str | None]:
+        """Return the file of the subject, or else of the object."""
+        for term in (triple.subject, triple.object):
+            file = provenance.file_of(self._graph, term.value) if isinstance(term, NamedNode) else (None, None)
+            if file[0] is not None:
+                return file
+        return (None, None)
+
+
+def _is_individual(term: object) -> TypeGuard[NamedNode]:
+    return isinstance(term, NamedNode) and term.value.startswith(ID)
+
+
+def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[Statement]:
+    """Return the statements, and for those that rules make for themselves what they were made of."""
+    found: dict[Statement, None] = {}
+    for statement in statements:
+        if closure.is_helper(statement):
+            derivation = closure.why(statement)
+            found |= dict.fromkeys(_without_helpers(closure, derivation.premises) if derivation else ())
+        else:
+            found[statement] = None
+    return list(found)
+
+
+def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
+    terms = [_sparql(term, f"?_{place}") for place, term in enumerate(_TERM.findall(pattern))]
+    terms += [f"?_{place}" for place in range(len(terms), 3)]
+    if len(terms) > 3:
+        raise InputError(f"{pattern}: is more than subject, predicate and object; put text in quotation marks")
+    text = " ".join(terms)
+    found = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} }} LIMIT {MOST_TRIPLES + 1}")
+    return list(cast(QueryTriples, found))
+
+
+def _sparql(term: str, variable: str) -> str:
+    prefix, colon, name = term.partition(":")
+    if term in _WILDCARDS or term.startswith("?"):
+        return variable
+    if colon and prefix in PREFIXES:
+        return f"<{PREFIXES[prefix]}{name}>"
+    return f"<{term}>" if name.startswith("//") and not term.startswith("<") else term
+
+
+def _show(statement: Triple | Statement) -> str:
+    return " ".join(map(show, statement))
+
+
+def _maker(maker: dict[str, object]) -> str:
+    """Return a provider's activity in words."""
+    when = f", finished {maker['finished']:%Y-%m-%d %H:%M:%S %Z}".rstrip() if maker.get("finished") else ""
+    software = f" of {maker['software']}" if maker.get("software") else ""
+    return f"{shorten(str(maker.get('provider') or maker['activity']))}{software}{when}"
+
+
+def _module(triple: Triple) -> str | None:
+    """Return the module of the ontology that says a triple; None for a part without a name."""
+    if isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode):
+        return None
+    return next((name for name, module in _modules() if next(in_graph([triple])) in module), None)
+
+
+@cache
+def _modules() -> tuple[tuple[str, Store], ...]:
+    """Return the modules of the ontology, their literals in the form that the graph gives back."""
+    modules = []
+    for file in sorted(folder("ontology").glob("*.ttl")):
+        module = Store()
+        module.extend(in_graph(read_turtle(file)))
+        modules.append((f"ontology/{file.name}", module))
+    return tuple(modules)

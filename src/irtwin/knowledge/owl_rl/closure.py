@@ -1,0 +1,275 @@
+"""The OWL 2 RL closure: the W3C's rules, run over what is new until nothing is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain, islice, product
+
+from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge.owl_rl import datatypes
+from irtwin.knowledge.owl_rl.program import program
+from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number
+from irtwin.knowledge.owl_rl.terms import Node
+from irtwin.knowledge.vocabulary import OWL, XSD, shorten
+
+_TRIVIAL = (OWL + "Thing", OWL + "Nothing")
+MOST_CONCLUSIONS = 100_000_000  # each time that a rule draws one counts
+MOST_FACTS = 5_000_000  # beside those that were given; they take 1.1 GB
+
+
+Statement = tuple[Node, Node, Node]  # unlike a triple, it may be about a literal
+
+
+class Contradiction(InputError):
+    """The graph contradicts itself: the rule that says so, and the terms it says it of."""
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """A conclusion's rule, by the W3C's name, and the premises that it was drawn from."""
+
+    rule: str
+    premises: tuple[Statement, ...]
+
+
+def closure(triples: Iterable[Triple]) -> set[Triple]:
+    """Return what OWL 2 RL infers and is worth keeping in a graph; Contradiction names the first one.
+
+    Left out is what holds of everything (x sameAs x, C subClassOf owl:Thing), what is inferred of anonymous class
+    expressions and of datatypes, and one more way to write a literal that stands there already.
+    """
+    return Closure(triples).worth_keeping()
+
+
+class Closure:
+    """Triples and all that OWL 2 RL infers from them. Contradiction names the first rule that finds one."""
+
+    def __init__(self, triples: Iterable[Triple]):
+        self._program = program()
+        self._terms = self._program.terms.copy()
+        self._facts = Facts()
+        self._drawn = 0
+        self._rounds = 0
+        self._round: dict[Fact, int] = {}  # in which a fact was found: a conclusion is found after its premises
+        self._groups: dict[Number, set[Number]] = {}  # of numbers that are the same
+        self._named_values: set[Number] = set()
+        self._triples: set[Triple] = set()
+        self._given: set[Fact] = set()
+        self._saturate(self._program.axioms)
+        self.add(triples)
+
+    def add(self, triples: Iterable[Triple]) -> None:
+        """Take more triples as given, and infer what follows of them."""
+        self._triples.update(triples)
+        self._given.update(map(self._terms.fact, self._triples))
+        self._refuse_ill_typed()
+        self._saturate([*self._given, *self._types_of_mentioned()])
+        self._add_reflexives()
+        self._refuse_contradictions()
+
+    def inferred(self) -> Iterator[Triple]:
+        """Return every triple that follows and was not given. What RDF cannot write, of literals, is left out."""
+        helpers, forms = self._helpers(), self._terms.forms
+        for fact in self._round:
+            if fact not in self._given and fact[1] not in helpers:
+                yield from self._terms.triples(fact)
+            elif len(forms[fact[2]]) > 1:  # a given value in the other ways that literals write it
+                yield from (triple for triple in self._terms.triples(fact) if triple not in self._triples)
+
+    def worth_keeping(self) -> set[Triple]:
+        """Return what follows, without what `closure` leaves out."""
+        terms, helpers = self._terms, self._helpers()
+        hidden = {number for number, forms in enumerate(terms.forms) if forms and _is_hidden(forms[0])}
+        kept: set[Triple] = set()
+        for fact in self._round.keys() - self._given - _truisms():
+            subject, predicate, object = fact
+            if subject != object and subject not in hidden and object not in hidden and predicate not in helpers:
+                kept.update(list(terms.triples(fact))[:1])
+        return kept
+
+    def __len__(self) -> int:
+        """Return how many statements are known."""
+        return len(self._round)
+
+    def since(self, count: int) -> Iterator[Statement]:
+        """Yield what is known beside the first `count` statements, given or inferred, but not that x is itself."""
+        forms = self._terms.forms
+        for subject, predicate, object in islice(self._round, count, None):
+            if (predicate != self._program.same or subject != object) and forms[subject] and forms[object]:
+                yield (forms[subject][0], forms[predicate][0], forms[object][0])
+
+    def why(self, statement: Statement | Triple) -> Derivation | None:
+        """Return how a statement was first inferred; None where it was given, does not follow, or needs no premise."""
+        subject, predicate, object = map(self._terms.number, statement)
+        return self._why((subject, predicate, object))
+
+    def is_helper(self, statement: Statement) -> bool:
+        """Whether a statement is one that the rules make for themselves, to walk along lists."""
+        return self._terms.number(statement[1]) in self._helpers()
+
+    def _why(self, conclusion: Fact) -> Derivation | None:
+        if conclusion in self._given or conclusion not in self._round:
+            return None
+        found = self._round[conclusion]
+        for rule, join, arguments in self._program.concluding(conclusion):
+            for values in join(self._facts, self._facts, *arguments):
+                premises = self._program.premises(rule, values)
+                if all(self._round[premise] < found for premise in premises):
+                    return Derivation(rule.name, tuple(map(self._shown, premises)))
+        return None
+
+    def _saturate(self, facts: Iterable[Fact]) -> None:
+        fresh = self._unknown(facts)
+        while fresh:
+            fresh += self._equal(fresh)
+            self._rounds += 1
+            for fact in fresh:
+                self._facts.add(fact)
+            new = Facts(fresh)
+            by_rules = (fact for join in self._program.forward for fact in join(self._facts, new))
+            fresh = self._unknown(chain(self._of_values(fresh), by_rules))
+
+    def _equal(self, fresh: list[Fact]) -> list[Fact]:
+        """Return what follows of new equalities by symmetry and transitivity, by joining groups of equals."""
+        same, found = self._program.same, list[Fact]()
+        for one, predicate, other in fresh:
+            if predicate != same or one == other:
+                continue
+            ones, others = (self._groups.setdefault(number, {number}) for number in (one, other))
+            if ones is others:
+                continue
+            steps = ([(other, one)], ((it, other) for it in ones), product(ones, others), product(others, ones))
+            for step in steps:  # each from what the ones before it found
+                self._rounds += 1
+                found += self._unknown((left, same, right) for left, right in step if left != right)
+            ones |= others
+            self._groups.update(dict.fromkeys(others, ones))
+        return found
+
+    def _unknown(self, facts: Iterable[Fact]) -> list[Fact]:
+        """Return those facts that are not known yet, and note the round that they are found in."""
+        known, unknown, drawn, number_of_round = self._round, [], self._drawn, self._rounds
+        for drawn, fact in enumerate(facts, self._drawn):
+            if fact not in known:
+                known[fact] = number_of_round
+                unknown.append(fact)
+            if drawn > MOST_CONCLUSIONS or len(known) - len(self._given) > MOST_FACTS:
+                raise InputError(
+                    f"OWL 2 RL draws more than {MOST_CONCLUSIONS:,} conclusions or {MOST_FACTS:,} different ones: "
+                    "look for large groups of owl:sameAs, or long chains of a transitive property"
+                )
+        self._drawn = drawn
+        return unknown
+
+    def _types_of_mentioned(self) -> Iterator[Fact]:
+        """Say of each literal which of the datatypes that the graph speaks of contain it (dt-type2)."""
+        nodes = {number for subject, _, object in self._given for number in (subject, object)}
+        mentioned = {iri: number for number in nodes if datatypes.is_datatype(iri := self._iri(number))}
+        if mentioned:
+            for number, value in self._terms.values.items():
+                for iri in datatypes.datatypes_of(value) & mentioned.keys():
+                    yield (number, self._program.type, mentioned[iri])
+
+    def _of_values(self, fresh: list[Fact]) -> Iterator[Fact]:
+        """Say what is known of values that have just been given another name (dt-type2, dt-diff)."""
+        for subject, predicate, object in fresh:
+            if predicate != self._program.same or subject == object:
+                continue
+            if subject in self._terms.values and object in self._terms.values:
+                raise self._two_values((subject, predicate, object))
+            for number in {subject, object} & self._terms.values.keys() - self._named_values:
+                for iri in datatypes.datatypes_of(self._terms.values[number]):
+                    yield (number, self._program.type, self._terms.number(NamedNode(iri)))
+                for other in self._named_values:
+                    yield (number, self._program.different, other)
+                    yield (other, self._program.different, number)
+                self._named_values.add(number)
+
+    def _add_reflexives(self) -> None:
+        """Say of everything that it is the same as itself (eq-ref).
+
+        Rules need not look at that, unless somebody says something about owl:sameAs itself.
+        """
+        same = self._program.same
+        helpers = self._helpers()
+        facts = [fact for fact in self._round if fact[1] not in helpers]
+        reflexive = [(number, same, number) for number in {same, *(number for fact in facts for number in fact)}]
+        if any(same in (fact[0], fact[2]) for fact in facts):
+            self._saturate(reflexive)
+        else:
+            for fact in self._unknown(reflexive):
+                self._facts.add(fact)
+
+    def _refuse_ill_typed(self) -> None:
+        for literal in self._terms.ill_typed:
+            raise _not_of(self._use(self._terms.number(literal)), literal.datatype.value)
+
+    def _refuse_contradictions(self) -> None:
+        for rule, join in self._program.contradictions:
+            for culprits in join(self._facts, self._facts):
+                raise _contradiction(rule.name, ", ".join(map(self._name, culprits)))
+        for kind, members in self._facts.subjects.get(self._program.type, {}).items():
+            if datatypes.is_datatype(self._iri(kind)):
+                for number in members & self._terms.values.keys():
+                    if self._iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
+                        raise _not_of(self._use(number), self._iri(kind))
+
+    def _helpers(self) -> set[Number]:
+        """Return the predicates that only rules speak: their own, and lists that stand for a chain or a key."""
+        lists = (self._facts.objects.get(number, {}) for number in self._program.helpers)
+        return self._program.helpers.union(*lists)
+
+    def _shown(self, fact: Fact) -> Statement:
+        subject, predicate, object = (self._terms.forms[number][0] for number in fact)
+        return (subject, predicate, object)
+
+    def _two_values(self, fact: Fact) -> Contradiction:
+        derivation = self._why(fact)
+        if derivation is None:
+            return _contradiction("dt-diff", " is the same as ".join(map(self._name, fact[::2])))
+        premises = (" ".join(map(show, premise)) for premise in derivation.premises)
+        return _contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises))
+
+    def _use(self, number: Number) -> str:
+        """Return a given triple, as people write it, whose object has the number."""
+        return " ".join(map(self._name, next(fact for fact in self._given if fact[2] == number)))
+
+    def _iri(self, number: Number) -> str:
+        forms = self._terms.forms[number]
+        return forms[0].value if forms and isinstance(forms[0], NamedNode) else ""
+
+    def _name(self, number: Number) -> str:
+        return show(self._terms.forms[number][0])
+
+
+@cache
+def _truisms() -> frozenset[Fact]:
+    """Return what follows from nothing."""
+    return frozenset(Closure([])._round)
+
+
+def _is_hidden(term: Node) -> bool:
+    if isinstance(term, NamedNode):
+        return term.value in _TRIVIAL or datatypes.is_datatype(term.value)
+    return isinstance(term, BlankNode)
+
+
+def show(term: Node) -> str:
+    """Return a term as people write it, with prefixes."""
+    if isinstance(term, NamedNode):
+        return shorten(term.value)
+    if isinstance(term, Literal) and term.datatype.value != XSD + "string" and term.language is None:
+        return f'"{term.value}"^^{shorten(term.datatype.value)}'
+    return str(term)
+
+
+def _contradiction(rule: str, what: str) -> Contradiction:
+    return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {what}")
+
+
+def _not_of(use: str, datatype: str) -> Contradiction:
+    return _contradiction("dt-not-type", f"the value is not of {shorten(datatype)} in {use}")

@@ -1,0 +1,1 @@
+"""The questions to the graph that have a name, one SPARQL file each, and any other."""

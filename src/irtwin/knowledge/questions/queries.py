@@ -1,0 +1,113 @@
+"""Questions to the graph: those that have a name, and any other in SPARQL."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.table import Table
+
+_FOLDER = Path(__file__).parent
+_HEADER = re.compile(r"^# (title|question|theme|of): (.+)$", re.MULTILINE)
+THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
+_QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|delete)\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Question:
+    """A named SPARQL query; `question` is what it answers, in words.
+
+    One that is `of_robot` can be asked of one robot, its variable `?arm`, instead of all.
+    """
+
+    name: str
+    title: str
+    question: str
+    theme: str
+    of_robot: bool
+    text: str
+
+
+@cache
+def named_questions() -> Mapping[str, Question]:
+    """Return the questions that have a name, in the order of their themes and names."""
+    questions = [_read(file) for file in _FOLDER.glob("*.rq")]
+    questions.sort(key=lambda question: (THEMES.index(question.theme), question.name))
+    return {question.name: question for question in questions}
+
+
+def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table:
+    """Answer a named question, of all robots or of the one called `robot`, or a question in SPARQL.
+
+    InputError where the question or the robot is unknown, or the question is not one of a single robot.
+    """
+    if robot is None:
+        return graph.query(_text(question))
+    named = named_questions().get(question)
+    if named is None or not named.of_robot:
+        raise InputError(f"{question!r} does not ask about one robot; leave --robot out")
+    return graph.query(named.text, {"arm": _robot_iri(graph, robot)})
+
+
+def to_json(table: Table) -> str:
+    """Write the rows as a JSON array of objects; what is unbound or not finite is null."""
+    rows = [{name: _plain(value) for name, value in row.items()} for row in table]
+    return json.dumps(rows, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def to_csv(table: Table) -> str:
+    """Write the rows as CSV with a header (RFC 4180); what is unbound is empty."""
+    out = io.StringIO()
+    writer = csv.writer(out)
+    writer.writerow(table.columns)
+    writer.writerows(
+        [row[name].isoformat() if isinstance(row[name], date) else row[name] for name in table.columns] for row in table
+    )
+    return out.getvalue()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, date):
+        return value.isoformat()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _read(file: Path) -> Question:
+    text = file.read_text(encoding="utf-8")
+    header = dict(_HEADER.findall(text))
+    return Question(file.stem, header["title"], header["question"], header["theme"], header.get("of") == "robot", text)
+
+
+def _robot_iri(graph: KnowledgeGraph, name: str) -> str:
+    rows = graph.query("SELECT ?arm ?name { ?arm irt:has_Information / irt:IR_Name ?name } ORDER BY ?name")
+    found = {row["name"]: row["arm"] for row in rows}
+    if name not in found:
+        near = get_close_matches(name, found, n=1)
+        known = ", ".join(list(found)[:10]) + (", ..." if len(found) > 10 else "")
+        raise InputError(
+            f"there is no robot {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
+        )
+    return str(found[name])
+
+
+def _text(question: str) -> str:
+    known = named_questions()
+    if question in known:
+        return known[question].text
+    if _QUERY_FORM.search(question):
+        return question
+    near = get_close_matches(question, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+    raise InputError(f"there is no question {question!r}: {hint}")

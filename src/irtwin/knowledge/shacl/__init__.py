@@ -1,0 +1,1 @@
+"""SHACL: constraints that the graph keeps, and rules that conclude."""

@@ -1,0 +1,180 @@
+"""A workspace in one file, and back: graph, database, series, twins, diagnoses and reports.
+
+The database goes as rows, so that a backup of an SQLite workspace may be restored into PostgreSQL and the other way.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pyoxigraph import NamedNode, Quad, RdfFormat, parse, serialize
+from sqlalchemy import Connection, Table, func, insert, select
+from sqlalchemy.exc import SQLAlchemyError
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.source import snapshot_options
+from irtwin.knowledge.store.damage import told
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE
+from irtwin.storage import engine, files
+from irtwin.storage.archive import pack, unpack
+from irtwin.storage.database import DIAGNOSES, TWINS, Workspace
+from irtwin.storage.rows import NamedFile, named_files
+from irtwin.storage.schema import LIVE, Base, Moment, Robot
+from irtwin.storage.series import FOLDER
+
+_FOLDERS = (FOLDER, TWINS, DIAGNOSES, LIVE, "reports")
+_GRAPH = "graph.nq"
+_NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*")
+_AT_ONCE = 5000  # rows
+
+
+def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
+    """Write a workspace into an archive, whole or not at all, while others may write.
+
+    Rows and files are those of one moment: files are linked while the writers' lock is held, rows read from a snapshot
+    taken then. The graph is that of a moment just after; what it lacks or has more is set right by the next mapping.
+    Raises InputError where a file that the database names is missing or altered, or the graph is damaged.
+    """
+    with files.working_folder(place.folder, ".backup-") as held:
+        with place.engine.connect() as connection:
+            connection.execution_options(**snapshot_options(place.engine))
+            with connection.begin():
+                with engine.writing(place.engine):
+                    connection.execute(select(func.count()).select_from(Base.metadata.sorted_tables[0]))
+                    contents = dict(_linked(place.folder, held))
+                contents |= _dump_rows(connection, held)
+                named = named_files(connection)
+        lost = [file for file in named if file.path not in contents]
+        if lost:
+            raise InputError(_incomplete(place.folder, lost, "missing", "nothing was written"))
+        with told(graph.folder):
+            serialize(graph.quads(), str(held / _GRAPH), RdfFormat.N_QUADS)
+        contents[_GRAPH] = held / _GRAPH
+        about = {"software": f"irtwin {version('irtwin')}", "created": datetime.now(UTC).isoformat(timespec="seconds")}
+        altered = pack(contents, archive, about, {file.path: file.sha256 for file in named})
+        lost = [file for file in named if file.path in altered]
+        if lost:
+            raise InputError(_incomplete(place.folder, lost, "altered", "nothing was written"))
+
+
+def restore(archive: Path, folder: Path, database: str | None = None, graph_url: str | None = None) -> None:
+    """Make a workspace of an archive, whole or not at all, where there is none.
+
+    With `database` the rows go there, into tables that must be empty; with `graph_url` the graph goes to that server.
+    Raises InputError where the archive is damaged or not ours, or where there is something already.
+    """
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise InputError(f"{folder}: already exists; restore into a new folder")
+    folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+    with files.working_folder(folder.absolute().parent, ".irtwin-restore-") as working:
+        held = working / "workspace"
+        with Workspace(held, database) as place:
+            sums = dict(unpack(archive, held, _NAMES))
+            with KnowledgeGraph(graph_url or place.graph_folder, held) as graph:
+                if graph.graphs():
+                    raise InputError(f"{graph_url}: the server holds a graph already; give an empty one")
+                with engine.writing(place.engine) as session:
+                    for table in Base.metadata.sorted_tables:
+                        _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")
+                    lost = [file for file in named_files(session.connection()) if sums.get(file.path) != file.sha256]
+                    if lost:
+                        raise InputError(_incomplete(archive, lost, "missing or altered", "use another backup"))
+                    if _GRAPH not in sums:
+                        raise InputError(f"{archive}: incomplete: it holds no graph; use another backup")
+                    robots = session.scalar(select(func.count()).select_from(Robot))
+                    names = (str(quad.graph_name) for quad in _read_quads(archive, held / _GRAPH))
+                    if robots and not any(name.startswith(f"<{GRAPH_SOURCE}") for name in names):
+                        raise InputError(f"{archive}: incomplete: its graph knows no robot; use another backup")
+                    graph.replace(_read_quads(archive, held / _GRAPH), "")
+        shutil.rmtree(held / "rows", ignore_errors=True)
+        (held / _GRAPH).unlink(missing_ok=True)
+        if folder.exists():
+            folder.rmdir()
+        held.rename(folder)
+
+
+def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) -> str:
+    robots = ", ".join(sorted({file.robot_id for file in lost}))
+    return (
+        f"{place}: {lost[0].path}{f' and {len(lost) - 1} more files' if len(lost) > 1 else ''} {what}; {then}: run the "
+        f"data set of {robots} again, or take the robot out by `irtwin drop`"
+    )
+
+
+def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
+    """Link a workspace's files into a folder; those that still grow are copied."""
+    for name in _FOLDERS:
+        (held / name).mkdir()
+        for file in sorted((folder / name).glob("[!.]*")):
+            target = held / name / file.name
+            try:
+                shutil.copyfile(file, target) if name == LIVE else os.link(file, target)
+            except FileNotFoundError:  # the journal of a run that is in the database now
+                continue
+            yield f"{name}/{file.name}", target
+
+
+def _dump_rows(connection: Connection, held: Path) -> Iterator[tuple[str, Path]]:
+    """Write each table as a file of JSON lines."""
+    (held / "rows").mkdir()
+    for table in Base.metadata.sorted_tables:
+        file = held / "rows" / f"{table.name}.jsonl"
+        with file.open("w", encoding="utf-8") as out:
+            for row in connection.execution_options(yield_per=_AT_ONCE).execute(select(table)).mappings():
+                out.write(json.dumps(dict(row), default=datetime.isoformat) + "\n")
+        yield f"rows/{table.name}.jsonl", file
+
+
+def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> None:
+    if connection.execute(select(func.count()).select_from(table)).scalar_one():
+        raise InputError(f"table {table.name} of the database holds rows already; give an empty database")
+    if not file.is_file():
+        raise InputError(
+            f"{archive}: has no table {table.name}: made by another irtwin version; restore it with that one"
+        )
+    try:
+        with file.open(encoding="utf-8") as lines:
+            for rows in _in_chunks(_row(table, archive, line) for line in lines):
+                connection.execute(insert(table), rows)
+    except (ValueError, TypeError, SQLAlchemyError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(
+            f"{archive}: the rows of table {table.name} do not fit ({reason}); use another backup"
+        ) from None
+
+
+def _row(table: Table, archive: Path, line: str) -> dict[str, Any]:
+    row = json.loads(line)
+    if set(row) != set(table.columns.keys()):
+        raise InputError(f"{archive}: table {table.name} was made by another irtwin version; restore it with that one")
+    moments = [column.name for column in table.columns if isinstance(column.type, Moment) and row[column.name]]
+    return {**row, **{name: datetime.fromisoformat(row[name]) for name in moments}}
+
+
+def _in_chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
+    chunk: list[dict[str, Any]] = []
+    for row in rows:
+        chunk.append(row)
+        if len(chunk) == _AT_ONCE:
+            yield chunk
+            chunk = []
+    if chunk:
+        yield chunk
+
+
+def _read_quads(archive: Path, file: Path) -> Iterator[Quad]:
+    try:
+        for quad in parse(path=str(file), format=RdfFormat.N_QUADS):
+            if isinstance(quad.graph_name, NamedNode):
+                yield quad
+    except SyntaxError as error:
+        raise InputError(f"{archive}: its graph is damaged: {error.msg}; use another backup") from None

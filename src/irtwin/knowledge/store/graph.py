@@ -1,0 +1,385 @@
+"""The knowledge graph: an Oxigraph store of named graphs, asked as one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, cast
+
+from pyoxigraph import (
+    BlankNode,
+    DefaultGraph,
+    NamedNode,
+    Quad,
+    QueryBoolean,
+    QuerySolutions,
+    QueryTriples,
+    RdfFormat,
+    Store,
+    Triple,
+    parse,
+)
+
+from irtwin.errors import InputError
+from irtwin.knowledge.store import changes, store_files
+from irtwin.knowledge.store.blank_nodes import has_blank_node, same
+from irtwin.knowledge.store.damage import check_files, telling, told
+from irtwin.knowledge.store.keywords import refuse_service
+from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.series_functions import Functions, series_functions
+from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
+from irtwin.knowledge.store.sparql_text import bound
+from irtwin.knowledge.store.table import Table, to_python
+from irtwin.knowledge.store.update_dataset import using
+from irtwin.knowledge.store.updates import as_change, check, keeping_union
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_UPDATE, ID, PREFIXES
+from irtwin.resources import folder
+
+if TYPE_CHECKING:
+    import rdflib  # half a second to import, for those who ask for it
+
+    from irtwin.storage.database import Workspace
+
+MOST_ROWS = 1_000_000
+
+
+class KnowledgeGraph:
+    """Ontology, individuals and inferences in named graphs: in a folder, on a SPARQL server by its URL, or in memory.
+
+    The store's default graph holds the union of the named graphs, each triple once: Oxigraph's own union
+    repeats a triple that several graphs hold, and a sum would count it twice.
+
+    Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
+    in `workspace`, which a folder's parent is if none is given.
+    """
+
+    def __init__(self, place: Path | str | None = None, workspace: Path | None = None):
+        self._store: Store | SparqlServer
+        self._read_only = False
+        self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
+        self.folder = None if place is None or is_url(place) else Path(place)
+        if self.folder is None:
+            self._store = Store() if place is None else SparqlServer(str(place))
+            return
+        check_files(self.folder)
+        with told(self.folder):
+            self._store = Store(str(self.folder))
+        for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
+            old.unlink(missing_ok=True)
+
+    @classmethod
+    def of_workspace(cls, place: Workspace, url: str | None = None) -> Self:
+        """Open a workspace's graph: in its folder, or on a SPARQL server. InputError where it is damaged or lost."""
+        if url is None:
+            place.check_graph()
+        return cls(url or place.graph_folder, place.folder)
+
+    @classmethod
+    def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
+        """Open what is on disk now, to read; takes no lock. Where another process may write meanwhile: see `snapshot`.
+
+        Raises OSError or RuntimeError where that process changed the files just now.
+        """
+        graph = cls.__new__(cls)
+        graph.folder, graph._read_only = path, True
+        graph._store = Store.read_only(str(path))
+        graph._workspace = workspace or path.parent
+        return graph
+
+    def __enter__(self) -> Self:
+        """Return the graph; leaving the block closes it."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
+        if self.folder is not None and isinstance(self._store, Store) and not self._read_only:
+            with told(self.folder):
+                self._store.flush()
+                store_files.note_sums(self.folder)
+        self._store = Store()
+
+    def load_ontology(self) -> None:
+        """Put the modules of `ontology/` into the ontology's graph."""
+        modules = sorted(folder("ontology").glob("*.ttl"))
+        self.replace(
+            in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
+        )
+
+    @telling
+    def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
+        """Make the quads the whole content of the named graphs whose IRIs start with one of `below`.
+
+        Happens whole or not at all: in one transaction or, where there is no such graph yet, as one bulk load, in
+        memory that grows little with their number. Graphs that stay as they are are left alone; returns the IRIs of
+        those that changed.
+        """
+        quads = _belonging(quads, below)
+        old = self.graphs(*below)
+        if isinstance(self._store, Store) and not old:
+            self._forget_what_was_inferred(below)
+            self._store.bulk_extend(_with_union(quads))
+            return self.graphs(*below)
+        new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
+        new.extend(quads)
+        names = {*_names(new), *old}
+        changed = sorted(name for name in names if not same(_read(new, name), _read(self._store, name)))
+        if changed:
+            self._forget_what_was_inferred(changed)
+            self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
+            self._store.flush()
+        return changed
+
+    @telling
+    def change(self, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
+        """Take quads out of their named graphs and put others in, in one transaction; the rest stays untouched.
+
+        ValueError for blank nodes: they have no name to find them by.
+        """
+        taken, given = set(removed), set(added)
+        taken -= given
+        if isinstance(self._store, Store):
+            given |= changes.notes(self._store, taken | given)
+        if has_blank_node(taken | given):
+            raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
+        triples = {quad.triple for quad in taken}
+        remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
+        lost = triples - remaining - {quad.triple for quad in given}
+        if taken or given:
+            self._store.update(
+                f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
+                f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
+            )
+
+    def _holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
+        """Yield the quads of named graphs that say one of the triples."""
+        if isinstance(self._store, SparqlServer):
+            return self._store.holding(triples)
+        found = (self._store.quads_for_pattern(it.subject, it.predicate, it.object, None) for it in triples)
+        return (quad for quads in found for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
+
+    def quads(self) -> Iterator[Quad]:
+        """Yield the quads of all named graphs, as one query sees them."""
+        for row in cast(QuerySolutions, self.answer("SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } }")):
+            yield Quad(row["s"], row["p"], row["o"], row["g"])
+
+    @telling
+    def graphs_with(self, triple: Triple) -> list[str]:
+        """Return the IRIs of the named graphs that hold a triple."""
+        return [quad.graph_name.value for quad in self._holding([triple]) if isinstance(quad.graph_name, NamedNode)]
+
+    @telling
+    def holds(self, triple: Triple) -> bool:
+        """Whether some named graph holds a triple."""
+        return next(iter(self._holding([triple])), None) is not None
+
+    @telling
+    def graphs(self, *below: str) -> list[str]:
+        """Return the IRIs of the named graphs, of all or of those that start with one of `below`."""
+        return sorted(name for name in _names(self._store) if not below or name.startswith(below))
+
+    @telling
+    def triples(self, *below: str) -> set[Triple]:
+        """Return the triples of the named graphs whose IRIs start with one of `below`, of all without it."""
+        if not below:
+            return {quad.triple for quad in self._store.quads_for_pattern(None, None, None, DefaultGraph())}
+        return {triple for name in self.graphs(*below) for triple in _read(self._store, name)}
+
+    @telling
+    def query(self, text: str, bindings: Mapping[str, str] | None = None) -> Table:
+        """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
+
+        `bindings` gives variables the IRI that they stand for. The usual prefixes need no PREFIX.
+        InputError where the text is no such query, asks another server, or has too many answers.
+        """
+        faults: dict[str, None] = {}
+        answer = self.answer(bound(text, bindings or {}), faults=faults)
+        if isinstance(answer, QueryBoolean):
+            return Table(("answer",), ({"answer": bool(answer)},))
+        if isinstance(answer, QuerySolutions):
+            columns = tuple(variable.value for variable in answer.variables)
+            rows = (
+                {name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in _counted(answer)
+            )
+            return Table(columns, tuple(rows), faults)
+        columns = ("subject", "predicate", "object")
+        found = ((triple.subject, triple.predicate, triple.object) for triple in _counted(answer))
+        return Table(columns, tuple(dict(zip(columns, map(to_python, triple), strict=True)) for triple in found))
+
+    @telling
+    def construct(self, text: str) -> set[Triple]:
+        """Return the triples that a CONSTRUCT makes of the union of all named graphs."""
+        triples = self.answer(text)
+        assert not isinstance(triples, QuerySolutions | QueryBoolean)
+        return set(triples)
+
+    @telling
+    def answer(
+        self,
+        text: str,
+        default_graphs: Sequence[str] = (),
+        named_graphs: Sequence[str] = (),
+        faults: dict[str, None] | None = None,
+        base: str = ID,
+    ) -> QuerySolutions | QueryBoolean | QueryTriples:
+        """Answer a query row by row as they are found; InputError where it is none or asks another server.
+
+        Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
+        `faults` is told why functions had no answer, while the rows are found. Relative IRIs are below `base`.
+        """
+        refuse_service(text, base, isinstance(self._store, SparqlServer))
+        whole = not (default_graphs or named_graphs)
+        try:
+            return self._store.query(
+                text,
+                base_iri=base,
+                prefixes=PREFIXES,
+                default_graph=None if whole else [_graph_name(iri) for iri in default_graphs],
+                named_graphs=None if whole else [_graph_name(iri) for iri in named_graphs],
+                custom_functions=self._functions({} if faults is None else faults),
+            )
+        except SyntaxError as error:
+            raise InputError(f"not a SPARQL query: {error}") from error
+        except RuntimeError as error:
+            if "function" in str(error):
+                raise InputError(f"{error}: see the functions of ontology/providers.ttl and of SPARQL 1.1") from None
+            raise
+
+    @telling
+    def update(
+        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str = ID
+    ) -> None:
+        """Do a SPARQL update in one transaction that keeps the default graph the union: see `updates`.
+
+        Graphs and base are those of `answer`. InputError where the text is no update, reads from elsewhere, or fails.
+        """
+        check(text, base, isinstance(self._store, SparqlServer))
+        if default_graphs or named_graphs:
+            text = using(text, default_graphs, named_graphs, base)
+        try:
+            change = as_change(text, self._holding, base)
+            if change is None:
+                self._forget_what_was_inferred([GRAPH_UPDATE])
+                self._store.update(keeping_union(text, base), base_iri=base, prefixes=PREFIXES)
+            else:
+                self.change(*change)
+            self._store.flush()
+        except (SyntaxError, RuntimeError) as error:
+            raise InputError(f"the update failed, nothing changed: {error}") from error
+
+    @telling
+    def about(self, node: NamedNode | BlankNode) -> list[Quad]:
+        """Return the quads of named graphs that have a node for subject or object; not of a server's graph."""
+        assert isinstance(self._store, Store)
+        return [
+            quad
+            for ends in ((node, None), (None, node))
+            for quad in self._store.quads_for_pattern(ends[0], None, ends[1], None)
+            if not isinstance(quad.graph_name, DefaultGraph)
+        ]
+
+    @telling
+    def changed(self, reader: str) -> set[Quad] | None:
+        """Return the notes of `changes` for GRAPH_INFERRED or GRAPH_VALIDATION; None on a server, where none are."""
+        return changes.noted(self._store, reader) if isinstance(self._store, Store) else None
+
+    def _forget_what_was_inferred(self, written: Iterable[str]) -> None:
+        """Before graphs are written whole: have everything inferred and validated anew, if they are asserted."""
+        if isinstance(self._store, Store) and not all(name.startswith(changes.NOT_ASSERTED) for name in written):
+            self.change(changes.made_of(self._store), ())
+
+    def _functions(self, faults: dict[str, None]) -> Functions:
+        """Return the functions that reach the samples, where their files are known."""
+        if self._workspace is None or isinstance(self._store, SparqlServer):
+            return {}
+        return series_functions(self._store, self._workspace, faults)
+
+    def as_rdflib(self) -> rdflib.Graph:
+        """Return the union of all named graphs as rdflib sees it, to read."""
+        import rdflib
+        from oxrdflib import OxigraphStore
+        from rdflib.plugins.stores.sparqlstore import SPARQLStore
+
+        if isinstance(self._store, SparqlServer):
+            return rdflib.Graph(
+                SPARQLStore(self._store.query_url, context_aware=False, method="POST", headers=self._store.headers)
+            )
+        return rdflib.Graph(OxigraphStore(store=self._store), identifier=rdflib.graph.DATASET_DEFAULT_GRAPH_ID)
+
+
+def read_turtle(file: Path) -> Iterator[Triple]:
+    """Read a Turtle file; InputError names the file and the line where it is broken."""
+    content = read_rdf(file, RdfFormat.TURTLE)
+    try:
+        for quad in parse(content, format=RdfFormat.TURTLE, rename_blank_nodes=True):
+            yield quad.triple
+    except (SyntaxError, MemoryError) as error:
+        refuse(file, error)
+
+
+def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
+    """Say of each triple that it belongs into the named graph, or into the default graph."""
+    graph = DefaultGraph() if name is None else NamedNode(name)
+    return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
+
+
+def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
+    for quad in quads:
+        if not (isinstance(quad.graph_name, NamedNode) and quad.graph_name.value.startswith(below)):
+            raise ValueError(f"a quad of graph {quad.graph_name} does not belong into {', '.join(below)}")
+        yield quad
+
+
+def _with_union(quads: Iterable[Quad]) -> Iterator[Quad]:
+    """Yield each quad, and its triple for the default graph."""
+    for quad in quads:
+        yield quad
+        yield Quad(*quad.triple)
+
+
+def _names(store: Store | SparqlServer) -> list[str]:
+    return [graph.value for graph in store.named_graphs() if isinstance(graph, NamedNode)]
+
+
+def _read(store: Store | SparqlServer, name: str) -> set[Triple]:
+    return {quad.triple for quad in store.quads_for_pattern(None, None, None, NamedNode(name))}
+
+
+def _replacement(name: str, triples: set[Triple]) -> str:
+    """Return the SPARQL Update that swaps a named graph's content, and keeps the default graph the union."""
+    text = "\n".join(f"{triple} ." for triple in triples)
+    return f"""
+    DELETE {{ ?s ?p ?o }} WHERE {{
+      GRAPH <{name}> {{ ?s ?p ?o }}
+      FILTER NOT EXISTS {{ GRAPH ?other {{ ?s ?p ?o }} FILTER(?other != <{name}>) }}
+    }} ;
+    DROP SILENT GRAPH <{name}> ;
+    INSERT DATA {{ {text} GRAPH <{name}> {{ {text} }} }}"""
+
+
+def _data(quads: Iterable[Quad]) -> str:
+    """Write quads of named graphs as SPARQL's QuadData, the triples of each graph together."""
+    by_graph: dict[Any, list[Triple]] = {}
+    for quad in quads:
+        by_graph.setdefault(quad.graph_name, []).append(quad.triple)
+    return "\n".join(f"GRAPH {name} {{ {_triples(triples)} }}" for name, triples in by_graph.items())
+
+
+def _triples(triples: Iterable[Triple]) -> str:
+    return " .\n".join(map(str, triples))
+
+
+def _graph_name(iri: str) -> NamedNode:
+    try:
+        return NamedNode(iri)
+    except ValueError as error:
+        raise InputError(f"{iri!r} is not the name of a graph: {error}") from error
+
+
+def _counted(answers: Iterable[Any]) -> Iterator[Any]:
+    for count, answer in enumerate(answers):
+        if count == MOST_ROWS:
+            raise InputError(f"the query has more than {MOST_ROWS:,} answers: add a LIMIT or narrow the query")
+        yield answer

@@ -1,0 +1,108 @@
+"""SPARQL updates that keep the default graph the union of the named graphs.
+
+Who writes an update sees one graph, the union, beside the named ones. What it puts there belongs to no source, so it
+goes into a named graph of its own; what it takes from there is taken from every named graph that holds it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+
+from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge.store.blank_nodes import has_blank_node
+from irtwin.knowledge.store.keywords import parse_update, refuse_service_and_load
+from irtwin.knowledge.store.sparql_text import SPACE, after_prologue
+from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE, PREFIXES
+
+_BEFORE = f"{GRAPH}before"  # there only while an update lasts
+_DATA = re.compile(rf"(INSERT|DELETE){SPACE}DATA", re.IGNORECASE | re.ASCII)
+
+
+def check(text: str, base: str | None, on_server: bool = False) -> None:
+    """Raise InputError where a text is no update, by the writer's own lines and columns, or reads from elsewhere."""
+    refuse_service_and_load(text, base, on_server)
+    try:
+        parse_update(text, base)
+    except SyntaxError as error:
+        raise InputError(f"not a SPARQL update: {_in_place(text, base) or error}") from error
+
+
+def as_change(
+    text: str, holding: Callable[[Iterable[Triple]], Iterable[Quad]], base: str | None = None
+) -> tuple[set[Quad], set[Quad]] | None:
+    """Return the quads of named graphs that an update takes out and puts in, where its text alone tells: or None.
+
+    It does where it is one INSERT DATA or DELETE DATA without blank nodes. `holding` finds the quads of named graphs
+    that say one of some triples. The text has passed `check`.
+    """
+    start = after_prologue(text)
+    head = _DATA.match(text, start)
+    if head is None:
+        return None
+    prologue, data = text[:start], text[head.end() :].rstrip(" \t\r\n;")
+    # A group is one INSERT's template as well: what follows it would not be let through here.
+    if not _parses(f"{prologue}INSERT {data}\nWHERE {{ }}", base):
+        return None
+    named, union = _inserted(f"{prologue}INSERT DATA {data}", base)
+    if has_blank_node(named) or has_blank_node(union):
+        return None
+    if head[1].lower() == "delete":
+        return named | set(holding(union)), set()
+    new = union - {quad.triple for quad in (*named, *holding(union))}
+    graph = NamedNode(GRAPH_UPDATE)
+    return set(), named | {Quad(triple.subject, triple.predicate, triple.object, graph) for triple in new}
+
+
+def keeping_union(text: str, base: str | None = None) -> str:
+    """Return an update that does what `text` says, and what the union then needs, in one transaction.
+
+    The text has passed `check`.
+    """
+    start = after_prologue(text)
+    prologue, operations = text[:start], text[start:]
+    if not operations:
+        return prologue
+    # A text may end with a semicolon, or with a comment that the new line ends.
+    semicolon = ";" if _parses(f"{text}\n; CLEAR DEFAULT", base) else ""
+    # Oxigraph takes a prologue before the first operation only, so it stays in front.
+    return f"""{prologue}
+COPY DEFAULT TO <{_BEFORE}> ;
+{operations}
+{semicolon}
+INSERT {{ GRAPH <{GRAPH_UPDATE}> {{ ?s ?p ?o }} }}
+WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?o }} }} }} ;
+DELETE {{ GRAPH ?g {{ ?s ?p ?o }} }}
+WHERE {{ GRAPH <{_BEFORE}> {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} GRAPH ?g {{ ?s ?p ?o }} }} ;
+DROP SILENT GRAPH <{_BEFORE}> ;
+DELETE {{ ?s ?p ?o }} WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?o }} }} }} ;
+INSERT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} }}"""
+
+
+def _parses(text: str, base: str | None) -> bool:
+    try:
+        parse_update(text, base)
+    except SyntaxError:
+        return False
+    return True
+
+
+def _in_place(text: str, base: str | None) -> SyntaxError | None:
+    """Return what the parser says of a text as it was written, which is known to be no update."""
+    try:
+        Store().update(text, base_iri=base, prefixes=PREFIXES)
+    except SyntaxError as error:
+        return error
+    except RuntimeError:
+        return None
+    return None
+
+
+def _inserted(text: str, base: str | None) -> tuple[set[Quad], set[Triple]]:
+    """Return what an INSERT DATA puts into named graphs, and into the union."""
+    store = Store()
+    store.update(text, base_iri=base, prefixes=PREFIXES)
+    union = set(store.quads_for_pattern(None, None, None, DefaultGraph()))
+    return set(store) - union, {quad.triple for quad in union}

@@ -1,0 +1,1 @@
+"""Robots that are watched: their samples into storage, the graph kept current."""

@@ -1,0 +1,153 @@
+"""A live run as rows of the database: while it lasts from its newest state, at its end from all its samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from irtwin.live.joint_stream import State
+from irtwin.providers.records import run_iri
+from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
+from irtwin.storage.journal import Header, Rows
+from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunState
+
+PREFIXES = ("q", "dq", "tau", "temp")  # of the columns for a State's values of each joint, as in a log
+_MADE: dict[str, type[Base]] = {"run_state": RunState, "joint_state": JointState, "live_state": LiveState}
+Values = dict[str, Any]
+Tables = dict[str, list[Values]]  # table -> rows, by column
+
+
+@dataclass(frozen=True)
+class Newest:
+    """What is told of a joint's state, each (n,): position rad, speed rad/s, acceleration rad/s2, torque N m, degC."""
+
+    time: float
+    position: Sequence[float]
+    speed: Sequence[float]
+    acceleration: Sequence[float]
+    torque: Sequence[float]
+    temperature: Sequence[float]
+
+
+def columns(joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns of a journal."""
+    return ("time", *(f"{prefix}_{joint}" for prefix in PREFIXES for joint in joints), "power")
+
+
+def journal_rows(states: Sequence[State]) -> Rows:
+    """Return states as rows of a journal, (N, columns)."""
+    return np.array([(s.time, *s.position, *s.velocity, *s.effort, *s.temperature, s.power) for s in states])
+
+
+def speed_of(state: State, before: State) -> Sequence[float]:
+    """Return the speed that a state says, else the one by which its position differs from the state before."""
+    if not math.isnan(state.velocity[0]):
+        return state.velocity
+    step = state.time - before.time
+    return [(now - was) / step for now, was in zip(state.position, before.position, strict=True)]
+
+
+def moving(speed: Sequence[float], fastest: Sequence[float]) -> bool:
+    """Whether a joint moves, by the bounds by which a recorded run is judged; fastest: (n,) speeds so far."""
+    return any(abs(now) >= max(STILL_SPEED, STILL_SHARE * top) for now, top in zip(speed, fastest, strict=True))
+
+
+def rows(
+    header: Header, joints: Sequence[str], began: float, count: int, at: Newest, current_state: str, live: Values
+) -> Tables:
+    """Return the rows of a run: `began` and `at.time` in s since 1970, `live` what else its live_state says."""
+    activity_id = f"{LIVE}.{header.run_id}"
+    run = {
+        "run_id": header.run_id,
+        "robot_id": header.robot_id,
+        "name": header.run_id.removeprefix(f"{header.robot_id}."),
+        "role": LIVE,
+        "payload_kg": header.payload_kg,
+        "start_time": _moment(began),
+        "start_time_from": "log",
+        "run_time_s": at.time - began,
+        "sample_count": count,
+    }
+    activity = {
+        "activity_id": activity_id,
+        "robot_id": header.robot_id,
+        "provider": LIVE,
+        "subject": run_iri(header.run_id),
+        "started": _moment(began),
+        "software": f"irtwin {version('irtwin')}",
+    }
+    made = {"run_id": header.run_id, "activity_id": activity_id}
+    return {
+        "run": [run],
+        "activity": [activity],
+        "run_state": [{**made, "current_state": current_state}],
+        "joint_state": [{**made, **joint} for joint in _joint_states(header.robot_id, joints, at)],
+        "live_state": [{**made, "state_time": _moment(at.time), **live}],
+    }
+
+
+def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa.Table]:
+    """Return the rows of a run that is over, and its series: a channel that was never said is left out."""
+    joints = [name.removeprefix("q_") for name in header.columns if name.startswith("q_")]
+    by_prefix = dict(zip(PREFIXES, np.split(samples[:, 1:-1], len(PREFIXES), axis=1), strict=True))
+    time, began = samples[:, 0], float(samples[0, 0])
+    speed = _speeds(time, by_prefix)
+    size = np.nan_to_num(np.abs(speed))
+    still = size < np.maximum(STILL_SPEED, STILL_SHARE * size.max(axis=0))
+    acceleration = np.diff(speed, axis=0, prepend=np.nan)[-1] / np.diff(time, prepend=np.nan)[-1]
+    torque, temperature = by_prefix["tau"][-1].tolist(), by_prefix["temp"][-1].tolist()
+    last = by_prefix["q"][-1].tolist(), speed[-1].tolist(), acceleration.tolist()
+    at = Newest(float(time[-1]), *last, torque, temperature)
+    idle = still.all(axis=1)
+    tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
+    length = at.time - began
+    tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else 0.0}
+    tables["run"][0] |= {f"payload_com_{axis}_m": 0.0 for axis in "xyz"}
+    tables["activity"][0] |= {"ended": _moment(at.time)}
+    tables["run_state"][0] |= {"idle_share": float(idle.mean())}
+    table = {"time": time - began, **dict(zip(header.columns[1:], samples.T[1:], strict=True))}
+    return tables, pa.table({name: values for name, values in table.items() if not np.isnan(values).all()})
+
+
+def records(tables: Tables) -> tuple[Run, Activity, list[Base]]:
+    """Return the rows as the database takes them: the run, its activity, and what that made."""
+    made = [kind(**values) for name, kind in _MADE.items() for values in tables[name]]
+    return Run(**tables["run"][0]), Activity(**tables["activity"][0]), made
+
+
+def _speeds(time: Rows, by_prefix: dict[str, Rows]) -> Rows:
+    """Return the speeds that were said, else those by which positions differ, (N, n); NaN at the first then."""
+    steps = np.diff(by_prefix["q"], axis=0, prepend=np.nan) / np.diff(time, prepend=np.nan)[:, None]
+    return np.where(np.isnan(by_prefix["dq"]), steps, by_prefix["dq"])
+
+
+def _joint_states(robot_id: str, joints: Sequence[str], at: Newest) -> list[Values]:
+    values = zip(joints, at.position, at.speed, at.acceleration, at.torque, at.temperature, strict=True)
+    return [
+        {
+            "robot_id": robot_id,
+            "joint": joint,
+            "joint_position_rad": position,
+            "joint_speed_rad_s": _known(speed),
+            "joint_acc_rad_s2": _known(acceleration),
+            "joint_torque_nm": _known(torque),
+            "joint_temperature_degc": _known(temperature),
+        }
+        for joint, position, speed, acceleration, torque, temperature in values
+    ]
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _moment(seconds: float) -> datetime:
+    """Return a time as the database keeps it: UTC without its zone."""
+    return datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)

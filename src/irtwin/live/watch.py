@@ -1,0 +1,68 @@
+"""Robots watched from the command line: from a stream to storage and graph."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
+from pathlib import Path
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.live.joint_stream import StateReader, feed, lines_of, listening
+from irtwin.live.live_twin import LiveTwin
+from irtwin.storage.database import Workspace
+from irtwin.storage.files import told_when_full
+
+SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
+_MOST_REASONS = 20  # said of refused lines
+
+
+def watch(
+    workspace: Path,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+    port: int | None = None,
+    announce: Callable[[str], None] = lambda line: None,
+) -> None:
+    """Watch a workspace's robots until the stream on standard input ends, or SIGINT or SIGTERM comes.
+
+    With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
+    """
+    sys.setswitchinterval(SWITCH)
+    refused: Counter[str] = Counter()
+    done = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: done.set())
+
+    def refuse(reason: str) -> None:
+        refused[reason] += 1
+        if refused[reason] == 1 and len(refused) <= _MOST_REASONS:
+            announce(f"line refused: {reason}")
+
+    with (
+        told_when_full(workspace),
+        Workspace.existing(workspace, database) as place,
+        KnowledgeGraph.of_workspace(place, graph_url) as graph,
+        LiveTwin(place, graph, announce) as twin,
+    ):
+        reader = StateReader(twin.joints, twin.names)
+
+        def take(lines: Iterable[bytes]) -> None:
+            feed(lines, reader, twin.receive, refuse)
+
+        def take_standard_input() -> None:
+            take(lines_of(sys.stdin.buffer))
+            done.set()
+
+        if port is None:
+            threading.Thread(target=take_standard_input, daemon=True).start()
+        with nullcontext() if port is None else listening(port, take) as actual:
+            announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
+            while not done.wait(0.2):
+                twin.check()
+    announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
+    announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")

@@ -1,0 +1,88 @@
+"""A run while it is watched: its newest state, and what still has to go into storage and into the graph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from pyoxigraph import Quad
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping import RowMapper
+from irtwin.live import live_run
+from irtwin.live.joint_stream import State
+from irtwin.storage.journal import Header, Journal
+
+HOLE = 60.0  # s without a state: the run is over, and the next begins
+
+
+@dataclass
+class WatchedRun:
+    """A run that lasts. `waiting` is for storage; `shown` is what the graph says of it, None where that is unknown.
+
+    `doubted` is a state whose time leaps: the next one tells whether a new run begins with it, or its time was wrong.
+    """
+
+    header: Header
+    joints: Sequence[str]
+    journal: Journal
+    fastest: list[float]
+    began: float = math.nan
+    newest: State | None = None
+    speed: Sequence[float] = ()
+    acceleration: Sequence[float] = ()
+    count: int = 0
+    superseded: int = 0
+    due: bool = False  # the graph lacks the newest state
+    over: bool = False
+    waiting: list[State] = field(default_factory=list)
+    shown: set[Quad] | None = field(default_factory=set)
+    doubted: State | None = None
+    _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
+
+    @property
+    def length(self) -> float:
+        """Seconds from the first state to the newest."""
+        return 0.0 if self.newest is None else self.newest.time - self.began
+
+    def is_next(self, state: State) -> bool:
+        """Whether a state follows the newest. Raises InputError where it comes late: as old, or a little older."""
+        if self.newest is None:
+            return True
+        if -HOLE < state.time - self.newest.time <= 0:
+            raise InputError(f"{state.robot_id}: a state that is not later than the one before; not stored")
+        return 0 < state.time - self.newest.time <= HOLE
+
+    def take(self, state: State) -> None:
+        """Take the next state, of a later time than the one before."""
+        before, speed_before = self.newest, self.speed
+        if before is None:
+            self.began, self.speed, self.acceleration = state.time, state.velocity, (math.nan,) * len(self.joints)
+        else:
+            step = state.time - before.time
+            self.speed = live_run.speed_of(state, before)
+            self.acceleration = [(now - was) / step for now, was in zip(self.speed, speed_before, strict=True)]
+        self.fastest = [max(top, abs(now)) for top, now in zip(self.fastest, self.speed, strict=True)]
+        self.newest = state
+        self.count += 1
+        self.waiting.append(state)
+
+    def tables(self, waited: float) -> live_run.Tables:
+        """Return the rows of the run as it is now."""
+        now = self.newest
+        assert now is not None
+        at = live_run.Newest(now.time, now.position, self.speed, self.acceleration, now.effort, now.temperature)
+        current = "moving" if live_run.moving(self.speed, self.fastest) else "standstill"
+        return live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
+
+    def mapped(self, tables: live_run.Tables, mapper: RowMapper) -> set[Quad]:
+        """Return the quads of the rows; those of tables that are as before are not made again."""
+        for table, rows in tables.items():
+            if table not in self._mapped or self._mapped[table][0] != rows:
+                self._mapped[table] = rows, set(mapper.quads(table, rows))
+        return set().union(*(quads for _, quads in self._mapped.values()))
+
+    def counts(self, waited: float) -> live_run.Values:
+        """Return what the graph says of how well it kept up."""
+        return {"superseded_states": self.superseded, "waited_s": waited}

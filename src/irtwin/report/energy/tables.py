@@ -1,0 +1,147 @@
+"""Tables of a page that turn or group the rows of their questions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.report import wording
+from irtwin.report.questions import Row
+
+Explain = Callable[[str, str, str], Explanation | None]  # subject, predicate and object, by their IRIs
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A parameter's value and 95 % interval as text; `holds_zero` where the interval does."""
+
+    value: str
+    interval: str | None
+    holds_zero: bool
+
+
+@dataclass(frozen=True)
+class Line:
+    """A parameter of one effect: `cells` by joint, or the one `cell` of a parameter of no joint."""
+
+    label: str
+    name: str
+    unit: str | None
+    cells: dict[str, Cell]
+    cell: Cell | None = None
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Parameters of joints, one line each; the others as (effect's label, lines)."""
+
+    joints: tuple[str, ...]
+    per_joint: tuple[Line, ...]
+    others: tuple[tuple[str, tuple[Line, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What was concluded, about which individuals, by which reasoner or rules, and how the first is known."""
+
+    label: str
+    definition: str | None
+    about: tuple[str, ...]
+    by: tuple[str, ...]
+    known: Explanation | None
+
+
+# A rigid body's parameters are many, and few people read them one by one: they stay a list.
+_MATRIX_NAMES = 4
+
+
+def parameters(rows: Sequence[Row], joints: Sequence[Row]) -> Parameters:
+    """Arrange a twin's parameters: one line for each that joints have, lists for the rest."""
+    per_joint: list[Line] = []
+    others: list[tuple[str, tuple[Line, ...]]] = []
+    for _, group in groupby(rows, key=lambda row: row["effect"]):
+        of_effect = list(group)
+        names = {row["name"] for row in of_effect}
+        if all(row["joint"] for row in of_effect) and len(names) <= _MATRIX_NAMES:
+            per_joint += [_line([row for row in of_effect if row["name"] == name]) for name in sorted(names)]
+        else:
+            in_order = sorted(of_effect, key=lambda row: _natural(row["name"]))
+            others.append((_label(of_effect[0]), tuple(_single(row) for row in in_order)))
+    return Parameters(tuple(row["joint"] for row in joints), tuple(per_joint), tuple(others))
+
+
+def fits(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
+    """Return the torque fits by joint and part."""
+    by_joint: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        by_joint.setdefault(row["joint"], {})[row["part"]] = row
+    return by_joint
+
+
+def run_fits(rows: Sequence[Row]) -> dict[tuple[str, str], dict[str, Row]]:
+    """Return the torque fits by (run, part), and for each by joint."""
+    by_run: dict[tuple[str, str], dict[str, Row]] = {}
+    for row in rows:
+        by_run.setdefault((row["run_name"], row["part"]), {})[row["joint"]] = row
+    return by_run
+
+
+def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> tuple[Conclusion, ...]:
+    """Gather the individuals about which the same was concluded; `explain` says of one how it is known."""
+    gathered = []
+    for iri, group in groupby(rows, key=lambda row: row["conclusion"]):
+        found = list(group)
+        gathered.append(
+            Conclusion(
+                label=found[0]["label"] or wording.local_name(iri).replace("_", " "),
+                definition=found[0]["definition"],
+                about=tuple(dict.fromkeys(_about(row) for row in found)),
+                by=tuple(dict.fromkeys(_reasoner(row["concluded_by"]) for row in found)),
+                known=None
+                if explain is None
+                else explain(*(found[0][name] for name in ("about", "property", "object"))),
+            )
+        )
+    return tuple(gathered)
+
+
+def _about(row: Row) -> str:
+    name = row["about_name"] or wording.local_name(row["about"])
+    return f"{name}: {row['value']}" if row["value"] else str(name)
+
+
+def _reasoner(graph: str) -> str:
+    kind = graph.partition("/")[0]
+    return {"owl_rl": "OWL 2 RL reasoning", "swrl": "SWRL rules", "shacl": "SHACL rules"}.get(kind, kind)
+
+
+def _natural(name: str) -> list[str | int]:
+    """Return a sorting key by which base_2 comes before base_10."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+
+
+def _label(row: Row) -> str:
+    return row["label"] or wording.local_name(row["effect"]).replace("_", " ")
+
+
+def _line(rows: Sequence[Row]) -> Line:
+    first = rows[0]
+    return Line(_label(first), first["name"], first["unit"], {row["joint"]: _cell(row) for row in rows})
+
+
+def _single(row: Row) -> Line:
+    name = f"{row['name']} of {row['joint']}" if row["joint"] else row["name"]
+    return Line(_label(row), name, row["unit"], {}, _cell(row))
+
+
+def _cell(row: Row) -> Cell:
+    lower: Any = row["lower"]
+    upper: Any = row["upper"]
+    if lower is None or upper is None:
+        return Cell(wording.number(row["value"]), None, False)
+    value, interval = wording.interval(row["value"], lower, upper)
+    return Cell(value, interval, lower <= 0 <= upper)

@@ -1,0 +1,299 @@
+"""Figures of the gap report: curves and maps come from the diagnosis' evidence, which the graph names."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from irtwin.report import wording
+from irtwin.report.energy.figures import MEASURED, PALETTE, Figure, plain
+from irtwin.report.gap import document as gap_document
+from irtwin.report.questions import Answers
+
+Evidence = Mapping[str, Any]
+
+BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
+_CAUSES = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#004C78", "#7FC8A9")
+_SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
+_BANDED = 0.25
+_TICKS = (0, 1, 3, 10, 30, 100, 300)
+_DECADES = (0, 10, 100, 1000, 10_000, 100_000, 1_000_000)
+_WIDE = 2.6  # decades of excess
+_LEAST_TOP = 3.0  # excess at which the scale ends where there is none larger: noise must not look like a gap
+_JOINTS_DRAWN = 7
+_CURVES = 3  # of one effect
+
+
+def figures(answers: Answers, evidence: Evidence, document: Evidence) -> dict[str, Figure]:
+    """Return every figure that there is evidence for, by name; `document`: the diagnosis itself."""
+    drawn = {"heat_map": heat_map(evidence.get("heat_map") or {})}
+    for place, curve in enumerate(evidence.get("follows") or []):
+        drawn[f"follows_{place}"] = follows(curve, effect_names(answers))
+    for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
+        if name == "runs_power" or joint is not None:
+            drawn[name] = runs(evidence.get("runs") or [], joint)
+    drawn["by_cause"] = by_cause(answers)
+    drawn["budget"] = budget(answers, document)
+    drawn["experiment"] = experiment(evidence.get("experiment") or {})
+    return {name: figure for name, figure in drawn.items() if figure is not None}
+
+
+def foremost_joint(answers: Answers) -> str | None:
+    """Return the joint with the largest share of the gap, None where no torque shows one."""
+    joints = (row["joint"] for row in answers["locations"].rows if row["channel"] == "torque" and row["joint"])
+    return next(joints, None)
+
+
+def heat_map(given: Evidence) -> Figure | None:
+    """Draw the excess of each joint in each regime."""
+    if not given.get("joints") or not given.get("regimes"):
+        return None
+    values = given["excess"]
+    known = [value for row in values for value in row if value is not None]
+    if not known:
+        return None
+    regimes = [plain(name.replace("_", " ")) for name in given["regimes"]]
+    top = math.log10(1 + max(_LEAST_TOP, *known))
+    ticks = [tick for tick in (_TICKS if top < _WIDE else _DECADES) if math.log10(1 + tick) <= top]
+    cells = {
+        "type": "heatmap", "x": regimes, "y": [plain(name) for name in given["joints"]], "zmin": 0, "zmax": top,
+        "z": [[None if value is None else math.log10(1 + max(value, 0.0)) for value in row] for row in values],
+        "customdata": values, "colorscale": _SHADES, "xgap": 2, "ygap": 2, "hoverongaps": False,
+        "text": [[_cell(value) for value in row] for row in values], "texttemplate": "%{text}",
+        "colorbar": {
+            "title": {"text": "excess"}, "thickness": 10, "outlinewidth": 0, "tickmode": "array",
+            "tickvals": [math.log10(1 + tick) for tick in ticks], "ticktext": [f"{tick:,}" for tick in ticks],
+        },
+        "hovertemplate": "%{y}, %{x}<br>excess %{customdata:.3~g}<extra></extra>",
+    }  # fmt: skip
+    axes = {
+        "xaxis": {"type": "category", "side": "top", "tickangle": -55},
+        "yaxis": {"type": "category", "autorange": "reversed"},
+    }
+    return {"data": [cells], "layout": {**axes, "hovermode": "closest", "margin": {"l": 80, "r": 12, "t": 95, "b": 12}}}
+
+
+def foremost_curves(curves: Sequence[Evidence], answers: Answers) -> list[Evidence]:
+    """Return the curves of each effect at the joints where most of the gap lies; an arm has too many to show all."""
+    order = list(dict.fromkeys(row["joint"] for row in answers["locations"].rows))
+    ranks = {joint: place for place, joint in enumerate(order)}
+    of_effect: dict[str | None, list[int]] = {}
+    for place, curve in enumerate(curves):
+        of_effect.setdefault(curve.get("effect"), []).append(place)
+    kept = [
+        place
+        for places in of_effect.values()
+        for place in sorted(places, key=lambda k: ranks.get(curves[k].get("joint"), len(ranks)))[:_CURVES]
+    ]
+    return [curves[place] for place in sorted(kept)]
+
+
+def effect_names(answers: Answers) -> dict[str, str]:
+    """Return what the ontology calls the effects that the diagnosis names, by their ids."""
+    named = [
+        (row[key], row["label"])
+        for question, key in (("causes", "effect"), ("rivals", "rival"), ("not_testable", "effect"))
+        for row in answers[question].rows
+    ]
+    return {wording.local_name(effect): label for effect, label in named if label}
+
+
+def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
+    """Draw the residual against the variable that it follows, and the effect's curve on it."""
+    unit = "W" if curve.get("channel") == "power" else "N m"
+    x, data = list(curve["x"]), []
+    if curve.get("low") and curve.get("high"):
+        edge = {
+            "type": "scatter",
+            "mode": "lines",
+            "x": x,
+            "line": {"width": 0},
+            "hoverinfo": "skip",
+            "showlegend": False,
+        }
+        band = {"fill": "tonexty", "fillcolor": f"rgba(95,109,122,{_BANDED})", "name": "spread", "showlegend": True}
+        data += [{**edge, "y": list(curve["low"])}, {**edge, "y": list(curve["high"]), **band}]
+    left = f"%{{y:.3~g}} {unit}<extra></extra>"
+    data.append(
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "residual",
+            "x": x,
+            "y": list(curve["residual"]),
+            "marker": {"color": MEASURED, "size": 5},
+            "hovertemplate": f"residual {left}",
+        }
+    )
+    if curve.get("fitted"):
+        effect = curve.get("effect") or "fitted_curve"
+        name = plain(names.get(effect, effect.replace("_", " ")))
+        line = {"color": PALETTE[5], "width": 2.5}
+        data.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": name,
+                "x": x,
+                "y": list(curve["fitted"]),
+                "line": line,
+                "hovertemplate": f"{name} {left}",
+            }
+        )
+    variable = curve["variable"].replace("_", " ")
+    unit_of_x = wording.unit_symbol(curve.get("unit"))
+    title = f"{variable}, {unit_of_x}" if unit_of_x else variable
+    xaxis = {"type": "linear", "title": {"text": plain(title)}, "zeroline": True}
+    return {"data": data, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"residual, {unit}"}}}}
+
+
+def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
+    """Draw the RMSE of each held-out run before and after, with its noise floor; power where `joint` is None.
+
+    None where nothing changed.
+    """
+    rows = [row for row in given if row.get("joint") == joint]
+    if all(row.get("before") == row.get("after") for row in rows):
+        return None
+    unit = "W" if joint is None else "N m"
+    names = _numbered([plain(row["run"]) for row in rows])
+    data: list[dict[str, Any]] = [
+        {
+            "type": "bar", "name": name, "x": names, "y": [row.get(key) for row in rows], "marker": {"color": colour},
+            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
+        }
+        for name, key, colour in (("before", "before", BEFORE), ("with the causes added", "after", AFTER))
+    ]  # fmt: skip
+    if any(row.get("floor") is not None for row in rows):
+        marker = {"symbol": "line-ew", "size": 34, "line": {"color": FLOOR, "width": 2}}
+        data.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "noise floor",
+                "x": names,
+                "y": [row.get("floor") for row in rows],
+                "marker": marker,
+                "hovertemplate": f"noise floor %{{y:.3~g}} {unit}<extra></extra>",
+            }
+        )
+    yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
+    return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis}}
+
+
+def by_cause(answers: Answers) -> Figure | None:
+    """Draw the RMSE that is left with each cause alone, and with all causes but it; the foremost channel's.
+
+    None for a single cause, which the table says.
+    """
+    of_any = answers["changes_by_cause"].rows
+    rows = [row for row in of_any if row["measure"] == of_any[0]["measure"]]
+    if len({row["rank"] for row in rows}) < 2:
+        return None
+    unit = rows[0]["unit"]
+    place_of = {row["rank"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
+    rows = sorted(rows, key=lambda row: place_of[row["rank"]])
+    data = []
+    for name, part, colour in (("cause alone", "alone", AFTER), ("all causes but this one", "without", PALETTE[4])):
+        of_part = [row for row in rows if row["part"] == part]
+        bars = {
+            "type": "bar", "name": name, "x": [plain(f"{place_of[row['rank']]}. {row['label']}") for row in of_part],
+            "y": [row["after"] for row in of_part], "marker": {"color": colour},
+            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
+        }  # fmt: skip
+        data.append(bars)
+    line = {"color": BEFORE, "width": 1.5, "dash": "dash"}
+    before = rows[0]["before"]
+    shape = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": before, "y1": before, "line": line}
+    note = {
+        "x": 0.995, "xref": "paper", "xanchor": "right", "y": before, "yanchor": "bottom", "showarrow": False,
+        "text": "before", "font": {"color": BEFORE}, "bgcolor": "rgba(255,255,255,0.85)",
+    }  # fmt: skip
+    yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
+    return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
+
+
+def budget(answers: Answers, document: Evidence) -> Figure | None:
+    """Draw where each channel's gap goes: closed by each cause, closeable without a name, and what is left."""
+    given = gap_document.budgets(document)
+    if not given:
+        return None
+    names, parts = list(given), gap_document.shares(document)
+    data = []
+
+    def bar(name: str, of_channel: Mapping[str, float], colour: str) -> None:
+        data.append(
+            {
+                "type": "bar", "orientation": "h", "name": plain(name), "y": names, "marker": {"color": colour},
+                "x": [100 * of_channel.get(channel, 0.0) for channel in names],
+                "hovertemplate": f"{plain(name)} %{{x:.3~g}} %<extra></extra>",
+            }
+        )  # fmt: skip
+
+    channel_of = {
+        rank: (cause.get("evidence") or {}).get("channel", "torque")
+        for rank, cause in enumerate(document["causes"], start=1)
+    }
+    for place, row in enumerate(answers["causes"].rows):
+        channel, share = channel_of[row["rank"]], max(parts.get(row["rank"], 0.0), 0.0)
+        if channel in given and share:
+            whole = sum(max(parts.get(rank, 0.0), 0.0) for rank, of in channel_of.items() if of == channel)
+            name = str(row["label"] or wording.local_name(row["effect"]).replace("_", " "))
+            bar(
+                f"{place + 1}. {name}",
+                {channel: given[channel]["closed"] * share / whole},
+                _CAUSES[place % len(_CAUSES)],
+            )
+    bar("could be closed, cause unknown", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
+    bar("not closed", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
+    xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
+    layout = {"barmode": "stack", "xaxis": xaxis, "yaxis": {"type": "category", "autorange": "reversed"}}
+    legend = {
+        "orientation": "h", "x": 0, "y": 1, "yanchor": "bottom", "xanchor": "left", "traceorder": "normal",
+    }  # fmt: skip
+    return {"data": data, "layout": {**layout, "hovermode": "closest", "bargap": 0.35, "legend": legend}}
+
+
+def experiment(curve: Evidence) -> Figure | None:
+    """Draw the positions that the proposed experiment commands."""
+    if not curve.get("q"):
+        return None
+    units = curve.get("units") or ["rad"] * len(curve["joints"])
+    lines = [
+        {
+            "type": "scatter", "mode": "lines", "name": plain(joint), "x": curve["time"], "y": q,
+            "line": {"width": 1.5, "color": PALETTE[place % len(PALETTE)]},
+            "hovertemplate": f"{plain(joint)} %{{y:.3~g}} {unit}<extra></extra>",
+        }
+        for place, (joint, unit, q) in enumerate(zip(curve["joints"], units, curve["q"], strict=True))
+        if place < _JOINTS_DRAWN
+    ]  # fmt: skip
+    xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
+    return {
+        "data": lines,
+        "layout": {
+            "xaxis": xaxis,
+            "yaxis": {"title": {"text": f"position, {' or '.join(sorted(set(units), reverse=True))}"}},
+        },
+    }
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Return names with a number where one stands more than once: the stretches of a run."""
+    total, count = Counter(names), Counter[str]()
+    found = []
+    for name in names:
+        count[name] += 1
+        found.append(f"{name}, part {count[name]}" if total[name] > 1 else name)
+    return found
+
+
+def _cell(value: float | None) -> str:
+    """Write an excess short enough for a cell."""
+    if value is None:
+        return ""
+    if abs(value) < 10:
+        return f"{round(value, 1) + 0.0:.1f}".replace("-", "\N{MINUS SIGN}")  # no -0.0
+    return f"{value:.0f}" if value < 10_000 else f"{value / 1000:.0f}k"

@@ -1,0 +1,211 @@
+"""The ontology's documentation: one HTML page that opens offline, with an anchor for each term."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+from pyoxigraph import NamedNode, RdfFormat, Store
+
+from irtwin import resources
+from irtwin.knowledge.store.table import to_python
+from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS, shorten
+from irtwin.report.energy.page import content_policy, environment
+from irtwin.report.ontology.class_tree import Node, class_tree
+from irtwin.storage.files import check_place, write
+
+KINDS = {
+    "Class": "Classes",
+    "ObjectProperty": "Object properties",
+    "DatatypeProperty": "Data properties",
+    "AnnotationProperty": "Annotation properties",
+    "NamedIndividual": "Individuals",
+}
+CHARACTERISTICS = {
+    f"{OWL}FunctionalProperty": "functional",
+    f"{OWL}InverseFunctionalProperty": "inverse functional",
+    f"{OWL}SymmetricProperty": "symmetric",
+    f"{OWL}TransitiveProperty": "transitive",
+}
+# A link that the page shows at the term that it leads to, too, and what it is called there.
+BACK = {
+    "subclass of": "subclasses",
+    "sub-property of": "sub-properties",
+    "domain": "in the domain of",
+    "range": "in the range of",
+}
+_BUILT_IN = (OWL, RDF, RDFS)
+_ALIGNED = {  # vocabularies that only the alignment speaks of
+    "sosa": "http://www.w3.org/ns/sosa/",
+    "ssn": "http://www.w3.org/ns/ssn/",
+    "saref": "https://saref.etsi.org/core/",
+    "quantitykind": "http://qudt.org/vocab/quantitykind/",
+}
+
+
+@dataclass
+class Term:
+    """A class, property or individual, with what the page says of it; links lead to IRIs."""
+
+    iri: str
+    kind: str
+    label: str
+    definition: str
+    example: str | None
+    source: str | None
+    unit: str | None
+    unit_symbol: str | None
+    unit_given_by: str | None
+    characteristics: list[str] = field(default_factory=list)
+    links: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    values: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
+
+    @property
+    def anchor(self) -> str:
+        """What stands after `#` in the term's address on the page; for a model's term, as in its IRI."""
+        return self.iri.removeprefix(f"{ONTOLOGY}#").removeprefix(f"{ONTOLOGY}/") if self.own else short(self.iri)
+
+    @property
+    def own(self) -> bool:
+        """Whether it is a term of the model, not one of another vocabulary."""
+        return self.iri.startswith(ONTOLOGY)
+
+
+@dataclass(frozen=True)
+class Module:
+    """A module of the ontology: its header, and its terms by kind."""
+
+    name: str
+    header: Mapping[str, Any]
+    terms: Mapping[str, list[Term]]
+
+
+def write_page(out: Path) -> None:
+    """Write the documentation of the ontology that irtwin ships to `out`. Raises InputError where it cannot be."""
+    check_place(out)
+    write(out, page(read_modules(resources.folder("ontology"))).encode())
+
+
+def read_modules(folder: Path) -> list[Module]:
+    """Read the modules of a folder, in the order in which they build on each other."""
+    store, names = Store(), {}
+    for file in sorted(folder.glob("*.ttl")):
+        iri = ONTOLOGY if file.stem == "irtwin" else f"{ONTOLOGY}/{file.stem}"
+        store.load(path=str(file), format=RdfFormat.TURTLE, to_graph=NamedNode(iri))
+        names[iri] = file.stem
+    headers = {row["module"]: row for row in _ask(store, "modules")}
+    terms = _terms(store)
+    order = [ONTOLOGY, *_imported(store)]
+    return [Module(names[iri], headers[iri], terms.get(iri, {})) for iri in order]
+
+
+def page(modules: list[Module]) -> str:
+    """Return the page."""
+    known = {term.iri: term for module in modules for group in module.terms.values() for term in group}
+    folder = resources.folder("reports")
+    templates = environment(folder)
+    templates.filters["link"] = lambda iri: _link(iri, known)
+    templates.filters["short"] = short
+    return templates.get_template("ontology/page.html.jinja").render(
+        modules=modules,
+        kinds=KINDS,
+        tree=Markup(class_tree(_forests(modules, known))),
+        count=sum(term.own for term in known.values()),
+        policy=content_policy([]),
+        style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
+        page_style=Markup((folder / "ontology" / "style.css").read_text(encoding="utf-8")),
+    )
+
+
+def short(iri: str) -> str:
+    """Return an IRI with its prefix, as the page writes it."""
+    for prefix, namespace in _ALIGNED.items():
+        if iri.startswith(namespace):
+            return f"{prefix}:{iri.removeprefix(namespace)}"
+    return shorten(iri)
+
+
+def _terms(store: Store) -> dict[str, dict[str, list[Term]]]:
+    found: dict[str, dict[str, list[Term]]] = {}
+    known: dict[str, Term] = {}
+    for row in _ask(store, "terms"):
+        kind = row["kind"].removeprefix(OWL)
+        term = Term(
+            row["term"], kind, row["label"], row["definition"], row["example"], row["source"], row["unit"],
+            row["symbol"], row["beside"],
+        )  # fmt: skip
+        known[term.iri] = term
+        found.setdefault(row["module"], {}).setdefault(kind, []).append(term)
+    _add_links(known, _ask(store, "links"))
+    for row in _ask(store, "values"):
+        if row["term"] in known:
+            known[row["term"]].values[row["property"]].append(row["value"])
+    return found
+
+
+def _add_links(known: Mapping[str, Term], rows: Iterable[Mapping[str, Any]]) -> None:
+    for row in rows:
+        term, link, other = known.get(row["term"]), row["link"], row["other"]
+        if term is None:
+            continue
+        if other in CHARACTERISTICS:
+            term.characteristics.append(CHARACTERISTICS[other])
+        elif link == "is":
+            if not other.startswith(_BUILT_IN):
+                term.links["is a"].append(other)
+                if other in known:
+                    known[other].links["individuals"].append(term.iri)
+        else:
+            term.links[link].append(other)
+            if link in BACK and other in known:
+                known[other].links[BACK[link]].append(term.iri)
+
+
+def _imported(store: Store) -> list[str]:
+    """Return the modules that the whole imports, in its order."""
+    text = (resources.folder("ontology") / "irtwin.ttl").read_text(encoding="utf-8")
+    imports = {
+        quad.object.value
+        for quad in store.quads_for_pattern(None, NamedNode(f"{OWL}imports"), None, NamedNode(ONTOLOGY))
+        if isinstance(quad.object, NamedNode)
+    }
+    return sorted(imports, key=text.index)
+
+
+def _forests(modules: list[Module], known: Mapping[str, Term]) -> dict[str, list[Node]]:
+    """Return the trees of each module's classes; superclasses that are not of the module stand beside a class."""
+    forests = {}
+    for module in modules:
+        classes = [term for term in module.terms.get("Class", []) if term.own]
+        if classes:
+            forests[module.name] = list(_nodes(classes, None, known))
+    return forests
+
+
+def _nodes(classes: list[Term], above: str | None, known: Mapping[str, Term]) -> Iterator[Node]:
+    names = {term.iri for term in classes}
+    for term in classes:
+        inside = [parent for parent in term.links["subclass of"] if parent in names]
+        outside = [parent for parent in term.links["subclass of"] if parent not in names]
+        if (inside[0] if inside else None) == above:
+            beside = [known[parent].label if parent.startswith(ONTOLOGY) else short(parent) for parent in outside]
+            yield Node(term.label, term.anchor, beside, list(_nodes(classes, term.iri, known)))
+
+
+def _link(iri: Any, known: Mapping[str, Term]) -> Markup:
+    """Return a link to a term's place on the page, or its short name where it has none."""
+    term = known.get(iri) if isinstance(iri, str) else None
+    if term is None:
+        return Markup("<code>{}</code>").format(short(iri) if isinstance(iri, str) else iri)
+    return Markup('<a href="#{}">{}</a>').format(term.anchor, term.label if term.own else short(term.iri))
+
+
+def _ask(store: Store, name: str) -> list[dict[str, Any]]:
+    text = (resources.folder("reports") / "ontology" / f"{name}.rq").read_text(encoding="utf-8")
+    solutions: Any = store.query(text, use_default_graph_as_union=True)
+    columns = [variable.value for variable in solutions.variables]
+    return [{name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in solutions]
