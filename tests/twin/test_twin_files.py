@@ -46,7 +46,7 @@ def spoil(document, *keys, value=None, drop=False):
 @pytest.mark.parametrize(
     "keys, change, message",
     [
-        (("format",), {"value": "gcode"}, '"format" is not "irtwin twin"; give a twin that irtwin saved'),
+        (("format",), {"value": "gcode"}, '"format" is not "irtwin twin"; name a twin that irtwin saved'),
         (("version",), {"value": 9}, '"version" is not 1; identify the twin again'),
         (("effects",), {"drop": True}, '"effects" is missing'),
         (("effects",), {"value": ["rigid_body", "magic"]}, 'there is no effect "magic"'),

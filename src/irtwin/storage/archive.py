@@ -92,7 +92,7 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
         raise foreign
     if said.get("version") != _FORMAT["version"]:
         raise InputError(
-            f"{archive}: made by another version of irtwin ({said.get('software')}); restore it with that version"
+            f"{archive}: made by another irtwin version ({said.get('software')}); restore it with that one"
         )
     try:
         listed = {str(name): (str(one["sha256"]), int(one["size"])) for name, one in said["files"].items()}

@@ -71,7 +71,7 @@ class Workspace:
             robots = session.scalar(select(func.count()).select_from(Robot))
         if robots and not (self.graph_folder / "CURRENT").is_file():
             raise InputError(
-                f"{self.graph_folder}: the graph or some of its files are missing; the database is intact: "
+                f"{self.graph_folder}: the graph is missing, or some of its files; the database is intact: "
                 f"`irtwin repair --workspace {self.folder}` rebuilds the graph from it (if a server keeps the "
                 "graph, give --graph)"
             )
