@@ -138,7 +138,7 @@ def test_documents(refused: Callable[..., str], folder: Path, name: str) -> None
     [
         ("nonsense", "the database URL cannot be read"),
         ("sqlite:////nowhere/data.db", "no such SQLite database"),
-        ("sqlite:////etc/passwd", "cannot open the database"),
+        ("sqlite:////etc/passwd", "file is not a database"),
         ("oracle://user:secret@host/x", "no driver for this database"),
         ("postgresql://user:secret@127.0.0.1:1/x", "cannot open the database"),
     ],

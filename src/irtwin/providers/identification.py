@@ -81,9 +81,10 @@ def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> 
 
 def body_combinations(twin: Twin) -> int | None:
     """Return how many combinations of the bodies' parameters torque tells apart; None where none was measured."""
-    if not twin.base_parameters or "rigid_body" not in twin.effect_ids:
+    bodies = [effect for effect in twin.stack.effects if effect.bodies]
+    if not twin.base_parameters or not bodies:
         return None
-    return len(base_parameters(Stack(twin.robot, ("rigid_body",))).independent)
+    return len(base_parameters(Stack(twin.robot, bodies)).independent)
 
 
 def _runs(twin_id: str, keys: dict[str, str], parts: Split) -> Iterator[schema.TwinRun]:
