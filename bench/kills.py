@@ -23,6 +23,7 @@ import data_sets
 import small_robots
 import synthetic
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_CHANGED
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import named_files
 from irtwin.storage.series import is_whole
@@ -119,7 +120,8 @@ def state(place: Path) -> State:
         named = named_files(session.connection())
         lost = [file.path for file in named if not is_whole(place, file.path, file.sha256)]
         with KnowledgeGraph.of_workspace(workspace) as graph:
-            triples = len(graph.triples())
+            # What is still to be reasoned over or validated is a note of the store, and goes with the next run.
+            triples = len(graph.triples(*(name for name in graph.graphs() if name != GRAPH_CHANGED)))
     paths = {file.path for file in named}
     files = {f"{folder}/{file.name}" for folder in ("series", "twins", "diagnoses") for file in glob(place / folder)}
     hidden = [path.name for path in place.glob(".*")]

@@ -20,6 +20,12 @@ def _server_programs() -> Path | None:
     return found[-1].parent if found else Path(path).parent if path else None
 
 
+@pytest.fixture(autouse=True)
+def keep_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave this process its sockets: a command that is run within it would take them for good."""
+    monkeypatch.setattr("irtwin.knowledge.store.no_network.leave_network", lambda: True)
+
+
 @pytest.fixture(scope="session")
 def new_postgresql_database() -> Iterator[Callable[[], str]]:
     """Give a function that makes an empty database and returns its URL."""

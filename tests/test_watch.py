@@ -51,7 +51,7 @@ def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(workspace: Path) 
         out, said = irtwin("query", question, "--format", "json", "--workspace", folder).communicate(timeout=120)
         assert json.loads(out) == [{"joules": pytest.approx(490.0)}], said
     process = irtwin("restore", archive, "--workspace", after)
-    assert "is there already" in process.communicate(timeout=120)[1]
+    assert "already exists" in process.communicate(timeout=120)[1]
     assert process.returncode == 2
 
 

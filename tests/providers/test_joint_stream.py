@@ -34,7 +34,7 @@ def test_a_robot_is_said_by_its_name_or_its_identifier(said: str) -> None:
     assert reader.read(line(robot=said)).robot_id == "Pr_fstand_3~1"
     with pytest.raises(InputError, match=r"no robot 'Prufstand 3' in the workspace.*known are Prüfstand 3, R$"):
         reader.read(line(robot="Prufstand 3"))
-    with pytest.raises(InputError, match="`name` is to name the joints of Prüfstand 3: a1, a2"):
+    with pytest.raises(InputError, match="`name` must list the joints of Prüfstand 3: a1, a2"):
         reader.read(line(robot=said, name=["a1"]))
 
 

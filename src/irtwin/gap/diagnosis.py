@@ -11,6 +11,7 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
 from irtwin.gap import document
 from irtwin.gap.closed_twin import closed_twin
 from irtwin.gap.data.case import Case, case_of
@@ -109,6 +110,8 @@ def diagnose(
     stack = Stack(case.robot, [*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
+    if case.shows("torque") and plain is not None:
+        _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain)
     explained: list[Explained] = []
     torque = predicted
@@ -153,6 +156,11 @@ def diagnose(
         against=case.against,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
     )
+
+
+def _check_observed(system: System) -> None:
+    if not system.observed.any():
+        raise InputError("in no observed run does a joint move for longer than the filter; log longer runs")
 
 
 def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stack, Torque, Below]:
@@ -207,6 +215,7 @@ def _power(
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
+    _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
     return explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
 

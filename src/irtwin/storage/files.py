@@ -105,5 +105,5 @@ def inside(workspace: Path, path: str) -> Path:
     """Return the file that a workspace's relative path means; InputError where it leads outside."""
     file = (workspace / path).resolve()
     if not file.is_relative_to(workspace.resolve()):
-        raise InputError(f"{workspace}: the path {path!r} leads out of the workspace; nothing was read or written")
+        raise InputError(f"{workspace}: the path {path!r} leads outside the workspace; nothing was read or written")
     return file

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block
 
 _FEWEST_GROUPS = 4
@@ -28,13 +27,8 @@ class Grouping:
         return len({self.label[run] for run in runs if run in self.observed}) < _FEWEST_GROUPS
 
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
-        """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time.
-
-        Raises InputError where none is.
-        """
+        """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""
         observed = np.array([block.run in self.observed for block in blocks])
-        if not observed.any():
-            raise InputError("in no observed run does a joint move for longer than the filter; log longer runs")
         labels = [(block.run in self.observed, self.label[block.run]) for block in blocks]
         if self.few(block.run for block in blocks):
             labels = [(*label, k) for label, k in zip(labels, _stretches(blocks), strict=True)]  # type: ignore[misc]
