@@ -86,6 +86,15 @@ def parse_update(text: str, base: str | None) -> None:
         return
 
 
+def is_update(text: str, base: str | None) -> bool:
+    """Whether a text is an update. Nothing of it is done."""
+    try:
+        parse_update(text, base)
+    except SyntaxError:
+        return False
+    return True
+
+
 def _misspelt(text: str, word: str) -> str | None:
     """Return the text with one letter of the word changed, to a spelling that is not there yet; None if all are.
 

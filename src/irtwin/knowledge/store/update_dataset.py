@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pyoxigraph import NamedNode
 
 from irtwin.errors import InputError
-from irtwin.knowledge.store.keywords import fault_without, parse_update
+from irtwin.knowledge.store.keywords import fault_without, is_update, parse_update
 from irtwin.knowledge.store.sparql_text import after_prologue
 
 MOST_PLACES = 100  # each is tried, and costs some parses
@@ -50,7 +50,9 @@ def using(text: str, default_graphs: Sequence[str], named_graphs: Sequence[str],
 
 def _is_clause(before: str, said: str, after: str, base: str | None) -> bool:
     """Whether USING may stand at a place as a clause, which it does not within a string or a comment."""
-    return _parses(before + said + after, base) and not _parses(before + said.replace("USING", "US_NG") + after, base)
+    return is_update(before + said + after, base) and not is_update(
+        before + said.replace("USING", "US_NG") + after, base
+    )
 
 
 def _pattern(text: str, place: int, base: str | None) -> str:
@@ -59,18 +61,10 @@ def _pattern(text: str, place: int, base: str | None) -> str:
     prologue = text[: after_prologue(text)]
     ends = (found.end() for found in re.compile("}").finditer(text, start))
     for end in _first(ends):
-        if _parses(f"{prologue}DELETE WHERE {text[start:end]}", base):
+        if is_update(f"{prologue}DELETE WHERE {text[start:end]}", base):
             return text[start:end]
     raise InputError("a DELETE WHERE is too long to be given the graphs of the request: write DELETE { } WHERE { }")
 
 
 def _first(ends: Iterator[int]) -> Iterator[int]:
     return (end for end, _ in zip(ends, range(MOST_PLACES), strict=False))
-
-
-def _parses(text: str, base: str | None) -> bool:
-    try:
-        parse_update(text, base)
-    except SyntaxError:
-        return False
-    return True

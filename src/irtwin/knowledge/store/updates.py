@@ -13,7 +13,7 @@ from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.blank_nodes import has_blank_node
-from irtwin.knowledge.store.keywords import parse_update, refuse_service_and_load
+from irtwin.knowledge.store.keywords import is_update, parse_update, refuse_service_and_load
 from irtwin.knowledge.store.sparql_text import SPACE, after_prologue
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE, PREFIXES
 
@@ -44,7 +44,7 @@ def as_change(
         return None
     prologue, data = text[:start], text[head.end() :].rstrip(" \t\r\n;")
     # A group is one INSERT's template as well: what follows it would not be let through here.
-    if not _parses(f"{prologue}INSERT {data}\nWHERE {{ }}", base):
+    if not is_update(f"{prologue}INSERT {data}\nWHERE {{ }}", base):
         return None
     named, union = _inserted(f"{prologue}INSERT DATA {data}", base)
     if has_blank_node(named) or has_blank_node(union):
@@ -66,7 +66,7 @@ def keeping_union(text: str, base: str | None = None) -> str:
     if not operations:
         return prologue
     # A text may end with a semicolon, or with a comment that the new line ends.
-    semicolon = ";" if _parses(f"{text}\n; CLEAR DEFAULT", base) else ""
+    semicolon = ";" if is_update(f"{text}\n; CLEAR DEFAULT", base) else ""
     # Oxigraph takes a prologue before the first operation only, so it stays in front.
     return f"""{prologue}
 COPY DEFAULT TO <{_BEFORE}> ;
@@ -79,14 +79,6 @@ WHERE {{ GRAPH <{_BEFORE}> {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} GRAPH
 DROP SILENT GRAPH <{_BEFORE}> ;
 DELETE {{ ?s ?p ?o }} WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?o }} }} }} ;
 INSERT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} }}"""
-
-
-def _parses(text: str, base: str | None) -> bool:
-    try:
-        parse_update(text, base)
-    except SyntaxError:
-        return False
-    return True
 
 
 def _in_place(text: str, base: str | None) -> SyntaxError | None:
