@@ -13,7 +13,7 @@ test: $(VENV)/test lint
 
 # Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test
-	$(BIN)/python tests/fuzz/fuzz.py
+	$(BIN)/python -m tests.fuzz.fuzz
 
 lint: $(VENV)/test
 	$(BIN)/ruff check .

@@ -19,9 +19,9 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-import small_robots
-from test_damage import DAMAGES
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests import small_robots
+from tests.test_damage import DAMAGES
 
 SLOWEST = 300.0  # s
 SAMPLES = "SELECT ?run (series:mean(?run, 'power', 0, 9) AS ?mean) { ?run a irt:IR_RunProcess } ORDER BY ?run"

@@ -18,10 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-import data_sets
-import small_robots
-import synthetic
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests import data_sets, small_robots, synthetic
+
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_CHANGED
 from irtwin.storage.database import Workspace

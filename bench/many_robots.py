@@ -13,8 +13,9 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-import small_robots
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests import small_robots
+
 from irtwin import workflow
 
 SHOWN = (1, 2, 5, 10, 20, 35, 50, 75, 100)

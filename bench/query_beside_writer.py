@@ -20,8 +20,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-import small_robots
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests import small_robots
 
 IRTWIN = [sys.executable, "-m", "irtwin"]
 RATE = 83.0  # Hz

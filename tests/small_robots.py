@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import data_sets
-import synthetic
 from irtwin.signals.log import Run
+from tests import data_sets, synthetic
 
 Change = Callable[[Run], Run]
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from endpoint import make_graph
 from irtwin import workflow
 from irtwin.asking import ask, explain, export, questions
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
+from tests.endpoint import make_graph
 
 ROBOTS = "SELECT ?robot { ?robot a irt:Industrial_Robot }"
 

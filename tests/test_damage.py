@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from data_sets import irtwin
 from irtwin import upkeep
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -21,7 +20,8 @@ from irtwin.resources import folder as resource
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base
-from small_robots import data_set
+from tests.data_sets import irtwin
+from tests.small_robots import data_set
 
 COUNT = "SELECT (COUNT(*) AS ?count) { ?s ?p ?o }"
 NAMES = "SELECT ?name { ?robot irt:IR_Name ?name } ORDER BY ?name"

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from data_sets import irtwin
-from small_robots import data_set
+from tests.data_sets import irtwin
+from tests.small_robots import data_set
 
 pytestmark = pytest.mark.slow
 

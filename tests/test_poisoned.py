@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from data_sets import irtwin
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers import planner
 from irtwin.providers.provider import Made, load_provider
 from irtwin.providers.records import ingest
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
-from small_robots import data_set, with_signals
+from tests.data_sets import irtwin
+from tests.small_robots import data_set, with_signals
 
 pytestmark = pytest.mark.slow
 

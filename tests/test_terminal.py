@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from data_sets import irtwin
+from tests.data_sets import irtwin
 
 COMMAND = [sys.executable, "-m", "irtwin"]
 

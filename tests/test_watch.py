@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-import rows
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
+from tests import rows
 
 
 def irtwin(*arguments: object, **options: object) -> subprocess.Popen[str]:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, as_run, measure, swing
 
 from blind.baselines import THRESHOLD, answers, majority, thresholded
 from blind.compare import table
 from irtwin.gap.data.case import case_of
 from irtwin.signals.log import DataSet
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(2)
 NAMES = ("bic_greedy", "f_test", "e_sindy")

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests import gap_cases
+from tests.synthetic import arm, as_run, measure, swing, truth
 
-import gap_cases
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
 from irtwin.twin.identify import identify
 from sham import circular_blocks, sham
-from synthetic import arm, as_run, measure, swing, truth
 from withheld import Answer, Robot, page, where_it_matters
 
 ROBOT = arm(2)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.synthetic import arm, swing
 
 from irtwin.effects.compliance import Backlash, JointElasticity, load_inertia, load_torque, transmitted
 from irtwin.effects.effect import Predicted
 from irtwin.signals.motion import Motion
-from synthetic import arm, swing
 
 RATE = 250.0
 TIME = np.arange(0, 6, 1 / RATE)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rdflib
+from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
@@ -15,7 +16,6 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.resources import folder
 from irtwin.robot.urdf import parse_urdf
-from synthetic import arm, rigid_torque, swing, truth, with_constants
 
 CONTRACT = Path(__file__).parents[3] / "shared/contract/effects.toml"
 

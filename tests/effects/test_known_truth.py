@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
+from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects import compliance, drive, friction, load, sensing, supply, transmission
 from irtwin.effects.catalogue import BASELINE, catalogue
@@ -19,7 +20,6 @@ from irtwin.robot.urdf import parse_urdf
 from irtwin.twin.files import load as load_twin
 from irtwin.twin.files import save
 from irtwin.twin.identify import identify
-from synthetic import arm, rigid_torque, swing, truth, with_constants
 
 TRUE = truth(arm(3))
 ROBOT = with_constants(arm(3))

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from tests.synthetic import arm, rigid_torque, swing
 
 from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import inverse_dynamics, last_body_columns, model_of, torque_slope
-from synthetic import arm, rigid_torque, swing
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])

@@ -6,11 +6,11 @@ import json
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import Any
 
-from drawn_robots import Axis, RobotPlan
 from hypothesis import strategies as st
-from logs import DataPlan, RunPlan, data_sets
-from spoil import spoils
-from streams import StreamPlan, streams
+from tests.fuzz.drawn_robots import Axis, RobotPlan
+from tests.fuzz.logs import DataPlan, RunPlan, data_sets
+from tests.fuzz.spoil import spoils
+from tests.fuzz.streams import StreamPlan, streams
 
 BRIEF = ("diagnose",)
 ALONE = ("diagnose with page and twin", "predict")

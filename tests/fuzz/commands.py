@@ -20,11 +20,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import logs
 import pyarrow.parquet
-import spoil
-import streams
-from case import Case
+from tests.fuzz import logs, spoil, streams
+from tests.fuzz.case import Case
 
 import irtwin
 import irtwin.cli

@@ -13,9 +13,9 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from case import Case, cases
-from commands import Fault, try_case
 from hypothesis import HealthCheck, Phase, given, seed, settings
+from tests.fuzz.case import Case, cases
+from tests.fuzz.commands import Fault, try_case
 
 KEPT = Path(__file__).parent / "kept"
 _ROUND = 200  # draws by one seed

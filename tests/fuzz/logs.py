@@ -11,8 +11,8 @@ import pinocchio as pin
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
-from drawn_robots import RobotPlan, joint_names, robots, urdf
 from hypothesis import strategies as st
+from tests.fuzz.drawn_robots import RobotPlan, joint_names, robots, urdf
 
 from irtwin.errors import InputError
 from irtwin.robot.urdf import parse_urdf

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from case import ALONE, Case, cases, read_case
-from commands import fault_of, in_child, try_case
 from hypothesis import HealthCheck, Phase, given, settings
+from tests.fuzz.case import ALONE, Case, cases, read_case
+from tests.fuzz.commands import fault_of, in_child, try_case
 
 FEW = settings(
     max_examples=12, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]

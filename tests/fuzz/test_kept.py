@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from case import read_case
-from commands import try_case
+from tests.fuzz.case import read_case
+from tests.fuzz.commands import try_case
 
 KEPT = sorted((Path(__file__).parent / "kept").glob("*.json"))
 

@@ -14,11 +14,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from tests.data_sets import irtwin, write
+from tests.synthetic import arm, as_run, measure, swing
 
-from data_sets import irtwin, write
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import Run
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(3)
 SIX = arm(6)

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, swing
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.gap.regression.candidate_columns import Candidates, candidate_pattern
 from irtwin.gap.regression.hypotheses import candidate_columns
-from synthetic import arm, swing
 
 ROBOT = arm(4)
 MOTION = swing(ROBOT, 1, seconds=8.0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, swing
 
 from irtwin.effects.effect import Predicted
 from irtwin.effects.load import ExternalContact, Payload
@@ -15,7 +16,6 @@ from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.signals.filter import low_pass
-from synthetic import arm, swing
 
 ROBOT = arm(6)
 NOISE = np.array([1.0, 0.9, 0.6, 0.3, 0.3, 0.2])

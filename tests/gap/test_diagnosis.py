@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(3)
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
@@ -16,7 +17,6 @@ from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.isolation.finding import find
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
-from synthetic import arm, measure, swing
 
 ROBOT = arm(2)
 NOISE = 0.2

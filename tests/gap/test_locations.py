@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, rigid_torque, swing
 
 from irtwin.gap.localisation.excess_map import heat_map, joint_maps, level_of, robot_maps
 from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import followed
 from irtwin.gap.localisation.regimes import JOINT_REGIMES
 from irtwin.gap.regression.residuals import Trace
-from synthetic import arm, rigid_torque, swing
 
 ROBOT = arm(3)
 JOINTS = ROBOT.joint_names

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
@@ -25,7 +26,6 @@ from irtwin.gap.regression.hypotheses import MISSING, hypotheses
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.report.gap.figures import experiment
-from synthetic import arm, measure, swing
 
 ROBOT = arm(2)
 NOISE = 0.2

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
@@ -16,7 +17,6 @@ from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import DataSet, Run
 from irtwin.twin.files import from_json, to_json
-from synthetic import arm, as_run, measure, swing
 
 SLIDER = '<link name="{child}">{body}</link><joint name="{name}" type="prismatic"><parent link="{parent}"/>'
 SLIDER += '<child link="{child}"/><axis xyz="{axis}"/><limit lower="-2" upper="2" velocity="2" effort="500"/></joint>'

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.data_sets import irtwin, write
+from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth
 
-from data_sets import irtwin, write
 from irtwin.robot.urdf import parse_urdf
-from synthetic import arm, as_run, measure, rigid_torque, swing, truth
 
 pytestmark = pytest.mark.slow
 DRAWN = arm(4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import Payload
@@ -13,7 +14,6 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.payloads import untold_payload
-from synthetic import arm, measure, swing
 
 ROBOT = arm(4)
 LOAD = np.array([0.6, 0.0, 0.02, 0.05, 0, 0, 0, 0, 0, 0])

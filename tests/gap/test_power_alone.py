@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
-from synthetic import arm, as_run, measure, swing, truth
 
 ROBOT = arm(3)
 WITH_LOSS = (*BASELINE, "copper_loss")

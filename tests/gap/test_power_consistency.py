@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.power_consistency import PowerBalance, filtered, kind_of, refuted
 from irtwin.signals.log import DataSet
-from synthetic import arm, as_run, measure, swing, truth
 
 ROBOT = arm(2)
 KNOWN = catalogue()

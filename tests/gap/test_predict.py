@@ -9,12 +9,12 @@ import pinocchio as pin
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from tests.data_sets import irtwin, write
+from tests.synthetic import arm, as_run, measure, swing
 
-from data_sets import irtwin, write
 from irtwin.effects.rigid_body import flange_frame
 from irtwin.twin.files import save
 from irtwin.twin.identify import identify
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(2)
 MASS, COM = 3.0, (0.02, -0.01, 0.1)

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 import numpy as np
+from tests.synthetic import arm, swing
 
 from irtwin.gap.regression import progress
 from irtwin.gap.regression.progress import with_progress
 from irtwin.identification.accumulate import Rows
-from synthetic import arm, swing
 
 ROBOT = arm(2)
 MOTIONS = [swing(ROBOT, seed, seconds=4.0) for seed in (1, 2)]

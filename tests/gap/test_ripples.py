@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.synthetic import arm, swing
 
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.screening.ripples import fast_ripples
-from synthetic import arm, swing
 
 ROBOT = arm(3)
 

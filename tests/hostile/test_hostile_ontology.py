@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from xml_attacks import attacks, entities
+from tests.hostile.xml_attacks import attacks, entities
 
 PREFIXES = (
     "@prefix : <http://e/> . @prefix owl: <http://www.w3.org/2002/07/owl#> . "

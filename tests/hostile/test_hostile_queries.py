@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 import psutil
 import pytest
-
-from endpoint import Server, make_graph, serving
+from tests.endpoint import Server, make_graph, serving
 
 SECONDS, MEGABYTES = 3, 128
 GOOD = (

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from xml_attacks import attacks
+from tests.hostile.xml_attacks import attacks
 
 LINK = (
     '<link name="{}"><inertial><mass value="1"/>'

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
@@ -12,7 +13,6 @@ from irtwin.identification import accumulate as room
 from irtwin.identification.accumulate import Rows, accumulate, accumulate_any
 from irtwin.identification.estimators import combine
 from irtwin.signals.filter import decimate, decimation, kernel
-from synthetic import arm, measure, swing
 
 ROBOT = arm(3)
 STACK = Stack(ROBOT, BASELINE)

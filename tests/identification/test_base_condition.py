@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from arms import kr6, two_joints
+from tests.identification.arms import kr6, two_joints
 
 from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack

@@ -4,13 +4,13 @@ from math import pi
 
 import numpy as np
 import pytest
-from arms import kr6
+from tests.identification.arms import kr6
+from tests.synthetic import AXES, arm, swing
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters, condition_number
 from irtwin.robot.urdf import parse_urdf
-from synthetic import AXES, arm, swing
 
 
 def chain(frames):

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from arms import kr6, two_joints
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.identification.arms import kr6, two_joints
+from tests.synthetic import arm
 
 from irtwin.errors import InputError
 from irtwin.identification import excitation
@@ -17,7 +18,6 @@ from irtwin.identification.motion_limits import CLEARANCE, FULL_SPEED_AFTER, Box
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
 from irtwin.robot.urdf import parse_urdf
-from synthetic import arm
 
 KR6 = kr6()
 TWO = two_joints()

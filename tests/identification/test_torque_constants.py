@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, swing
 
 from irtwin.errors import InputError
 from irtwin.identification.torque_constants import torque_constants
-from synthetic import arm, swing
 
 KT = np.array([12.0, 8.0, 5.0])
 

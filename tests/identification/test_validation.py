@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.synthetic import arm, swing
 
 from irtwin.identification.validation import energy, energy_error, r_squared, rmse, split
-from synthetic import arm, swing
 
 MOTION = swing(arm(1), 1, seconds=3)
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from pyoxigraph import NamedNode, Triple
 from sqlalchemy import func, select
+from tests import rows
 
-import rows
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
@@ -111,7 +111,7 @@ WRITER = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-import rows
+from tests import rows
 from irtwin.storage.database import Workspace
 with Workspace(Path(sys.argv[1])) as place:
     for number in range(10**9):
@@ -130,7 +130,7 @@ KNOWING.replace(in_graph([Triple(NamedNode("a:a"), NamedNode("a:a"), NamedNode("
 
 def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> None:
     filled = Workspace(tmp_path / "before")
-    tests = Path(rows.__file__).parent
+    tests = Path(rows.__file__).parents[1]
     command = [sys.executable, "-c", WRITER, str(filled.folder), str(tests)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

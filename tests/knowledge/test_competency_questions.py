@@ -7,8 +7,8 @@ import io
 from pathlib import Path
 
 import pytest
+from tests import small_fleet
 
-import small_fleet
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv

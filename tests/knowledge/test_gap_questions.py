@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import RdfFormat, parse
+from tests import gap_cases, rows
 
-import gap_cases
-import rows
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import check_consistency

@@ -10,13 +10,13 @@ from string import ascii_lowercase
 
 import pytest
 from pyoxigraph import Store
+from tests.sparql_family import Family, Listener, listener
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.keywords import refuse_service, refuse_service_and_load
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.vocabulary import PREFIXES
-from sparql_family import Family, Listener, listener
 
 BASE = "http://e/"
 SPELLINGS = " ".join(f"ser{letter}ice" for letter in ascii_lowercase)

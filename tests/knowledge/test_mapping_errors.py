@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from test_mapping import PEOPLE, SUBJECT, mapped, person
+from tests.knowledge.test_mapping import PEOPLE, SUBJECT, mapped, person
 
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.reader import read_document

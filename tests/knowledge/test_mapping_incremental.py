@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import NamedNode, Quad, Triple
 from sqlalchemy import Engine
-from test_mapping import PREFIXES
+from tests.knowledge.test_mapping import PREFIXES
 
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database, refresh

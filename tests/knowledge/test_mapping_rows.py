@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from test_mapping import PREFIXES, mapped, person
+from tests.knowledge.test_mapping import PREFIXES, mapped, person
 
 from irtwin.knowledge.mapping import RowMapper
 from irtwin.storage.engine import open_engine

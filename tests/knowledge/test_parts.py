@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
+from tests import small_fleet
 
-import small_fleet
 from irtwin import workflow
 from irtwin.knowledge import owl_dl, parts, reasoning
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+from tests import rows
 
-import rows
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database

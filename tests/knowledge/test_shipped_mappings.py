@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pyoxigraph import NamedNode, Quad, RdfFormat, parse
 from sqlalchemy import insert, select
+from tests import rows
 
-import rows
 from irtwin import resources
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.mapping.document import RR

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import Literal, NamedNode, Triple
+from tests.endpoint import make_graph
 
-from endpoint import make_graph
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.store.snapshot import Snapshot, kept

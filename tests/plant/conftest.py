@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 
 pytest.importorskip("mujoco", reason="the plant needs irtwin[plant]")
-sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 from plant.machine import Drawings, Machine, build, read_drawings
 

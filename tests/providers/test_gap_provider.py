@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from sqlalchemy import select
+from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.errors import InputError
 from irtwin.providers import energy, identification
@@ -19,7 +20,6 @@ from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import Workspace
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
-from synthetic import arm, as_run, measure, swing, with_constants
 
 ROBOT = "arm_2"
 BARE = ("rigid_body", "viscous_friction")

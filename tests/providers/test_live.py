@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import subprocess
 import sys
 import time
@@ -15,8 +14,8 @@ import numpy as np
 import pytest
 from pyoxigraph import Quad
 from sqlalchemy import select
+from tests import rows
 
-import rows
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
@@ -289,7 +288,7 @@ WATCHER = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-from test_live import state
+from tests.providers.test_live import state
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
@@ -304,10 +303,8 @@ with Workspace(Path(sys.argv[1])) as place, KnowledgeGraph(place.graph_folder) a
 
 
 def test_a_kill_loses_no_stored_sample(place: Workspace, tmp_path: Path) -> None:
-    here = Path(__file__).parent
-    command = [sys.executable, "-c", WATCHER, str(tmp_path), str(here)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parent), *sys.path])}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+    command = [sys.executable, "-c", WATCHER, str(tmp_path), str(Path(__file__).parents[2])]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         stored = 0
         while stored < 1000:

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from sqlalchemy import select
+from tests import rows
 
-import rows
 from irtwin.errors import InputError
 from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, load_run
 from irtwin.robot.urdf import parse_urdf

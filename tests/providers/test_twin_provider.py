@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.providers import identification
 from irtwin.providers.records import ingest
@@ -15,7 +16,6 @@ from irtwin.storage.database import Workspace
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
 from irtwin.twin.validate import validate
-from synthetic import arm, as_run, measure, swing, with_constants
 
 
 def parts(folder: Path, roles: list[str]) -> dict[str, str]:

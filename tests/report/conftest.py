@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from robots import Factory, PageOf
+from tests.report.robots import Factory, PageOf
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import render

@@ -1,7 +1,7 @@
 import json
 
 import pytest
-from robots import Factory, answers, power_only, six_axis
+from tests.report.robots import Factory, answers, power_only, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.figures import figures, plain

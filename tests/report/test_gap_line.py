@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from tests import gap_cases
 
-import gap_cases
 from irtwin.report.gap.headline import line
 
 

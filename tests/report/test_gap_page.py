@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests import gap_cases, rows
 
-import gap_cases
-import rows
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl import rules as shacl_rules

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from robots import power_only, six_axis
+from tests.report.robots import power_only, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import render

@@ -2,7 +2,7 @@ import re
 from pathlib import Path
 
 import pytest
-from robots import power_only, six_axis
+from tests.report.robots import power_only, six_axis
 
 from irtwin import resources
 from irtwin.knowledge.store.graph import KnowledgeGraph

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import NamedNode, Triple
-from robots import Factory, PageOf, power_only, six_axis
+from tests.report.robots import Factory, PageOf, power_only, six_axis
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explanation import Explanation

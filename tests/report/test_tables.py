@@ -1,4 +1,4 @@
-from robots import answers, six_axis
+from tests.report.robots import answers, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy import tables

@@ -1,5 +1,5 @@
 import pytest
-from robots import Factory, answers, power_only, six_axis
+from tests.report.robots import Factory, answers, power_only, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy import verdict

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-
-from endpoint import Server, make_graph, serving
+from tests.endpoint import Server, make_graph, serving
 
 
 @pytest.fixture(scope="session")

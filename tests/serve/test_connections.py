@@ -13,8 +13,8 @@ from urllib.parse import urlencode, urlsplit
 import httpx
 import pytest
 import uvicorn
+from tests.endpoint import Server
 
-from endpoint import Server
 from irtwin.serve import connections
 from irtwin.serve.answer import IN_MEMORY, Answer, Answers
 

@@ -12,8 +12,7 @@ from urllib.parse import quote
 
 import httpx
 import pytest
-
-from endpoint import CLIENT, TOKEN, Server
+from tests.endpoint import CLIENT, TOKEN, Server
 
 DATA = "http://kasei.us/2009/09/sparql/data/data"
 FORM, QUERY, UPDATE = "application/x-www-form-urlencoded", "application/sparql-query", "application/sparql-update"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
 from irtwin.signals.conditioning import choose_cutoff, condition, differentiate
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(3)
 

@@ -9,11 +9,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from tests.data_sets import write
+from tests.synthetic import arm, as_run, measure, swing
 
-from data_sets import write
 from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(1)
 

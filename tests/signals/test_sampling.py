@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.data_sets import write
+from tests.synthetic import arm, as_run, measure, swing
 
-from data_sets import write
 from irtwin.errors import InputError
 from irtwin.gap.predict import predict
 from irtwin.signals.conditioning import choose_cutoff, condition
@@ -19,7 +20,6 @@ from irtwin.signals.log import Run, read_data_set
 from irtwin.signals.samples import Signals
 from irtwin.signals.sampling import as_sampled, interval
 from irtwin.twin.identify import identify
-from synthetic import arm, as_run, measure, swing
 
 ROBOT = arm(2)
 FILE = Path("runs/a.csv")

@@ -7,17 +7,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests import rows
+from tests.storage.test_database import populate, state
 
-import rows
 from irtwin.storage.database import Workspace
-from test_database import populate, state
 
 # Each kills the process at one step of taking in a changed data set.
 KILLED = """
 import os, signal, sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-import rows
+from tests import rows
 from sqlalchemy import event
 from irtwin.storage import database, files
 from irtwin.storage.database import Workspace
@@ -52,7 +52,7 @@ TAKEN_IN = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-import rows
+from tests import rows
 from irtwin.storage.database import Workspace
 for number in range(5):
     robot, joints, runs, series = rows.data_set()
@@ -63,7 +63,7 @@ for number in range(5):
 
 
 def python(script: str, **values: object) -> subprocess.Popen[str]:
-    code = script.format(tests=str(Path(rows.__file__).parent), **values)
+    code = script.format(tests=str(Path(rows.__file__).parents[1]), **values)
     return subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
+from tests import rows
 
-import rows
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Activity, ActivityUse, Base, Run, RunEnergy, RunState, Series, Twin

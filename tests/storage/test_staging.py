@@ -7,25 +7,25 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests import rows
+from tests.storage.test_database import WORK, populate, state, workspace
 
-import rows
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import LIVE, Activity
 from irtwin.storage.staging import staged
-from test_database import WORK, populate, state, workspace
 
 __all__ = ["workspace"]
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-sys.path[:0] = [{tests!r}, {tests!r} + "/storage"]
+sys.path.insert(0, {tests!r})
 from irtwin.storage import staging
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
-import rows
-from test_database import populate
+from tests import rows
+from tests.storage.test_database import populate
 
 with Workspace(Path({folder!r})) as place, staged(place, rows.ROBOT) as apart:
     populate(apart)
@@ -106,7 +106,7 @@ def test_a_kill_leaves_the_earlier_state(tmp_path: Path, point: str) -> None:
     with Workspace(tmp_path) as place:
         place.ingest(*rows.data_set())
         before = state(place)
-    code = KILLED.format(tests=str(Path(rows.__file__).parent), folder=str(tmp_path), point=point)
+    code = KILLED.format(tests=str(Path(rows.__file__).parents[1]), folder=str(tmp_path), point=point)
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
     with Workspace(tmp_path) as place:
         assert list(tmp_path.glob(".staged-*"))

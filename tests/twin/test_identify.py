@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
 from irtwin.signals.conditioning import condition
 from irtwin.twin.identify import identify
 from irtwin.twin.validate import validate
-from synthetic import arm, as_run, measure, rigid_torque, swing, truth, with_constants
 
 ALL = (*BASELINE, "copper_loss")
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.synthetic import arm, measure, swing, with_constants
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.twin import twin as room
 from irtwin.twin.identify import identify
-from synthetic import arm, measure, swing, with_constants
 
 ALL = (*BASELINE, "copper_loss")
 ROBOT = with_constants(arm(3))

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
 from irtwin.twin.files import load, save
 from irtwin.twin.identify import identify
-from synthetic import arm, measure, swing
 
 ROBOT = arm(3)
 MOTION = measure(ROBOT, swing(ROBOT, 1), noise=0.3)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic import arm, measure, swing, with_constants
 
 from irtwin.signals.filter import low_pass
 from irtwin.twin.identify import identify
 from irtwin.twin.validate import validate
-from synthetic import arm, measure, swing, with_constants
 
 ROBOT = with_constants(arm(2))
 TWIN = identify(ROBOT, [measure(ROBOT, swing(ROBOT, 1), noise=0.1)])

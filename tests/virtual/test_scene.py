@@ -3,7 +3,7 @@ import re
 import numpy as np
 import pinocchio as pin
 import pytest
-from scene_data import HOSTILE, bare, embedded, kr6, run
+from tests.virtual.scene_data import HOSTILE, bare, embedded, kr6, run
 
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements

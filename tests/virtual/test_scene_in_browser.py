@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_data import HOSTILE, bare, kr6, run
+from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements

@@ -1,8 +1,0 @@
-"""The benches lie beside the package and not in it."""
-
-from __future__ import annotations
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
