@@ -16,7 +16,9 @@ BRIEF = ("diagnose",)
 ALONE = ("diagnose with page and twin", "predict")
 MOTION = ("excite",)
 WITH_WORKSPACE = ("run", "query", "export", "live", "diagnose into workspace", "query")
-_TRIED = (BRIEF,) * 9 + (ALONE,) * 4 + (MOTION,) * 2 + (WITH_WORKSPACE,)
+KEPT_AND_MOVED = ("run", "map", "explain", "export", "reason", "backup", "restore", "repair", "drop")
+ADOPTED = ("run", "diagnose into workspace", "adopt", "query")
+_TRIED = (BRIEF,) * 36 + (ALONE,) * 16 + (MOTION,) * 8 + (WITH_WORKSPACE, KEPT_AND_MOVED, ADOPTED)
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def _tuples(value: Any) -> Any:
 
 @st.composite
 def cases(draw: st.DrawFn) -> Case:
-    """Draw a case, small nine times in ten; one in three data sets is spoilt, one in sixteen goes into a workspace."""
+    """Draw a case, small nine times in ten; one in three data sets is spoilt, one in twenty goes into a workspace."""
     large = draw(st.integers(0, 9)) == 9
     spoilt = draw(spoils()) if draw(st.integers(0, 2)) == 0 else ()
     commands = draw(st.sampled_from(_TRIED))

@@ -36,6 +36,11 @@ _PATIENCE = 600  # s, for what waits and does nothing
 MEGABYTES = 2000  # beside what the libraries take
 _EXCITING = 2.0  # s until Ctrl-C: the best motion so far is kept
 _STOPPED = 130  # exit status after Ctrl-C
+MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
+WRITTEN = (
+    *("gap.json", "gap.html", "predicted.parquet", "motion.csv"),
+    *("all.owl", "closed.ttl", "robot.nq", "kept.zip"),
+)
 LONGEST_LINE = 2000  # characters of an error
 _STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
@@ -97,7 +102,7 @@ def _make(case: Case, folder: Path) -> None:
 def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]]:
     """Return a command's arguments, None where there is nothing to try it on, and the files it is to write."""
     data, workspace, twin = folder / "data", folder / "workspace", folder / "twin.json"
-    out = {name: folder / name for name in ("gap.json", "gap.html", "predicted.parquet", "motion.csv", "all.owl")}
+    out = {name: folder / name for name in WRITTEN}
     diagnose = ["diagnose", data, "--json", out["gap.json"]]
     run = next((data / "runs").iterdir())
     words, writes = {
@@ -116,6 +121,17 @@ def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]
         "query": (["query", "energy_per_joint", "--workspace", workspace], []),
         "export": (["export", "--owl", out["all.owl"], "--workspace", workspace], [out["all.owl"]]),
         "live": (["live", "--workspace", workspace], []),
+        "map": (
+            ["map", MAPPING, "--database", f"sqlite:///{workspace / 'irtwin.db'}", "--out", out["robot.nq"]],
+            [out["robot.nq"]],
+        ),
+        "reason": (["reason", out["all.owl"], "--out", out["closed.ttl"]], [out["closed.ttl"]]),
+        "explain": (["explain", "?", "irt:Energy_Consumption", "--workspace", workspace], []),
+        "backup": (["backup", out["kept.zip"], "--workspace", workspace], [out["kept.zip"]]),
+        "restore": (["restore", out["kept.zip"], "--workspace", folder / "restored"], []),
+        "repair": (["repair", "--workspace", workspace], []),
+        "adopt": (["adopt", _robot(folder), "--workspace", workspace], []),
+        "drop": (["drop", _robot(folder), "--workspace", workspace], []),
     }[command]
     if command == "predict" and not twin.exists():
         return None, []
@@ -124,8 +140,13 @@ def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]
 
 def _stream(case: Case, folder: Path) -> bytes:
     moving = sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
+    return streams.lines(case.stream, _robot(folder), moving)
+
+
+def _robot(folder: Path) -> str:
+    """Return the robot in the workspace."""
     pages = sorted((folder / "workspace" / "reports").glob("*.html"))
-    return streams.lines(case.stream, pages[0].stem if pages else "arm", moving)
+    return pages[0].stem if pages else "arm"
 
 
 def _main(arguments: list[str]) -> None:

@@ -158,7 +158,7 @@ def _channel(how: str, model: np.ndarray, noise: float, rng: np.random.Generator
     elif how == "tiny":
         values = values * 1e-12
     elif how == "one dead":
-        values[:, 0] = 0.0
+        values[:, :1] = 0.0
     elif how == "last only":
         values[:-1] = 0.0
     return np.clip(values, -9e5, 9e5)
