@@ -24,6 +24,7 @@ from scipy.stats import f as fisher
 from blind.library import Explained, Library, power_library, swept, torque_library
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, bounds
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import read_data_set
 
 STEPS = 20  # of forward selection, at most
@@ -252,7 +253,7 @@ def answer_case(task: tuple[Path, Path, dict[str, Any] | None]) -> str:
     folder, out, commonest = task
     names = [name for name in BASELINES if not (out / name / f"{folder.name}.json").exists()]
     try:
-        case = case_of(read_data_set(folder), ())
+        case = case_of(read_data_set(folder), (), DEFAULT)
         found = answers(case, names) if names else {}
         if commonest:
             found["majority"] = document(case.robot.name, [commonest], 0.0)

@@ -61,6 +61,11 @@ def _cell(score: str, value: float) -> str:
     return f"{100 * value:.0f} %"
 
 
+def answers(folder: Path) -> dict[str, Any]:
+    """Return the diagnoses of a folder, by case."""
+    return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in folder.glob("*.json")}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m blind.compare", description=__doc__)
     parser.add_argument("labels", type=Path, help="labels.json")
@@ -70,8 +75,7 @@ def main() -> None:
     ways = {}
     for way in arguments.ways:
         name, _, folder = way.partition("=")
-        files = Path(folder).glob("*.json")
-        ways[name] = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}
+        ways[name] = answers(Path(folder))
     print(table(ways, labels))
 
 

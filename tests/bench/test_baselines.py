@@ -12,6 +12,7 @@ from tests.synthetic import arm, as_run, measure, swing
 from blind.baselines import THRESHOLD, answers, majority, thresholded
 from blind.compare import table
 from irtwin.gap.data.case import case_of
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
 ROBOT = arm(2)
@@ -39,7 +40,7 @@ def sticking(motion):
 
 @pytest.fixture(scope="module")
 def said():
-    return answers(case_of(logged(sticking), ()), NAMES)
+    return answers(case_of(logged(sticking), (), DEFAULT), NAMES)
 
 
 def family(cause):

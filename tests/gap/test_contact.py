@@ -15,6 +15,7 @@ from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Varia
 from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.filter import low_pass
 
 ROBOT = arm(6)
@@ -42,7 +43,7 @@ def runs(touched, added=push, count=8):
 
 @pytest.mark.parametrize("touched", [(2,), (1, 4, 6)])
 def test_a_contact_is_found_in_its_runs_and_its_time(touched):
-    found = contact(ROBOT, runs(touched), NOISE)
+    found = contact(ROBOT, runs(touched), NOISE, DEFAULT.contact)
     assert found.effect.runs == tuple(f"run_{seed}" for seed in touched)
     assert found.effect.start == pytest.approx(3.0, abs=0.2)
     assert found.effect.stop == pytest.approx(4.5, abs=0.2)
@@ -52,9 +53,9 @@ def test_a_contact_is_found_in_its_runs_and_its_time(touched):
 
 
 def test_noise_is_no_contact():
-    assert [contact(ROBOT, runs(()), NOISE)] == [None]
+    assert [contact(ROBOT, runs(()), NOISE, DEFAULT.contact)] == [None]
     others = [remainder(seed) for seed in range(100, 108)]
-    assert contact(ROBOT, others, NOISE) is None
+    assert contact(ROBOT, others, NOISE, DEFAULT.contact) is None
 
 
 @pytest.mark.parametrize("joint", range(5))
@@ -64,7 +65,7 @@ def test_what_one_joint_shows_alone_is_no_contact(joint):
         added[:, joint] = 5 * NOISE[joint] * ((motion.time > 3.0) & (motion.time < 4.5))
         return added
 
-    assert contact(ROBOT, runs((1, 4, 6), jolt), NOISE) is None
+    assert contact(ROBOT, runs((1, 4, 6), jolt), NOISE, DEFAULT.contact) is None
 
 
 def test_joints_that_are_jolted_at_once_but_by_no_force_are_no_contact():
@@ -73,19 +74,19 @@ def test_joints_that_are_jolted_at_once_but_by_no_force_are_no_contact():
         inside = (motion.time > 3.0) & (motion.time < 4.5)
         return 4 * NOISE * signs * np.sin(9 * motion.time[:, None] + np.arange(6)) * inside[:, None]
 
-    assert contact(ROBOT, runs((1, 4, 6), jolt), NOISE) is None
+    assert contact(ROBOT, runs((1, 4, 6), jolt), NOISE, DEFAULT.contact) is None
 
 
 def test_a_force_that_lasts_is_no_episode():
     def weigh(motion):
         return ExternalContact().contribution(ROBOT, motion, FORCE)
 
-    assert contact(ROBOT, runs((1, 4, 6), weigh), NOISE) is None
+    assert contact(ROBOT, runs((1, 4, 6), weigh), NOISE, DEFAULT.contact) is None
 
 
 def test_a_contact_of_a_reference_run_is_nobodys():
     left = [remainder(2, push, observed=False), *(remainder(seed) for seed in range(10, 17))]
-    assert contact(ROBOT, left, NOISE) is None
+    assert contact(ROBOT, left, NOISE, DEFAULT.contact) is None
 
 
 def test_undecided_samples_are_left_out():
@@ -93,7 +94,7 @@ def test_undecided_samples_are_left_out():
     for one in left:
         one.residual[100:120, 2] = np.nan
         one.residual[:5] = np.nan
-    assert contact(ROBOT, left, NOISE).effect.runs == ("run_1", "run_4", "run_6")
+    assert contact(ROBOT, left, NOISE, DEFAULT.contact).effect.runs == ("run_1", "run_4", "run_6")
 
 
 def test_candidates_are_zero_in_runs_in_which_they_do_not_act():

@@ -17,6 +17,7 @@ from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.isolation.finding import find
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(2)
 NOISE = 0.2
@@ -40,11 +41,13 @@ def of(motions, tried=("stribeck_friction",)):
         return stack.real_torque(motion, values)
 
     effects = [shape for effect in tried for shape in catalogue()[effect].candidates(ROBOT)]
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
+    grouping = Grouping(
+        {m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.admission.fewest_groups
+    )
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
-    case = SimpleNamespace(effects=BASELINE, robot=ROBOT, observed=grouping.observed)
+    case = SimpleNamespace(effects=BASELINE, robot=ROBOT, observed=grouping.observed, thresholds=DEFAULT)
     finding = find("torque", case, system, np.full(2, NOISE), 0)
-    channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)))
+    channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
     return finding, flexible_regression(channel, motions, 0)
 
 
@@ -93,7 +96,7 @@ def test_one_short_run_has_none():
 
 
 def test_without_a_floor_shares_are_of_the_mean_square():
-    made = FlexibleRegression(np.array([4.0]), np.array([1.0]), np.array([2.0]), np.array([1.0]), None)
+    made = FlexibleRegression(np.array([4.0]), np.array([1.0]), np.array([2.0]), np.array([1.0]), None, 0.1)
     shares = made.shares()
     assert (shares["closeable"], shares["nameless"]) == (0.75, 0.25)
     assert "no floor" in shares["of"]
@@ -101,5 +104,5 @@ def test_without_a_floor_shares_are_of_the_mean_square():
 
 def test_without_a_gap_there_are_no_shares():
     one = np.array([1.0])
-    assert FlexibleRegression(one, one, one, one, np.array([1.1])).shares()["closeable"] is None
-    assert FlexibleRegression(one, one, one, one, np.array([0.98])).shares()["closeable_by_equation"] == [None]
+    assert FlexibleRegression(one, one, one, one, np.array([1.1]), 0.1).shares()["closeable"] is None
+    assert FlexibleRegression(one, one, one, one, np.array([0.98]), 0.1).shares()["closeable_by_equation"] == [None]

@@ -17,6 +17,7 @@ from irtwin.gap.isolation.forward_selection import attribute
 from irtwin.gap.regression.cross_validation import canonical_correlation
 from irtwin.gap.regression.hypotheses import MISSING, Column, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 300, 12
@@ -49,7 +50,7 @@ def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
 
 
 def found(mix, coefficients):
-    return [cause.effect for cause in attribute(*system_of(mix, coefficients), seed=0).causes]
+    return [cause.effect for cause in attribute(*system_of(mix, coefficients), seed=0, limits=DEFAULT).causes]
 
 
 def test_what_is_there_is_found_and_nothing_else():
@@ -62,7 +63,7 @@ def test_what_two_runs_alone_show_is_found_where_it_leads_by_far_and_is_rare():
         system, candidates = system_of(np.eye(4), [coefficient, 0.0, 0.0, 0.0], silent=range(RUNS - speaking))
         first = replace(candidates[0].variants[0], effect=catalogue()[effect])
         candidates[0] = replace(candidates[0], variants=(first,))
-        return [cause.effect for cause in attribute(system, candidates, seed=0).causes]
+        return [cause.effect for cause in attribute(system, candidates, seed=0, limits=DEFAULT).causes]
 
     assert causes(1.0, speaking=2) == ["effect_0"]
     assert causes(1.0, speaking=2, effect="stribeck_friction") == []  # a joint that sticks shows as much
@@ -75,9 +76,9 @@ def test_what_sticks_at_one_joint_does_not_hide_what_is_rare_at_another():
     for k, effect in enumerate(("backlash", "stribeck_friction")):
         variant = replace(candidates[k].variants[0], effect=catalogue()[effect])
         candidates[k] = replace(candidates[k], effect=effect, joint=f"joint_{k}", variants=(variant,))
-    assert [cause.effect for cause in attribute(system, candidates[:2], seed=0).causes] == ["backlash"]
+    assert [cause.effect for cause in attribute(system, candidates[:2], seed=0, limits=DEFAULT).causes] == ["backlash"]
     candidates[1] = replace(candidates[1], joint="joint_0")
-    assert [cause.effect for cause in attribute(system, candidates[:2], seed=0).causes] == []
+    assert [cause.effect for cause in attribute(system, candidates[:2], seed=0, limits=DEFAULT).causes] == []
 
 
 def test_what_friction_of_another_form_imitates_has_to_explain_a_part_of_the_floor():
@@ -85,7 +86,7 @@ def test_what_friction_of_another_form_imitates_has_to_explain_a_part_of_the_flo
         system, candidates = system_of(np.eye(2), [0.05, 0.0])
         first = replace(candidates[0].variants[0], effect=catalogue()[effect])
         candidates[0] = replace(candidates[0], variants=(first,))
-        return [cause.effect for cause in attribute(system, candidates, seed=0, floor=floor).causes]
+        return [cause.effect for cause in attribute(system, candidates, seed=0, limits=DEFAULT, floor=floor).causes]
 
     assert causes("time_delay", floor=np.array([1.0])) == []
     assert causes("time_delay", floor=np.array([0.5])) == ["effect_0"]
@@ -95,9 +96,9 @@ def test_what_friction_of_another_form_imitates_has_to_explain_a_part_of_the_flo
 
 def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
     system, candidates = system_of(np.eye(3), [0.3, 0.025, 0.0])
-    assert [cause.effect for cause in attribute(system, candidates, seed=0).causes] == ["effect_0"]
+    assert [cause.effect for cause in attribute(system, candidates, seed=0, limits=DEFAULT).causes] == ["effect_0"]
     alike = [replace(one, effect="effect", joint=f"joint_{k}") for k, one in enumerate(candidates)]
-    (cause,) = attribute(system, alike, seed=0).causes
+    (cause,) = attribute(system, alike, seed=0, limits=DEFAULT).causes
     assert cause.joints == ("joint_0", "joint_1")
 
 
@@ -108,7 +109,7 @@ def test_a_mixture_that_comes_first_gives_way_to_the_two_that_it_stands_for():
 
 def test_effects_that_cannot_be_told_apart_are_rivals_whose_columns_agree():
     system, candidates = system_of([[1.0, 0.0], [1.0, 1e-3]], [0.3, 0.0])
-    (cause,) = attribute(system, candidates, seed=0).causes
+    (cause,) = attribute(system, candidates, seed=0, limits=DEFAULT).causes
     rival = "effect_1" if cause.effect == "effect_0" else "effect_0"
     assert cause.rivals == (rival,)
     assert cause.rival_correlations[rival] == pytest.approx(1.0, abs=1e-3)
@@ -116,7 +117,7 @@ def test_effects_that_cannot_be_told_apart_are_rivals_whose_columns_agree():
 
 def test_effects_that_share_nothing_do_not_correlate():
     system, candidates = system_of(np.eye(2), [0.3, 0.0])
-    (cause,) = attribute(system, candidates, seed=0).causes
+    (cause,) = attribute(system, candidates, seed=0, limits=DEFAULT).causes
     assert cause.rivals == ()
     assert cause.rival_correlations["effect_1"] < 0.05
 
@@ -132,19 +133,23 @@ def test_the_canonical_correlation_of_two_columns_is_their_correlation(correlati
 def test_uneven_gains_in_every_group_are_sure_and_mixed_ones_are_not():
     uneven = np.array([2.75, 0.27, 0.05, 0.08, 0.08, 0.12, 0.44, 1.04, 0.13])
     everywhere = np.ones(9)
-    assert between_groups(uneven, everywhere) > 3
-    assert between_groups(uneven * np.array([1, -1, 1, -1, 1, -1, -1, -1, 1]), everywhere) < 1
-    assert between_groups(np.array([1.0]), np.array([1.0])) == 0
+    assert between_groups(uneven, everywhere, DEFAULT.selection) > 3
+    assert between_groups(uneven * np.array([1, -1, 1, -1, 1, -1, -1, -1, 1]), everywhere, DEFAULT.selection) < 1
+    assert between_groups(np.array([1.0]), np.array([1.0]), DEFAULT.selection) == 0
 
 
 def test_groups_that_an_effect_says_nothing_of_do_not_count():
     gain = np.array([0.9, -0.01, 0.8, 0.0, -0.02, 1.1, -0.01])
-    assert between_groups(gain, np.ones(7)) < 2.3
-    assert between_groups(gain, np.abs(gain)) > 10
-    assert between_groups(gain[[0, 1, 3]], np.abs(gain[[0, 1, 3]])) < 2.3  # of one that speaks nothing can be said
+    assert between_groups(gain, np.ones(7), DEFAULT.selection) < 2.3
+    assert between_groups(gain, np.abs(gain), DEFAULT.selection) > 10
+    assert (
+        between_groups(gain[[0, 1, 3]], np.abs(gain[[0, 1, 3]]), DEFAULT.selection) < 2.3
+    )  # of one that speaks nothing can be said
 
 
 @given(arrays(float, 6, elements=st.integers(-50, 50), unique=True), st.floats(0.1, 10))
 def test_the_unit_of_gain_does_not_matter(gain, unit):
     said = np.arange(1.0, 7.0)
-    assert between_groups(unit * gain, said) == pytest.approx(between_groups(gain, unit * said), rel=1e-6, abs=1e-6)
+    assert between_groups(unit * gain, said, DEFAULT.selection) == pytest.approx(
+        between_groups(gain, unit * said, DEFAULT.selection), rel=1e-6, abs=1e-6
+    )

@@ -13,6 +13,7 @@ from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import followed
 from irtwin.gap.localisation.regimes import JOINT_REGIMES
 from irtwin.gap.regression.residuals import Trace
+from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(3)
 JOINTS = ROBOT.joint_names
@@ -48,10 +49,10 @@ def labels(*kinds):
 
 
 def located(observed, others=(), acting=None):
-    seen, known = joint_maps((observed, others), labels(observed, others))
+    seen, known = joint_maps((observed, others), labels(observed, others), DEFAULT)
     follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
-    level = level_of(FLOOR, seen, known)
-    return locate("torque", JOINTS, follows, seen, level, reference=known, acting=acting)
+    level = level_of(FLOOR, seen, known, DEFAULT.places.fewest_samples)
+    return locate("torque", JOINTS, follows, seen, level, limits=DEFAULT.places, reference=known, acting=acting)
 
 
 def test_noise_has_no_place():
@@ -100,10 +101,10 @@ def test_a_cause_of_which_no_place_is_sure_has_those_to_which_it_adds():
     observed = traces(noise=0.3)
     inertia = on(1, lambda m, t: 0.1 * m.ddq[:, 1])
     added = [replace(trace, residual=inertia(trace.motion, trace.torque)) for trace in observed]
-    seen, acts = joint_maps((observed, added), labels(observed, added))
+    seen, acts = joint_maps((observed, added), labels(observed, added), DEFAULT)
     acting = np.array([False, True, False])
-    level = level_of(FLOOR, seen, None)
-    places = locate("torque", JOINTS, [None] * 3, seen, level, acting=acting, acts=acts)
+    level = level_of(FLOOR, seen, None, DEFAULT.places.fewest_samples)
+    places = locate("torque", JOINTS, [None] * 3, seen, level, limits=DEFAULT.places, acting=acting, acts=acts)
     assert {place.joint for place in places} == {"joint_2"}
     assert places[0].regime in {"accelerating", "braking", "reversal"}
     assert all(place.q > 0.05 for place in places)
@@ -126,15 +127,22 @@ def test_one_run_is_cut_in_time():
 
 
 def test_places_without_a_known_floor_stand_out_of_their_joint():
-    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()))
-    places = locate("torque", JOINTS, ["acceleration"] * 3, seen, level_of(None, seen, None))
+    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()), DEFAULT)
+    places = locate(
+        "torque",
+        JOINTS,
+        ["acceleration"] * 3,
+        seen,
+        level_of(None, seen, None, DEFAULT.places.fewest_samples),
+        limits=DEFAULT.places,
+    )
     assert places[0].joint == "joint_2"
     assert places[0].regime in ("accelerating", "braking", "loaded")
 
 
 def test_a_map_has_every_joint_and_regime():
-    (seen,) = joint_maps([traces()], labels(traces()))
-    drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None))
+    (seen,) = joint_maps([traces()], labels(traces()), DEFAULT)
+    drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None, DEFAULT.places.fewest_samples))
     assert drawn["regimes"] == list(JOINT_REGIMES)
     assert np.array(drawn["excess"]).shape == (3, len(JOINT_REGIMES))
     assert np.all(np.isfinite(drawn["excess"]))
@@ -145,8 +153,15 @@ def test_power_that_is_given_back_is_located():
     for trace in traces():
         given = np.minimum((trace.torque * trace.motion.dq).sum(axis=1), 0.0)
         observed.append(replace(trace, residual=(trace.residual[:, 0] - given)[:, None]))
-    (seen,) = robot_maps([observed], labels(observed))
-    first = locate("power", (None,), ("mechanical_power",), seen, level_of(np.array([0.5]), seen, None))[0]
+    (seen,) = robot_maps([observed], labels(observed), DEFAULT)
+    first = locate(
+        "power",
+        (None,),
+        ("mechanical_power",),
+        seen,
+        level_of(np.array([0.5]), seen, None, DEFAULT.places.fewest_samples),
+        limits=DEFAULT.places,
+    )[0]
     assert (first.joint, first.regime) == (None, "regenerating")
 
 

@@ -12,7 +12,7 @@ from tests.synthetic import arm, measure, swing
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
-from irtwin.gap.experiment.next_experiment import ENOUGH, Proposal, next_experiment
+from irtwin.gap.experiment.next_experiment import Proposal, next_experiment
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.experiment.programmes import programmes
 from irtwin.gap.experiment.separation import fitted, projected, unimitated
@@ -23,6 +23,7 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.report.gap.figures import experiment
@@ -56,7 +57,9 @@ def ground_of(motions, tried, cause=None, rivals=()):
         values = np.array([term.expected for _, term in stack.torque_terms])
         return stack.real_torque(motion, values)
 
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
+    grouping = Grouping(
+        {m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.admission.fewest_groups
+    )
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     found = tuple(hypotheses(system.columns, system.base, MISSING))
     noise = np.full(2, NOISE)
@@ -70,7 +73,7 @@ def ground_of(motions, tried, cause=None, rivals=()):
     finding = Finding(
         "torque", ROBOT.joint_names, observed, system, attribution, held_out(system, noise, noise, ()), None, nothing
     )
-    return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)))
+    return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +113,7 @@ def test_joints_that_are_not_asked_for_stand_still(motions):
 
 def test_a_page_draws_the_joints_that_move(motions):
     ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
-    proposal = Proposal("tell", (), ladder.joints, ROBOT, ladder, (), (), (), None)
+    proposal = Proposal("tell", (), ladder.joints, ROBOT, ladder, (), (), (), None, 5.0)
     assert proposal.curve["joints"] == ["joint_2"]
     assert len(proposal.curve["q"]) == 1
     assert np.ptp(proposal.curve["q"][0]) > 0
@@ -120,7 +123,7 @@ def test_a_page_draws_the_joints_that_move(motions):
 def test_positions_of_sliding_joints_are_in_metres(motions):
     gantry = arm(2, slides=(1,))
     both = next(iter(programmes(gantry, [], motions)))
-    drawn = Proposal("tell", (), both.joints, gantry, both, (), (), (), None).curve
+    drawn = Proposal("tell", (), both.joints, gantry, both, (), (), (), None, 5.0).curve
     assert drawn["units"] == ["rad", "m"]
     assert experiment(drawn)["layout"]["yaxis"]["title"]["text"] == "position, rad or m"
     assert "m/s" in next(iter(programmes(gantry, ["joint_2"], motions))).text
@@ -139,7 +142,7 @@ def test_a_programme_lasts_minutes_and_has_no_million_samples(motions, speed, ra
 def test_where_every_programme_would_last_too_long_it_is_said(motions):
     robot = replace(ROBOT, joints=tuple(replace(joint, velocity=1e-5) for joint in ROBOT.joints))
     silent = catalogue()["stribeck_friction"]
-    proposal = next_experiment(robot, [ground_of(motions, [silent.id])], [silent], motions)
+    proposal = next_experiment(robot, [ground_of(motions, [silent.id])], [silent], motions, DEFAULT.experiment)
     assert proposal.programme is None or proposal.programme.seconds <= 600
 
 
@@ -170,7 +173,7 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
         "stribeck_friction",
         ["nonlinear_viscous_friction"],
     )
-    proposal = next_experiment(ROBOT, [channel], [], motions)
+    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
     (weight,) = proposal.weights
     assert proposal.programme is not None and weight.reached
     planned = [replace(m, run=f"new_{k}") for k, m in enumerate(proposal.programme.motions)]
@@ -198,7 +201,7 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
 
 def test_of_two_names_for_one_thing_none_is_told(motions):
     channel = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"])
-    proposal = next_experiment(ROBOT, [channel], [], motions)
+    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
     assert proposal.programme is None
     assert "cannot be told apart" in proposal.note
     assert proposal.to_json()["expected_separation"] is None
@@ -206,22 +209,24 @@ def test_of_two_names_for_one_thing_none_is_told(motions):
 
 def test_a_payload_in_every_run_asks_for_runs_without(motions):
     channel = ground_of(motions, ["payload"])
-    proposal = next_experiment(ROBOT, [channel], [catalogue()["payload"]], motions)
+    proposal = next_experiment(ROBOT, [channel], [catalogue()["payload"]], motions, DEFAULT.experiment)
     assert proposal.programme.kind == "without_payload"
     (weight,) = proposal.weights
-    assert weight.now < 1 < ENOUGH < weight.expected
+    assert weight.now < 1 < DEFAULT.experiment.enough < weight.expected
 
 
 def test_temperature_that_nobody_logged_asks_for_a_warm_up(motions):
     channel = ground_of(motions, ["payload"])
-    proposal = next_experiment(ROBOT, [channel], [catalogue()["temperature_dependent_friction"]], motions)
+    proposal = next_experiment(
+        ROBOT, [channel], [catalogue()["temperature_dependent_friction"]], motions, DEFAULT.experiment
+    )
     assert proposal.programme.kind == "warm_up"
     assert proposal.to_json()["programme"]["temperatures"] == [25.0, 45.0]
 
 
 def test_what_no_signal_shows_is_said_in_words(motions):
     channel = ground_of(motions, ["payload"])
-    document = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions).to_json()
+    document = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions, DEFAULT.experiment).to_json()
     assert document["programme"] is None
     assert "log power" in document["motions"][0]
 
@@ -233,7 +238,7 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
         "stribeck_friction",
         ["nonlinear_viscous_friction"],
     )
-    proposal = next_experiment(ROBOT, [channel], [], motions)
+    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
     document = proposal.to_json()
     json.dumps(document, allow_nan=False)
     assert document["purpose"] == "tell stribeck_friction from nonlinear_viscous_friction"
@@ -244,4 +249,4 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
 
 
 def test_nothing_to_ask(motions):
-    assert next_experiment(ROBOT, [ground_of(motions, ["payload"])], [], motions) is None
+    assert next_experiment(ROBOT, [ground_of(motions, ["payload"])], [], motions, DEFAULT.experiment) is None

@@ -14,6 +14,7 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.payloads import untold_payload
+from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(4)
 LOAD = np.array([0.6, 0.0, 0.02, 0.05, 0, 0, 0, 0, 0, 0])
@@ -27,9 +28,11 @@ def search(loaded, observed=range(8), added=None):
         extra = Payload().contribution(ROBOT, motion, LOAD) if seed in loaded else 0.0
         extra = extra + (added(seed, motion) if added else 0.0)
         motions.append(replace(shown, torque=shown.torque + extra))
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed))
+    grouping = Grouping(
+        {m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed), DEFAULT.admission.fewest_groups
+    )
     system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
-    return untold_payload(ROBOT, system, noise_before(system), seed=0)
+    return untold_payload(ROBOT, system, noise_before(system), DEFAULT.some_payload, seed=0)
 
 
 def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():

@@ -13,12 +13,17 @@ from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.power_consistency import PowerBalance, filtered, kind_of, refuted
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
 ROBOT = arm(2)
 KNOWN = catalogue()
 WITH_LOSS = (*BASELINE, "copper_loss")
-MECHANICAL, SENSOR, UNDECIDED = PowerBalance(0.5, 8.0), PowerBalance(-0.5, -8.0), PowerBalance(0.5, 1.0)
+MECHANICAL, SENSOR, UNDECIDED = (
+    PowerBalance(0.5, 8.0, DEFAULT.power_consistency),
+    PowerBalance(-0.5, -8.0, DEFAULT.power_consistency),
+    PowerBalance(0.5, 1.0, DEFAULT.power_consistency),
+)
 
 
 def data_set(real=None, late=0.0):
@@ -70,7 +75,7 @@ def test_power_drops_rivals_of_the_other_kind():
 def test_power_that_does_not_decide_drops_nothing():
     friction = cause("load_dependent_friction", "torque_constant_error")
     assert filtered(friction, UNDECIDED, KNOWN) == friction
-    assert filtered(friction, PowerBalance(0.01, 9.0), KNOWN) == friction
+    assert filtered(friction, PowerBalance(0.01, 9.0, DEFAULT.power_consistency), KNOWN) == friction
     assert refuted([friction], [UNDECIDED], KNOWN) == frozenset()
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, REPEATS, Floor
 from irtwin.gap.isolation.verdict import AMBIGUOUS, ATTRIBUTED, NO_GAP, UNEXPLAINED, verdict_of
+from irtwin.gap.thresholds import DEFAULT
 
 CAUSE = SimpleNamespace(rivals=())
 
@@ -18,7 +19,7 @@ def verdict(before, after, causes=(), source=REPEATS):
     system = SimpleNamespace(both=False)
     floor = np.ones(len(before))
     finding = SimpleNamespace(causes=causes, floor=floor, system=system, fitted=(np.array(before), np.array(after)))
-    return verdict_of([finding], Floor(floor, None, source))
+    return verdict_of([finding], Floor(floor, None, source), DEFAULT.verdict)
 
 
 def test_a_gap_that_is_closed_is_attributed():

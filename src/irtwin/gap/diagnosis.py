@@ -37,6 +37,7 @@ from irtwin.gap.regression.cross_fitted import LeftOut, twin_power
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
 from irtwin.gap.screening.screen import screen
+from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
@@ -62,6 +63,7 @@ class Diagnosis:
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
     against: str | None = None  # the role of the runs that the observed ones are held against
+    thresholds: Thresholds = DEFAULT
     yardstick: dict[str, Any] = field(default_factory=dict)  # each channel's, what could be closed at all
 
     @property
@@ -78,7 +80,10 @@ class Diagnosis:
             "robot": robot.name,
             "gap": document.gap(robot.joint_names, self.channels, self.energies),
             "locations": [location.to_json() for location in self.locations],
-            "causes": [document.cause(robot, finding, cause, gains, self.verdict) for finding, cause in self.causes],
+            "causes": [
+                document.cause(robot, finding, cause, gains, self.verdict, self.thresholds.confidence)
+                for finding, cause in self.causes
+            ],
             "not_testable": [{"effect": one.effect, "why": one.why} for one in self.untestable],
             "shrink": {
                 **document.shrink(robot, self.runs, self.channels, self.floor, self.energies, self.seed),
@@ -94,19 +99,20 @@ def diagnose(
     *,
     withhold: Sequence[str] = (),
     unknown: Sequence[str] = (),
+    thresholds: Thresholds = DEFAULT,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
     `withhold` takes effects out of the twin and leaves them in the catalogue; `unknown` are those that the search is
-    not to know; `progress` is told each step. Raises InputError on an effect that the catalogue lacks or the twin has
-    not, and where the data set cannot be diagnosed.
+    not to know; `thresholds` decide what is said; `progress` is told each step. Raises InputError on an effect that the
+    catalogue lacks or the twin has not, and where the data set cannot be diagnosed.
     """
     tell = progress or (lambda line: None)
     tell(f"Filtering {len(data_set.runs)} runs")
-    case = case_of(data_set, withhold)
-    floor = noise_floor(case.runs, case.motions)
+    case = case_of(data_set, withhold, thresholds)
+    floor = noise_floor(case.runs, case.motions, thresholds.repeats)
     stack = Stack(case.robot, [*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
@@ -128,18 +134,22 @@ def diagnose(
         explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = verdict_of(findings, floor)
+    verdict = verdict_of(findings, floor, thresholds.verdict)
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
     silent = [effect for effect in catalogue().values() if effect.id not in blamed]
-    lacking = untestable(silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen)
+    lacking = untestable(
+        silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
+    )
     left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
     located = places(left, seed)
     tell("Designing the next experiment")
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
     measures = {channel.finding.name: flexible_regression(channel, case.seen, seed) for channel in planned}
-    proposal = next_experiment(case.robot, planned, [catalogue()[one.effect] for one in lacking], case.seen)
+    proposal = next_experiment(
+        case.robot, planned, [catalogue()[one.effect] for one in lacking], case.seen, thresholds.experiment
+    )
     return Diagnosis(
         description=case.robot,
         verdict=verdict,
@@ -154,6 +164,7 @@ def diagnose(
         twin=closed_twin(case, causes),
         energies=energies,
         against=case.against,
+        thresholds=thresholds,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
     )
 
@@ -173,7 +184,7 @@ def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stac
         through_power = ThroughPower(stack, case.with_power)
         return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
     if case.shows("torque"):
-        check_same_robot(case.runs, stack, plain)
+        check_same_robot(case.runs, stack, plain, case.thresholds.same_robot)
     left_out = LeftOut(stack, plain)
     return stack, left_out.torque, left_out.below
 

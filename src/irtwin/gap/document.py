@@ -17,6 +17,7 @@ from irtwin.gap.isolation.verdict import UNEXPLAINED
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
+from irtwin.gap.thresholds import Confidence
 from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
 
@@ -40,14 +41,16 @@ def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErro
     return document
 
 
-def cause(robot: Robot, finding: Finding, one: Cause, gains: Sequence[float], verdict: str) -> Json:
+def cause(
+    robot: Robot, finding: Finding, one: Cause, gains: Sequence[float], verdict: str, weights: Confidence
+) -> Json:
     """Return a cause with its parameters and evidence; `gains` are those of all causes."""
     closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
     return {
         "effect": one.effect,
         "joints": acted_on(robot, one),
         "scope": one.scope,
-        "confidence": confidence(one.t, one.gain, closed, share, len(gains), unexplained=unexplained),
+        "confidence": confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained),
         "parameters": parameters(robot, finding, one),
         "indistinguishable_from": list(one.rivals),
         "evidence": {

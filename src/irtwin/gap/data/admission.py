@@ -7,15 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from irtwin.errors import InputError
+from irtwin.gap.thresholds import Admission
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 
-_SLOW = 1e-3  # rad/s (m/s)
-_SHORTEST = 1.0  # s of all observed runs: in less no robot makes a move, and any twin fits
-_STILL = 1e-3  # rad (m): noise of a joint that stands still spans less
 
-
-def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
+def admit(data_set: DataSet, motions: Mapping[str, Motion], limits: Admission) -> None:
     """Raise InputError, naming the file and what to do, where no diagnosis is possible; `motions` by name of the run.
 
     There have to be observed runs, a second long together, with torque or power that changes with the motion, in which
@@ -30,14 +27,15 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion]) -> None:
     if not any(motion.torque is not None or motion.power is not None for motion in seen):
         raise InputError(f"{file}: {_nothing_measured(seen)}")
     seconds = sum(float(motion.time[-1] - motion.time[0]) for motion in seen)
-    if seconds < _SHORTEST:
+    if seconds < limits.least_time:
         raise InputError(
             f"{file}: the observed runs last {seconds:.2g} s together, too short to tell a gap from none; log at least "
-            f"{_SHORTEST:g} s in motion"
+            f"{limits.least_time:g} s in motion"
         )
-    if not any(_moving(motion).any() for motion in seen):
+    moving = {run.name: _moving(motions[run.name], limits) for run in observed}
+    if not any(each.any() for each in moving.values()):
         raise InputError(f"{file}: no joint moves in any observed run; log runs in motion")
-    _check_dead([run for run in observed if _moving(motions[run.name]).any()], data_set.robot.joint_names, motions)
+    _check_dead([run for run in observed if moving[run.name].any()], data_set.robot.joint_names, moving)
     others = [run for run in data_set.runs if run.role != "observed"]
     if others and not _overlap(seen, [motions[run.name] for run in others]):
         raise InputError(
@@ -56,12 +54,14 @@ def _nothing_measured(motions: Sequence[Motion]) -> str:
     return "neither torque nor power was measured in any observed run; log tau_, i_ or power"
 
 
-def _moving(motion: Motion) -> np.ndarray:
+def _moving(motion: Motion, limits: Admission) -> np.ndarray:
     """Return (n,) which joints move."""
-    return np.asarray((np.abs(motion.dq).max(axis=0) > _SLOW) & (np.ptp(motion.q, axis=0) > _STILL))
+    return np.asarray(
+        (np.abs(motion.dq).max(axis=0) > limits.moving_speed) & (np.ptp(motion.q, axis=0) > limits.moving_range)
+    )
 
 
-def _check_dead(runs: Sequence[Run], joints: Sequence[str], motions: Mapping[str, Motion]) -> None:
+def _check_dead(runs: Sequence[Run], joints: Sequence[str], moving: Mapping[str, np.ndarray]) -> None:
     """Raise where the torque of a joint that moves, or power, is one and the same number throughout all runs.
 
     A fit to it would be perfect, and say that there is no gap.
@@ -70,7 +70,7 @@ def _check_dead(runs: Sequence[Run], joints: Sequence[str], motions: Mapping[str
     if powers and all(np.ptp(power) == 0 for power in powers):
         raise _dead(runs[0], "column power")
     for joint, name in enumerate(joints):
-        moved = [run for run in runs if run.signals.torque is not None and _moving(motions[run.name])[joint]]
+        moved = [run for run in runs if run.signals.torque is not None and moving[run.name][joint]]
         torques = [run.signals.torque[:, joint] for run in moved if run.signals.torque is not None]
         if torques and all(np.ptp(torque) == 0 for torque in torques):
             raise _dead(moved[0], f"the torque of {name}, by column tau_{name} or i_{name},")

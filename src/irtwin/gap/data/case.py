@@ -12,6 +12,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.data.admission import admit
 from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import choose_cutoff, condition
@@ -32,6 +33,7 @@ class Case:
     runs: tuple[Run, ...]
     motions: dict[str, Motion]
     given: tuple[Robot, dict[str, Motion]]
+    thresholds: Thresholds
 
     @property
     def observed(self) -> frozenset[str]:
@@ -41,7 +43,7 @@ class Case:
     @property
     def grouping(self) -> Grouping:
         """Which runs are left out together: those of one programmed motion."""
-        return Grouping(_labels(self.runs), self.observed)
+        return Grouping(_labels(self.runs), self.observed, self.thresholds.admission.fewest_groups)
 
     @property
     def seen(self) -> list[Motion]:
@@ -83,7 +85,7 @@ class Case:
         return any(getattr(motion, signal) is not None for motion in self.seen)
 
 
-def case_of(data_set: DataSet, withhold: Sequence[str]) -> Case:
+def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds) -> Case:
     """Prepare a data set; `withhold` takes effects out of the twin.
 
     Raises InputError on an effect that the catalogue lacks or the twin has not, and where `admit` does.
@@ -92,8 +94,8 @@ def case_of(data_set: DataSet, withhold: Sequence[str]) -> Case:
     cutoff = choose_cutoff(data_set.runs)
     given = {run.name: condition(run, data_set.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(data_set.robot, given)
-    admit(data_set, motions)
-    return Case(robot, effects, data_set.runs, motions, (data_set.robot, given))
+    admit(data_set, motions, thresholds.admission)
+    return Case(robot, effects, data_set.runs, motions, (data_set.robot, given), thresholds)
 
 
 def twin_effects(data_set: DataSet, withhold: Sequence[str]) -> tuple[str, ...]:

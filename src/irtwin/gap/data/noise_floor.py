@@ -9,15 +9,13 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
 
+from irtwin.gap.thresholds import Repeats
 from irtwin.signals.filter import kernel, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
 REPEATS, OUT_OF_BAND = "repeats", "out_of_band"
-_LONGEST_SHIFT = 1.0  # s, between the starts of a motion and its repeat
-_SAME = 0.1  # of the motion's size: repeats that differ by more are no repeats
 _LEAST = 1e-9  # N m or W: of a channel that repeats itself to the last bit
-_MARGIN = 1.05  # of the cutoff: where the filter's stop band begins in earnest
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class Floor:
     source: str | None
 
 
-def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion]) -> Floor:
+def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repeats) -> Floor:
     """Return the floor: from repeats of one motion where there are any, else from above the band.
 
     A simulator's runs say nothing of it: they have no noise, and repeat themselves.
@@ -42,12 +40,12 @@ def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion]) -> Floor:
     """
     runs = [run for run in runs if run.role != "simulated"]
     pairs = [(motions[run.repeat_of], motions[run.name]) for run in runs if run.repeat_of and _has_repeat(run, runs)]
-    torque = _pooled([_difference(a, b, "torque") for a, b in pairs])
-    power = _pooled([_difference(a, b, "power") for a, b in pairs])
+    torque = _pooled([_difference(a, b, "torque", limits) for a, b in pairs])
+    power = _pooled([_difference(a, b, "power", limits) for a, b in pairs])
     if torque is not None or power is not None:
         return Floor(torque, None if power is None else float(power[0]), REPEATS)
-    torque = _pooled([_above(run.signals.time, run.signals.torque, motions[run.name]) for run in runs])
-    power = _pooled([_above(run.signals.time, run.signals.power, motions[run.name]) for run in runs])
+    torque = _pooled([_above(run.signals.time, run.signals.torque, motions[run.name], limits) for run in runs])
+    power = _pooled([_above(run.signals.time, run.signals.power, motions[run.name], limits) for run in runs])
     source = None if torque is None and power is None else OUT_OF_BAND
     return Floor(torque, None if power is None else float(power[0]), source)
 
@@ -61,12 +59,12 @@ def _pooled(variances: Sequence[np.ndarray | None]) -> np.ndarray | None:
     return np.maximum(np.sqrt(np.mean(known, axis=0)), _LEAST) if known else None
 
 
-def _difference(first: Motion, second: Motion, signal: str) -> np.ndarray | None:
+def _difference(first: Motion, second: Motion, signal: str, limits: Repeats) -> np.ndarray | None:
     """Return half the mean square difference of two runs of one motion, (n,) or (1,)."""
     one, two = getattr(first, signal), getattr(second, signal)
     if one is None or two is None:
         return None
-    shift = _shift(first, second)
+    shift = _shift(first, second, limits.largest_shift)
     start = max(first.time[0], second.time[0] + shift) + 1e-9
     stop = min(first.time[-1], second.time[-1] + shift) - 1e-9
     inside = (first.time >= start) & (first.time <= stop)
@@ -74,7 +72,7 @@ def _difference(first: Motion, second: Motion, signal: str) -> np.ndarray | None
         return None
     time = first.time[inside]
     q = make_interp_spline(second.time + shift, second.q)(time)
-    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > _SAME * max(float(first.q.std()), 1e-3):
+    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.largest_difference * max(float(first.q.std()), 1e-3):
         return None
     again = make_interp_spline(second.time + shift, two, k=1)(time)
     squares = (one[inside] - again) ** 2 / 2
@@ -86,7 +84,7 @@ def _without_jumps(squares: np.ndarray) -> np.ndarray:
     return np.asarray(np.minimum(squares, np.quantile(squares, 0.99, axis=0)))
 
 
-def _shift(first: Motion, second: Motion) -> float:
+def _shift(first: Motion, second: Motion, largest: float) -> float:
     """Return by how much later (s) the second motion has to be moved to lie on the first."""
     spline = make_interp_spline(second.time, second.q)
     low, high = second.time[0], second.time[-1]
@@ -98,17 +96,17 @@ def _shift(first: Motion, second: Motion) -> float:
         return float(np.mean((spline(time[inside] - shift) - q[inside]) ** 2)) if inside.any() else np.inf
 
     offset = first.time[0] - second.time[0]
-    grid = offset + np.linspace(-_LONGEST_SHIFT, _LONGEST_SHIFT, 81)
+    grid = offset + np.linspace(-largest, largest, 81)
     best = grid[int(np.argmin([distance(shift) for shift in grid]))]
     step = grid[1] - grid[0]
     return float(minimize_scalar(distance, bounds=(best - step, best + step), method="bounded").x)
 
 
-def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion) -> np.ndarray | None:
+def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Repeats) -> np.ndarray | None:
     """Return the variance in the band of white noise that has, above it, what the filter takes away."""
     if signal is None or motion.cutoff is None or len(kernel(motion.rate, motion.cutoff)) == 1:
         return None
-    share = min(1.0, _MARGIN * motion.cutoff / (motion.rate / 2))
+    share = min(1.0, limits.stop_band * motion.cutoff / (motion.rate / 2))
     if share > 0.9:
         return None
     even = make_interp_spline(time, signal, k=1)(motion.time)

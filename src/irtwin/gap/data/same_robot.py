@@ -13,20 +13,14 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored
 from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.gap.thresholds import SameRobot
 from irtwin.robot.description import Robot
 from irtwin.signals.log import Run
 
-# of a joint's mean square, left by the bodies of the other runs: twice what gains of 0.7 or 1.4 on two joints leave;
-# a simulator's masses may be off by tens of percent
-_FOREIGN = {"reference": 0.06, "simulated": 0.3}
-_JOINTS = 2
-_OPPOSED = 0.3  # of the observed friction, with the other sign
-_HALF = 0.5  # of the joints
-_HEAVIEST = 20.0  # kg, of a load that came or went; half of what the arm weighs where that is more
 _REACH = (1.0, 0.4, 0.4, 0.4, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)  # m, m^2: its first moments and inertia, per kg
 
 
-def check_same_robot(runs: Sequence[Run], stack: Stack, system: System) -> None:
+def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: SameRobot) -> None:
     """Raise InputError where the torque of the other runs (reference, simulated) is nothing like the observed.
 
     `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or its bodies explain it no
@@ -40,9 +34,9 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System) -> None:
     other = system.solution((), np.sum([m for m, own in zip(moments, seen, strict=True) if not own], axis=0))
     total = np.sum([m for m, own in zip(moments, seen, strict=True) if own], axis=0)
     own = system.solution((), total)
-    foreign = _foreign_share(stack.robot, system, total, own, other) > _FOREIGN[others[0].role]
-    opposed = _opposed(stack.robot, system, own, other)
-    if foreign.sum() >= _JOINTS or opposed.mean() >= _HALF:
+    foreign = _foreign_share(stack.robot, system, total, own, other, limits) > limits.foreign[others[0].role]
+    opposed = _opposed(stack.robot, system, own, other, limits.opposed)
+    if foreign.sum() >= limits.foreign_joints or opposed.mean() >= limits.opposed_joints:
         named = [name for k, name in enumerate(stack.robot.joint_names) if foreign[k] or opposed[k]]
         raise InputError(
             f"{others[0].file}: the torque of the {others[0].role} runs is nothing like that of the observed runs (on "
@@ -50,13 +44,15 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System) -> None:
         )
 
 
-def _foreign_share(robot: Robot, system: System, total: np.ndarray, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _foreign_share(
+    robot: Robot, system: System, total: np.ndarray, own: np.ndarray, other: np.ndarray, limits: SameRobot
+) -> np.ndarray:
     """Return how much of each observed joint's mean square (n,) the bodies of the other runs leave.
 
     Friction, offsets and rotors are refitted, and a load of a likely size may have come or gone; what the observed
     runs' own bodies leave too is not counted. `own`, `other`: coefficients (D,) of either kind of run.
     """
-    borrowed = other + _refitted(total, other, _allowed(robot, system))
+    borrowed = other + _refitted(total, other, _allowed(robot, system, limits.heaviest_load))
     nothing = np.zeros(len(other))
     nothing[: system.base] = -system.expected / system.scale[: system.base]
 
@@ -67,7 +63,7 @@ def _foreign_share(robot: Robot, system: System, total: np.ndarray, own: np.ndar
     return np.asarray((squares(borrowed) - squares(own)) / np.maximum(squares(nothing), np.finfo(float).tiny))
 
 
-def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray, least: float) -> np.ndarray:
     """Return on which joints (n,) all friction of the other runs drives where that of the observed runs brakes."""
     opposed = []
     for joint in robot.joint_names:
@@ -78,14 +74,14 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -
         ]
         seen = own[places] + system.expected[places] / system.scale[places]
         elsewhere = other[places] + system.expected[places] / system.scale[places]
-        opposed.append(bool(places) and bool(np.all(elsewhere * np.sign(seen) < -_OPPOSED * np.abs(seen))))
+        opposed.append(bool(places) and bool(np.all(elsewhere * np.sign(seen) < -least * np.abs(seen))))
     return np.array(opposed)
 
 
-def _allowed(robot: Robot, system: System) -> np.ndarray:
+def _allowed(robot: Robot, system: System, heaviest: float) -> np.ndarray:
     """Return how far each of the twin's terms (K,) may move, in units of its prior: bodies not, a load on the last."""
     bodies = np.array([effect.bodies for effect, _ in system.terms], dtype=bool)
-    weight = max(_HEAVIEST, sum(inertia.mass for inertia in robot.model.inertias) / 2)
+    weight = max(heaviest, sum(inertia.mass for inertia in robot.model.inertias) / 2)
     allowed = np.where(bodies, 0.0, np.inf)
     last = np.flatnonzero(bodies)[-len(_REACH) :]
     allowed[last] = (weight * np.array(_REACH) / system.scale[last])[: len(last)]

@@ -23,7 +23,6 @@ _WAVES = 60  # random features
 _DIMENSIONS = 3  # at most, that one random feature depends on
 _SCALES = (0.25, 0.5, 1.0)  # waves over the range of a variable
 _RIDGES = (1e-3, 1e-2, 1e-1)  # of the mean square of a feature
-_LEAST_GAP = 0.1  # of the floor's mean square: less is no gap to part
 _STANDSTILL = 1e-3  # rad/s
 _MEMORY = (0.1, 0.5)  # s
 
@@ -34,6 +33,7 @@ class FlexibleRegression:
 
     `plain`, `closed`: what the twin and the twin with its causes leave, refitted to all runs; `plain_regressed` and
     `closed_regressed`: what a regression of these on the motion leaves. `floor` (g,): RMS of the noise; None: unknown.
+    A gap smaller than `least_gap`, of the floor's mean square, has no shares.
     """
 
     plain: np.ndarray
@@ -41,6 +41,7 @@ class FlexibleRegression:
     closed: np.ndarray
     closed_regressed: np.ndarray
     floor: np.ndarray | None
+    least_gap: float
 
     def shares(self) -> dict[str, Any]:
         """Return which part of the gap above the floor could be closed, in all equations and in each.
@@ -60,11 +61,11 @@ class FlexibleRegression:
         }
         parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
         total = float(np.maximum(gap, 0.0).sum())
-        total = total if total > _LEAST_GAP * len(gap) else 0.0
+        total = total if total > self.least_gap * len(gap) else 0.0
         shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
         for name, part in parts.items():
             shares[f"{name}_by_equation"] = [
-                _share(float(p), float(g) if g > _LEAST_GAP else 0.0) for p, g in zip(part, gap, strict=True)
+                _share(float(p), float(g) if g > self.least_gap else 0.0) for p, g in zip(part, gap, strict=True)
             ]
         return shares | {
             "of": "the mean square, as no floor is known" if self.floor is None else "the gap above the floor"
@@ -94,7 +95,8 @@ def flexible_regression(channel: PlannedEquations, motions: Sequence[Motion], se
         residuals = np.column_stack([plain[:, equation], closed[:, equation]])
         sums.append(_regressed(features, residuals, group))
     plain_squares, plain_left, closed_squares, closed_left = np.array(sums).T
-    return FlexibleRegression(plain_squares, plain_left, closed_squares, closed_left, channel.finding.floor)
+    least = channel.thresholds.experiment.least_gap
+    return FlexibleRegression(plain_squares, plain_left, closed_squares, closed_left, channel.finding.floor, least)
 
 
 @dataclass(frozen=True)

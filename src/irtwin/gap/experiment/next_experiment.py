@@ -15,15 +15,10 @@ from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
+from irtwin.gap.thresholds import Experiment, Thresholds
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
-ENOUGH = 5.0  # standard deviations
-_LEAST_SHARE = 0.06  # of a cause that its rival must not imitate: twice of what counts as equally good
-_LEAST_VISIBLE = 0.05  # mean square in units of the noise's, as in `irtwin.gap.isolation.detectability`
-_IDENTICAL = 1e-3  # of it: less is the same in other words
-_HELPS = 1.1  # times the separation there is: less is not worth an experiment
-_FOREMOST = 4  # of a class of rivals
 _DRAWN = 400  # points of a curve on a page
 
 
@@ -45,6 +40,7 @@ class Weight:
     expected: float
     share_now: float
     share: float
+    thresholds: Thresholds
 
     @property
     def added(self) -> float:
@@ -54,14 +50,22 @@ class Weight:
     @property
     def known(self) -> bool:
         """Whether the data show an effect already."""
-        return len(self.effects) == 1 and self.now >= ENOUGH and self.share_now >= _LEAST_VISIBLE
+        return len(self.effects) == 1 and self.now >= self._enough and self.share_now >= self._visible
 
     @property
     def reached(self) -> bool:
         """Whether the programme would answer the question; of rivals by itself, as the data there are do not."""
         if len(self.effects) == 1:
-            return self.expected >= ENOUGH and self.share >= _LEAST_VISIBLE
-        return self.added >= ENOUGH and self.share >= _LEAST_SHARE
+            return self.expected >= self._enough and self.share >= self._visible
+        return self.added >= self._enough and self.share >= self.thresholds.experiment.least_unimitated
+
+    @property
+    def _enough(self) -> float:
+        return self.thresholds.experiment.enough
+
+    @property
+    def _visible(self) -> float:
+        return self.thresholds.detectability.least_visible
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers by name."""
@@ -91,6 +95,7 @@ class Proposal:
     considered: tuple[tuple[Programme, float], ...]
     by_hand: tuple[str, ...]
     note: str | None
+    enough: float
 
     def to_json(self) -> dict[str, Any]:
         """Return `next_experiment` of the contract: texts, numbers and the programme to run."""
@@ -102,7 +107,7 @@ class Proposal:
             "motions": [*([chosen.text] if chosen else []), *self.by_hand],
             "expected_separation": min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
             "separation_now": min((_rounded(w.now) for w in self.weights), default=None),
-            "separation_that_is_enough": ENOUGH,
+            "separation_that_is_enough": self.enough,
             "questions": [weight.to_json() for weight in self.weights],
             "programme": chosen.to_json() if chosen else None,
             "considered": [
@@ -164,7 +169,9 @@ class _Question:
         """Return how far two rivals lie apart, the worse of both ways round."""
         ways = [self._distance(left, placed[a], placed[b]) for a, b in ((one, other), (other, one))]
         now, expected, share_now, share = (float(min(values)) for values in zip(*ways, strict=True))
-        return Weight((self.effects[one], self.effects[other]), now, expected, share_now, share)
+        return Weight(
+            (self.effects[one], self.effects[other]), now, expected, share_now, share, self.channel.thresholds
+        )
 
     def _distance(self, left: Left, true: Sequence[Sequence[list[int]]], taken: Sequence[Sequence[list[int]]]) -> Four:
         """Return separation and share, now and then, where the first is true and the second taken for it."""
@@ -182,7 +189,7 @@ class _Question:
         now, then = (float(np.sqrt(max(square, 0.0) / self.channel.dispersion)) for square in squares)
         rows = self.channel.rows, self.channel.rows + seconds * self.channel.per_second
         share_now, share = (max(square, 0.0) / count for square, count in zip(squares, rows, strict=True))
-        return Weight(self.effects, now, max(now, then), share_now, share)
+        return Weight(self.effects, now, max(now, then), share_now, share, self.channel.thresholds)
 
 
 def _imitating(
@@ -200,13 +207,17 @@ def _gain(left: np.ndarray, own: list[int]) -> float:
 
 
 def next_experiment(
-    robot: Robot, channels: Sequence[PlannedEquations], lacking: Sequence[Effect], seen: Sequence[Motion]
+    robot: Robot,
+    channels: Sequence[PlannedEquations],
+    lacking: Sequence[Effect],
+    seen: Sequence[Motion],
+    limits: Experiment,
 ) -> Proposal | None:
     """Design what tells the causes' rivals apart; where there are none, what shows the effects `lacking`.
 
     `channels`: planned equations of each; `seen`: the motions that were judged. Of the programmes that reach a
-    separation of ENOUGH in every question the one that takes the least time is chosen, else the one that answers the
-    most. None where there is nothing to ask.
+    separation of `limits.enough` in every question the one that takes the least time is chosen, else the one that
+    answers the most. None where there is nothing to ask.
     """
     questions = [q for channel in channels for cause in channel.finding.causes if (q := _rivals(channel, cause))]
     if questions:
@@ -231,10 +242,10 @@ def next_experiment(
     asked = {name for q in questions for name in q.effects}
     by_hand = _manual_tests([effect for effect in effects if effect.id not in asked])
     chosen, weights = _choose(weighed) if weighed else (None, [])
-    if not any(weight.reached or weight.expected > _HELPS * weight.now for weight in weights):
+    if not any(weight.reached or weight.expected > limits.helps * weight.now for weight in weights):
         chosen, by_hand = None, by_hand or _manual_tests(effects)
     considered = tuple((one, min(weight.expected for weight in of_one)) for one, of_one in weighed)
-    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note)
+    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note, limits.enough)
 
 
 def _weigh(programme: Programme, questions: Sequence[_Question]) -> list[Weight]:
@@ -259,11 +270,12 @@ def _note(weighed: Sequence[Sequence[Weight]]) -> str | None:
     said = []
     for chances in zip(*weighed, strict=True):
         best = max(chances, key=lambda weight: weight.share)
+        limits = best.thresholds.experiment
         if best.known:
             said.append(f"{best.effects[0]} shows in these data once the causes are in the twin: adopt it, ask again")
-        elif len(best.effects) > 1 and best.share < _IDENTICAL:
+        elif len(best.effects) > 1 and best.share < limits.identical:
             said.append(f"{' and '.join(best.effects)} cannot be told apart: in every motion one is the other")
-        elif len(best.effects) == 1 and best.share < _IDENTICAL * _LEAST_VISIBLE:
+        elif len(best.effects) == 1 and best.share < limits.identical * best.thresholds.detectability.least_visible:
             said.append(f"{best.effects[0]} cannot be shown: in every motion the rest of the twin imitates it")
         elif not any(weight.reached for weight in chances):
             said.append(f"no programme that was weighed is enough for {' and '.join(best.effects)}")
@@ -278,7 +290,7 @@ def _rivals(channel: PlannedEquations, cause: Cause) -> _Question | None:
     effects = [cause.effect]
     places: list[tuple[tuple[Shape, ...], ...]] = [tuple((variant.columns,) for variant in cause.variants)]
     others = tuple(k for k in channel.finding.chosen if k not in cause.columns)
-    for rival in cause.rivals[: _FOREMOST - 1]:
+    for rival in cause.rivals[: channel.thresholds.experiment.most_rivals - 1]:
         of_rival = known.get((rival, cause.scope)) or known.get((rival, _other(cause.scope))) or {}
         found = tuple(of_rival[joint] for joint in cause.joints if joint in of_rival)
         if not found or len(found) < len(cause.joints):

@@ -20,6 +20,7 @@ from irtwin.gap.regression.cross_fitted import PowerOf, twin_power
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.gap.regression.normal_equations import least_noise
 from irtwin.gap.regression.residuals import as_filtered
+from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.accumulate import Rows, accumulate_any
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -46,9 +47,10 @@ class Products:
 class PlannedEquations:
     """The equations of one channel, with what was found in it, on motions of one's choice."""
 
-    def __init__(self, finding: Finding, stack: Stack, below: Callable[[Motion], Predicted]):
+    def __init__(self, finding: Finding, stack: Stack, below: Callable[[Motion], Predicted], thresholds: Thresholds):
         """Take a channel's finding, the twin's effects, and what these predict over a whole run."""
         self.finding, self._stack, self._predict = finding, stack, below
+        self.thresholds = thresholds
         self._last: tuple[Motion, Predicted] | None = None
 
     @property
@@ -222,8 +224,8 @@ def planned_equations(
         return Predicted(real, *power()(whole, real))
 
     return tuple(
-        PlannedEquations(finding, stacks[0], below)
+        PlannedEquations(finding, stacks[0], below, case.thresholds)
         if finding.name == "torque"
-        else PlannedEquations(finding, stacks[1], below_power)
+        else PlannedEquations(finding, stacks[1], below_power, case.thresholds)
         for finding in findings
     )

@@ -12,17 +12,17 @@ from irtwin.gap.regression.cross_validation import attempt, canonical_correlatio
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
-
-RIVAL = 0.8  # of the cause's gain a rival explains
-_APART = 2.0  # standard errors between groups that tell rivals apart
-SAME = 0.01  # of the gain: a smaller difference is none
-_LEAST_SHARE = 0.01  # of what the largest cause explains
+from irtwin.gap.thresholds import Ambiguity, Thresholds
 
 _Parts = tuple[Variant, ...]
 
 
 def causes(
-    system: System, moments: Sequence[np.ndarray], candidates: Sequence[Hypothesis], found: Sequence[Find]
+    system: System,
+    moments: Sequence[np.ndarray],
+    candidates: Sequence[Hypothesis],
+    found: Sequence[Find],
+    limits: Thresholds,
 ) -> tuple[Cause, ...]:
     """Join the finds of one effect and scope into causes, look for rivals of each, and rank them."""
     keys = list(dict.fromkeys((one.hypothesis.effect, one.hypothesis.scope) for one in found))
@@ -30,9 +30,11 @@ def causes(
     for key in keys:
         members = [one for one in found if (one.hypothesis.effect, one.hypothesis.scope) == key]
         others = [k for one in found if one not in members for k in one.variant.columns]
-        joined.append(_cause(system, moments, candidates, members, others))
+        joined.append(_cause(system, moments, candidates, members, others, limits))
     most = max((cause.gain for cause in joined), default=0.0)
-    return tuple(sorted((one for one in joined if one.gain >= _LEAST_SHARE * most), key=lambda one: -one.gain))
+    return tuple(
+        sorted((one for one in joined if one.gain >= limits.ambiguity.least_share * most), key=lambda one: -one.gain)
+    )
 
 
 def _cause(
@@ -41,6 +43,7 @@ def _cause(
     candidates: Sequence[Hypothesis],
     members: Sequence[Find],
     others: Sequence[int],
+    limits: Thresholds,
 ) -> Cause:
     effect, scope = members[0].hypothesis.effect, members[0].hypothesis.scope
     mine: _Parts = tuple(one.variant for one in members)
@@ -61,7 +64,9 @@ def _cause(
             continue
         if mean[k] > known.get(name, -np.inf):
             known[name], correlations[name] = float(mean[k]), float(alike[k])
-        if mean[0] - mean[k] < indistinguishable_below(gain[0] - gain[k], float(mean[0]), 1 - RIVAL):
+        if mean[0] - mean[k] < indistinguishable_below(
+            gain[0] - gain[k], float(mean[0]), 1 - limits.ambiguity.rival_gain, limits.ambiguity
+        ):
             equal.append(name)
     return Cause(
         effect=effect,
@@ -71,7 +76,7 @@ def _cause(
         gain=float(mean[0]),
         t=members[0].t
         if is_transient(mine[0].effect)
-        else between_groups(gain[0], said),  # an episode's is between joints
+        else between_groups(gain[0], said, limits.selection),  # an episode's is between joints
         p=max(one.p for one in members),
         rivals=tuple(dict.fromkeys(sorted(equal, key=lambda name: -known[name]))),
         rival_gains=known,
@@ -79,13 +84,13 @@ def _cause(
     )
 
 
-def indistinguishable_below(behind: np.ndarray, gain: float, most: float) -> float:
+def indistinguishable_below(behind: np.ndarray, gain: float, most: float, limits: Ambiguity) -> float:
     """Return by how much an effect must be behind a better one to be told from it.
 
     behind: (G,) it is in each group, of the better one's `gain`; more than `most` of that always tells.
     """
     error = float(np.std(behind, ddof=1)) / np.sqrt(len(behind)) if len(behind) > 1 else 0.0
-    return max(SAME * gain, min(_APART * error, most * gain))
+    return max(limits.no_difference * gain, min(limits.apart * error, most * gain))
 
 
 def _competing(

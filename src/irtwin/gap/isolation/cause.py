@@ -9,9 +9,7 @@ import numpy as np
 from irtwin.gap.regression.cross_validation import Trial
 from irtwin.gap.regression.hypotheses import CHANGED, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
-
-_SPEAKS = 0.05  # of what a hypothesis adds in the group where it adds most: it is about this group too
-_FEWEST = 3  # groups
+from irtwin.gap.thresholds import Selection
 
 
 @dataclass(frozen=True)
@@ -70,14 +68,14 @@ def judged(system: System, scope: str) -> np.ndarray:
     return np.asarray(system.group_observed if scope == CHANGED else np.ones(system.groups, dtype=bool))
 
 
-def between_groups(gain: np.ndarray, said: np.ndarray) -> float:
+def between_groups(gain: np.ndarray, said: np.ndarray, limits: Selection) -> float:
     """Return the t of the gain between groups, (G,): mean over standard error of its signed root; 0 of one group.
 
     The root, since a group in which much happens gains more than others: that speaks not against an effect. Nor does
     a group in which it has nothing to say: of what it adds, `said` (G,), there is next to nothing.
     """
-    speaks = said >= _SPEAKS * said.max(initial=0.0)
-    if speaks.sum() >= _FEWEST:
+    speaks = said >= limits.speaks * said.max(initial=0.0)
+    if speaks.sum() >= limits.fewest_speaking:
         gain = gain[speaks]
     if len(gain) < 2:
         return 0.0

@@ -9,9 +9,8 @@ import numpy as np
 
 from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.thresholds import Detectability
 from irtwin.signals.motion import Motion
-
-_LEAST = 0.05  # mean square in units of the noise's that an effect of expected size adds beyond the rest
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,7 @@ def untestable(
     inside: Sequence[str],
     channels: Sequence[tuple[str, Attribution]],
     motions: Iterable[Motion],
+    limits: Detectability,
 ) -> list[Untestable]:
     """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
     measured = {name for name, _ in channels}
@@ -55,7 +55,7 @@ def untestable(
             reasons.append(Untestable(effect.id, f"no {' and no '.join(sorted(effect.requires))} was measured"))
         elif effect.id not in visible or visible[effect.id] == 0:
             reasons.append(Untestable(effect.id, "nothing in these runs brings it about"))
-        elif visible[effect.id] < _LEAST:
+        elif visible[effect.id] < limits.least_visible:
             imitated = 100 * (1 - share[effect.id])
             reasons.append(Untestable(effect.id, f"the rest of the twin imitates {imitated:.0f} % of it on these runs"))
     return reasons

@@ -119,7 +119,7 @@ def find(
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
     candidates = [one for one in candidates if one.effect not in without]
-    found = attribute(system, candidates, seed, floor)
+    found = attribute(system, candidates, seed, case.thresholds, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     parts = shares(system, found, seed)

@@ -9,27 +9,16 @@ import numpy as np
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
-from irtwin.gap.isolation.ambiguity_groups import RIVAL, SAME, causes, indistinguishable_below
+from irtwin.gap.isolation.ambiguity_groups import causes, indistinguishable_below
 from irtwin.gap.isolation.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.regression.cross_validation import Trial, attempt, scores
 from irtwin.gap.regression.hypotheses import MISSING, Hypothesis, in_scope
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.significance import p_values
 from irtwin.gap.regression.transient import is_transient
+from irtwin.gap.thresholds import Selection, Thresholds
 
 _ROUNDS = 12
-_MATTERS = 0.08  # of the mean square of one equation's residual: what explains less is no cause
-_OF_FLOOR = 0.25  # of a floor's square, besides, in power: other forms of losses make 0.23 of it in healthy robots
-_IMITATED = 0.5  # of a floor squared: the least that an effect must explain if friction of another form imitates it
-_ALPHA = 0.02  # of the whole catalogue
-_MUCH, _ALPHA_OF_MUCH = 0.3, 0.1  # what explains so much of the residual may be less sure
-_LEAST_T = 2.3  # mean gain over its standard error between groups
-_LESS, _LESS_T = 0.5, 2.0  # of what a cause has to gain, and its t, for an effect that another joint has shown
-_FEW = 3.0  # groups, effectively: what speaks in no more cannot be sure by the scatter between groups
-_ALONE, _AHEAD = 0.12, 3.0  # what it gains instead, and how far it is ahead of all that speak everywhere
-_NEAR = 0.9  # of the best gain at a joint: the effect that leads elsewhere is taken there too
-_PLAIN = 0.5  # of the best gain: a form of the default twin that is missing goes before what refines it
-_AT_MOST = 0.05  # of the gain: a larger difference is one, whatever its error
 
 
 @dataclass(frozen=True)
@@ -44,7 +33,11 @@ class Attribution:
 
 
 def attribute(
-    system: System, candidates: Sequence[Hypothesis], seed: int, floor: np.ndarray | None = None
+    system: System,
+    candidates: Sequence[Hypothesis],
+    seed: int,
+    limits: Thresholds,
+    floor: np.ndarray | None = None,
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's.
 
@@ -56,12 +49,13 @@ def attribute(
     noise = system.residual_rms((), noise)
     moments = system.moments(noise)
     first = attempt(system, moments, (), [h.variants for h in candidates])
-    search = _Search(system, candidates, seed, floor)
+    search = _Search(system, candidates, seed, floor, limits)
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
     moments = system.moments(noise)
-    found = _backward(system, moments, found, search.matters(noise, [one.hypothesis for one in found]) / 2)
-    named = causes(system, moments, candidates, found)
+    least = search.matters(noise, [one.hypothesis for one in found]) / 2
+    found = _backward(system, moments, found, least, limits.selection)
+    named = causes(system, moments, candidates, found, limits)
     noise = system.residual_rms([k for cause in named for k in cause.columns], noise)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
 
@@ -74,18 +68,29 @@ class _Search:
     candidates: Sequence[Hypothesis]
     seed: int
     floor: np.ndarray | None
+    limits: Thresholds
 
     def matters(self, noise: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
         """Return what each has to gain, (H,), where equations are weighed by `noise` (g,)."""
-        least = np.full(len(left), _MATTERS)
+        least = np.full(len(left), self.limits.selection.least_gain)
         if self.floor is None:
             return least
         floor = np.minimum(self.floor / noise, 1.0) ** 2  # of the residual's square where that is below it
         for k, one in enumerate(left):
-            share = _share_of_floor(one.variants[0].effect)
+            share = self.share_of_floor(one.variants[0].effect)
             if share:
-                least[k] = max(_MATTERS, share * float(floor[self.system.equations(one.variants[0].columns)].max()))
+                least[k] = max(
+                    self.limits.selection.least_gain,
+                    share * float(floor[self.system.equations(one.variants[0].columns)].max()),
+                )
         return least
+
+    def share_of_floor(self, effect: Effect) -> float:
+        """Return which part of a floor's square a cause explains at least: what forms that differ leave is no cause."""
+        limits = self.limits.selection
+        if effect.signal == "power":
+            return limits.least_of_floor_in_power
+        return limits.least_of_floor_imitated if effect.imitated else 0.0
 
     def noise(self, found: Sequence[Find], before: np.ndarray) -> np.ndarray:
         """Return what finds leave of each equation, (g,) RMS; `before` weighs the equations."""
@@ -105,27 +110,27 @@ class _Search:
         return all_found
 
     def _round(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
-        chosen = _columns(found)
+        chosen, limits = _columns(found), self.limits.selection
         left = self._left(found)
         if not left:
             return []
         trial = attempt(self.system, moments, chosen, [h.variants for h in left])
-        gain, t, speaks = _judged(self.system, trial, left)
+        gain, t, speaks = _judged(self.system, trial, left, self.limits.selection)
         transient = self.system.transient
         short = [k for k, one in enumerate(left) if transient and any(is_transient(v.effect) for v in one.variants)]
         t[short] = transient.t if transient else 0.0
-        alone = _far_ahead(gain, speaks <= _FEW, left)
-        plausible = (gain >= self.matters(noise, left)) & ((t >= _LEAST_T) | alone)
+        alone = _far_ahead(gain, speaks <= limits.few_groups, left, limits)
+        plausible = (gain >= self.matters(noise, left)) & ((t >= limits.least_t) | alone)
         if not plausible.any():
             return []
         block_scores, products = scores(self.system, moments, noise, chosen)
         p = p_values(block_scores, products, left, self.seed)
         p[short] = transient.p if transient else 1.0
-        sure = np.flatnonzero(plausible & (_sure(p, gain, left) | alone))
+        sure = np.flatnonzero(plausible & (_sure(p, gain, left, limits) | alone))
         if not len(sure):
             return []
-        best = _leader(sure, gain, gains(self.system, trial), left, found)
-        return [_find(trial, left, k, gain, t, p) for k in [best, *_leads_too(best, sure, gain, left)]]
+        best = _leader(sure, gain, gains(self.system, trial), left, found, self.limits)
+        return [_find(trial, left, k, gain, t, p) for k in [best, *_leads_too(best, sure, gain, left, limits)]]
 
     def _elsewhere(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
         """Return what the effects that were found add at other joints, which show it less."""
@@ -133,12 +138,14 @@ class _Search:
         left = [one for one in self._left(found) if one.joint and (one.effect, one.scope) in known]
         if not left:
             return []
-        chosen = _columns(found)
+        chosen, limits = _columns(found), self.limits.selection
         trial = attempt(self.system, moments, chosen, [h.variants for h in left])
-        gain, t, _ = _judged(self.system, trial, left)
+        gain, t, _ = _judged(self.system, trial, left, self.limits.selection)
         p = p_values(*scores(self.system, moments, noise, chosen), left, self.seed)
-        enough = np.where([_share_of_floor(one.variants[0].effect) > 0 for one in left], 1.0, _LESS)
-        sure = (gain >= enough * self.matters(noise, left)) & (t >= _LESS_T) & (p <= _ALPHA)
+        enough = np.where(
+            [self.share_of_floor(one.variants[0].effect) > 0 for one in left], 1.0, limits.second_joint_gain
+        )
+        sure = (gain >= enough * self.matters(noise, left)) & (t >= limits.second_joint_t) & (p <= limits.alpha)
         return [_find(trial, left, int(k), gain, t, p) for k in np.flatnonzero(sure)]
 
     def _left(self, found: Sequence[Find]) -> list[Hypothesis]:
@@ -166,13 +173,6 @@ def _swapped(search: _Search, found: list[Find], noise: np.ndarray) -> list[Find
     return found
 
 
-def _share_of_floor(effect: Effect) -> float:
-    """Return which part of a floor's square a cause explains at least: what forms that differ leave is no cause."""
-    if effect.signal == "power":
-        return _OF_FLOOR
-    return _IMITATED if effect.imitated else 0.0
-
-
 def _key(one: Find) -> tuple[str, str]:
     return one.hypothesis.effect, one.hypothesis.scope
 
@@ -182,7 +182,7 @@ def _columns(found: Sequence[Find]) -> list[int]:
 
 
 def _judged(
-    system: System, trial: Trial, candidates: Sequence[Hypothesis]
+    system: System, trial: Trial, candidates: Sequence[Hypothesis], limits: Selection
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return each hypothesis' gain per row, its t between groups, and in how many it speaks; (H,), on those that count.
 
@@ -192,12 +192,12 @@ def _judged(
     said = trial.said / weights
     own = [judged(system, hypothesis.scope) for hypothesis in candidates]
     mean = [np.average(one[mine], weights=weights[mine]) for one, mine in zip(gain, own, strict=True)]
-    t = [between_groups(one[mine], adds[mine]) for one, adds, mine in zip(gain, said, own, strict=True)]
+    t = [between_groups(one[mine], adds[mine], limits) for one, adds, mine in zip(gain, said, own, strict=True)]
     speaks = [adds[mine].sum() ** 2 / max((adds[mine] ** 2).sum(), 1e-12) for adds, mine in zip(said, own, strict=True)]
     return np.array(mean), np.array(t), np.array(speaks)
 
 
-def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
+def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis], limits: Selection) -> np.ndarray:
     """Return (H,) whether an effect that is rare speaks in a `few` groups alone, gains most at its joint, and by far.
 
     A swing or a full bus may be excited in one run or two; friction that shows in one alone is a joint that sticks.
@@ -209,17 +209,19 @@ def _far_ahead(gain: np.ndarray, few: np.ndarray, left: Sequence[Hypothesis]) ->
         best = int(rare[np.argmax(gain[rare])])
         beside = max(gain[k] for k, one in enumerate(left) if _overlap(one, left[best]))
         common = [gain[k] for k in np.flatnonzero(~few).tolist() if not _same_place(left[k], left[best])]
-        found[best] = gain[best] >= max(_ALONE, _AHEAD * max(common, default=0.0), beside)
+        found[best] = gain[best] >= max(limits.rare_gain, limits.rare_lead * max(common, default=0.0), beside)
     return found
 
 
-def _sure(p: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
+def _sure(p: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis], limits: Selection) -> np.ndarray:
     """Return (H,) whether a hypothesis is beyond chance."""
     bodies = np.array([one.of_bodies for one in left])  # too many for a score by column
-    return np.asarray((p <= np.where(gain >= _MUCH, _ALPHA_OF_MUCH, _ALPHA)) | bodies)
+    return np.asarray((p <= np.where(gain >= limits.large_gain, limits.alpha_of_large, limits.alpha)) | bodies)
 
 
-def _leads_too(best: int, plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis]) -> list[int]:
+def _leads_too(
+    best: int, plausible: np.ndarray, gain: np.ndarray, left: Sequence[Hypothesis], limits: Selection
+) -> list[int]:
     """Return the other joints' places where the leader's effect leads too, or nearly."""
     leader = left[best]
     robot = [gain[j] for j in plausible if left[j].joint is None]
@@ -230,7 +232,7 @@ def _leads_too(best: int, plausible: np.ndarray, gain: np.ndarray, left: Sequenc
         other = left[k]
         if k == best or other.effect != leader.effect or other.scope != leader.scope or other.joint is None:
             continue
-        near = _PLAIN if other.effect in BASELINE and other.scope == MISSING else _NEAR
+        near = limits.plain_first if other.effect in BASELINE and other.scope == MISSING else limits.leads_too
         if gain[k] >= near * max(gain[j] for j in plausible if left[j].joint == other.joint):
             found.append(int(k))
     return found
@@ -242,6 +244,7 @@ def _leader(
     per_group: np.ndarray,
     left: Sequence[Hypothesis],
     found: Sequence[Find],
+    limits: Thresholds,
 ) -> int:
     """Return the place of the hypothesis to take: of those that do as well as the best, the least flexible.
 
@@ -254,21 +257,25 @@ def _leader(
         if left[k].effect in BASELINE
         and left[k].scope == MISSING == left[best].scope
         and left[k].joint == left[best].joint
-        and gain[k] >= _PLAIN * gain[best]
+        and gain[k] >= limits.selection.plain_first * gain[best]
     ]
     if plain:
         return max(plain, key=lambda k: gain[k])
     before = {(one.hypothesis.effect, one.hypothesis.scope) for one in found}
     known = [int(k) for k in plausible if (left[k].effect, left[k].scope) in before and left[k].joint]
-    if known and (nearest := max(known, key=lambda k: gain[k])) != best and gain[nearest] >= RIVAL * gain[best]:
+    nearest = max(known, key=lambda k: gain[k], default=best)
+    if nearest != best and gain[nearest] >= limits.ambiguity.rival_gain * gain[best]:
         return nearest
     behind = per_group[best] - per_group
     equal = [
-        int(k) for k in plausible if behind[k].mean() <= indistinguishable_below(behind[k], float(gain[best]), _AT_MOST)
+        int(k)
+        for k in plausible
+        if behind[k].mean()
+        <= indistinguishable_below(behind[k], float(gain[best]), limits.selection.as_good, limits.ambiguity)
     ]
     equal = [k for k in equal if left[k].scope == left[best].scope and _overlap(left[k], left[best])]
     if left[best].of_bodies:  # a load imitates bodies that are off, but not all of it
-        equal = [k for k in equal if gain[k] >= (1 - SAME) * gain[best]]
+        equal = [k for k in equal if gain[k] >= (1 - limits.ambiguity.no_difference) * gain[best]]
     return min(equal, key=lambda k: (left[k].flexibility, -gain[k]), default=best)
 
 
@@ -291,10 +298,12 @@ def _find(trial: Trial, left: Sequence[Hypothesis], place: int, gain: np.ndarray
     return Find(left[place], variant, float(gain[place]), float(t[place]), float(p[place]))
 
 
-def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find], least: np.ndarray) -> list[Find]:
+def _backward(
+    system: System, moments: Sequence[np.ndarray], found: list[Find], least: np.ndarray, limits: Selection
+) -> list[Find]:
     """Drop what gains less than `least` (F,) beside the others: the later ones made it idle."""
     while len(found) > 1:
-        short = np.array([_alone(system, moments, found, k) for k in range(len(found))]) / least
+        short = np.array([_alone(system, moments, found, k, limits) for k in range(len(found))]) / least
         worst = int(np.argmin(short))
         if short[worst] >= 1:
             break
@@ -303,8 +312,10 @@ def _backward(system: System, moments: Sequence[np.ndarray], found: list[Find], 
     return found
 
 
-def _alone(system: System, moments: Sequence[np.ndarray], found: Sequence[Find], place: int) -> float:
+def _alone(
+    system: System, moments: Sequence[np.ndarray], found: Sequence[Find], place: int, limits: Selection
+) -> float:
     rest = _columns([one for k, one in enumerate(found) if k != place])
     one = found[place]
     trial = attempt(system, moments, rest, [[one.variant]])
-    return float(_judged(system, trial, [one.hypothesis])[0][0])
+    return float(_judged(system, trial, [one.hypothesis], limits)[0][0])

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.thresholds import PowerConsistency
 
 MECHANICAL, SENSOR = "mechanical", "sensor"
-_MATTERS = 0.03  # a share of the mean square of power
-_DECISIVE = 2.5  # standard errors between groups
 _CHANNELS = {"torque": MECHANICAL, "measurement": SENSOR}
 
 
@@ -28,11 +27,12 @@ class PowerBalance:
 
     gain: float
     t: float
+    limits: PowerConsistency
 
     @property
     def kind(self) -> str | None:
         """Return "mechanical" or "sensor" where power decides, else None."""
-        if abs(self.gain) < _MATTERS or abs(self.t) < _DECISIVE or self.gain * self.t < 0:
+        if abs(self.gain) < self.limits.least_gain or abs(self.t) < self.limits.least_t or self.gain * self.t < 0:
             return None
         return MECHANICAL if self.gain > 0 else SENSOR
 

@@ -26,7 +26,7 @@ def _weigh(case: Case, stack: Stack, explained: ExplainedTorque, cause: Cause) -
     gain = np.log(shown / carried)
     error = float(np.std(gain, ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
     mean = float(gain.mean())
-    return PowerBalance(mean, float(mean / max(error, np.finfo(float).tiny)))
+    return PowerBalance(mean, float(mean / max(error, np.finfo(float).tiny)), case.thresholds.power_consistency)
 
 
 def _taken(explained: ExplainedTorque, cause: Cause, *, carried: bool) -> Torque:

@@ -9,18 +9,17 @@ import numpy as np
 from irtwin.gap.data.noise_floor import REPEATS, Floor
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.normal_equations import noise_before, reference_rms
+from irtwin.gap.thresholds import Verdict
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
-_EXCESS = 3.5  # over the floor, mean square: a gap, though nothing explains it; below lies what differs between runs
-_CLOSED = 0.7  # of the largest excess: causes that leave more than the rest of it, anywhere, do not explain the gap
 
 
-def verdict_of(findings: Sequence[Finding], floor: Floor) -> str:
+def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Verdict) -> str:
     """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not."""
     causes = [cause for finding in findings for cause in finding.causes]
     if floor.source == REPEATS:
         before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
-        if after > max(_EXCESS, (1 - _CLOSED) * before):
+        if after > max(limits.excess, (1 - limits.closed) * before):
             return UNEXPLAINED
     if not causes:
         return NO_GAP

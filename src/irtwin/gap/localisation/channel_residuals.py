@@ -18,6 +18,7 @@ from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
+from irtwin.gap.thresholds import Places
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,14 @@ class ChannelResidual:
     acts: Map | None
     reference: Map | None
     level: np.ndarray
+    limits: Places
 
 
 def channel_residual(case: Case, explained: Explained, torque: Torque) -> ChannelResidual:
     """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes)."""
     finding = explained.finding
     power = finding.name == "power"
-    reference = against_reference(finding)
+    reference, limits = against_reference(finding), case.thresholds.places
 
     def traces(runs: Sequence[Any], values: Values) -> list[Trace]:
         return (power_traces if power else torque_traces)(explained.stack, runs, values, torque)
@@ -57,11 +59,22 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
         acting = [_of(trace, sum(parts)) for trace, *parts in zip(before, *added, strict=True)]
         plain = traces(case.seen, lambda run: explained.values)
         after = [replace(t, residual=t.residual - sum(parts)) for t, *parts in zip(plain, *added, strict=True)]
-    maps = (robot_maps if power else joint_maps)((before, after or [], acting, others), case.grouping.label)
+    maps = (robot_maps if power else joint_maps)(
+        (before, after or [], acting, others), case.grouping.label, case.thresholds
+    )
     seen, closed, acts, known = maps
     assert seen is not None
     return ChannelResidual(
-        finding, before, after, added, seen, closed, acts, known, level_of(finding.floor, seen, known)
+        finding,
+        before,
+        after,
+        added,
+        seen,
+        closed,
+        acts,
+        known,
+        level_of(finding.floor, seen, known, limits.fewest_samples),
+        limits,
     )
 
 
@@ -144,6 +157,7 @@ def _places(left: ChannelResidual, seed: int) -> list[Location]:
         explained=left.explained,
         acting=acting,
         acts=left.acts,
+        limits=left.limits,
         seed=seed,
     )
     return [replace(place, runs=_standing_out(left, place)) for place in located]
@@ -151,7 +165,7 @@ def _places(left: ChannelResidual, seed: int) -> list[Location]:
 
 def _standing_out(left: ChannelResidual, place: Location) -> tuple[str, ...]:
     k = left.finding.places.index(place.joint)
-    return standing_out(left.before, k, float(left.level[k].min()))
+    return standing_out(left.before, k, float(left.level[k].min()), left.limits)
 
 
 def fitted_values(finding: Finding, *, reference: bool) -> Values:

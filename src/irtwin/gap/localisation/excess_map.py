@@ -17,9 +17,8 @@ from irtwin.gap.localisation.regimes import (
     robot_regimes,
 )
 from irtwin.gap.regression.residuals import Trace
+from irtwin.gap.thresholds import Thresholds
 
-FEWEST = 20  # samples in a regime that tell anything
-_FEWEST_UNITS = 4  # runs, else stretches of time
 _STRETCHES = 8
 
 
@@ -49,34 +48,34 @@ class Map:
             return np.asarray(self.squares.sum(axis=0) / self.counts.sum(axis=0))
 
 
-def joint_maps(kinds: Sequence[Sequence[Trace]], labels: Mapping[str, str]) -> list[Map | None]:
+def joint_maps(kinds: Sequence[Sequence[Trace]], labels: Mapping[str, str], limits: Thresholds) -> list[Map | None]:
     """Sum the squares of torque residuals of several kinds of traces, None of a kind that has none.
 
     labels: each run's programmed motion, whose runs make one unit. Regimes are told alike in all kinds.
     """
     traces = [trace for kind in kinds for trace in kind]
     motions, torques = [trace.motion for trace in traces], [trace.torque for trace in traces]
-    masks = [joint_regimes(motions, torques, joint) for joint in range(traces[0].residual.shape[1])]
-    return _maps(kinds, masks, Regimes(JOINT_REGIMES, JOINT_PARTS), labels)
+    masks = [joint_regimes(motions, torques, joint, limits.regimes) for joint in range(traces[0].residual.shape[1])]
+    return _maps(kinds, masks, Regimes(JOINT_REGIMES, JOINT_PARTS), labels, limits.places.fewest_units)
 
 
-def robot_maps(kinds: Sequence[Sequence[Trace]], labels: Mapping[str, str]) -> list[Map | None]:
+def robot_maps(kinds: Sequence[Sequence[Trace]], labels: Mapping[str, str], limits: Thresholds) -> list[Map | None]:
     """Sum the squares of power residuals, as `joint_maps` those of torque."""
     traces = [trace for kind in kinds for trace in kind]
-    masks = [robot_regimes([trace.motion for trace in traces], [trace.torque for trace in traces])]
-    return _maps(kinds, masks, Regimes(ROBOT_REGIMES, ROBOT_PARTS), labels)
+    masks = [robot_regimes([trace.motion for trace in traces], [trace.torque for trace in traces], limits.regimes)]
+    return _maps(kinds, masks, Regimes(ROBOT_REGIMES, ROBOT_PARTS), labels, limits.places.fewest_units)
 
 
-def level_of(floor: np.ndarray | None, seen: Map, reference: Map | None) -> np.ndarray:
+def level_of(floor: np.ndarray | None, seen: Map, reference: Map | None, fewest: int) -> np.ndarray:
     """Return the mean square beyond which a gap lies, (g, R): the floor's, or what the reference runs show if more.
 
     floor: (g,) RMS; where none is known, the mean square in the regime that has the least stands in for its square.
     """
-    whole = _least(seen) if floor is None else floor**2
+    whole = _least(seen, fewest) if floor is None else floor**2
     level = np.repeat(np.maximum(whole, np.finfo(float).tiny)[:, None], len(seen.regimes.names), axis=1)
     if reference is None:
         return level
-    enough = reference.counts.sum(axis=0) >= FEWEST
+    enough = reference.counts.sum(axis=0) >= fewest
     return np.where(enough, np.fmax(level, reference.means), level)
 
 
@@ -86,9 +85,9 @@ def heat_map(joints: Sequence[str | None], seen: Map, level: np.ndarray) -> dict
     return {"joints": list(joints), "regimes": list(seen.regimes.names), "excess": excess.tolist()}
 
 
-def _least(seen: Map) -> np.ndarray:
+def _least(seen: Map, fewest: int) -> np.ndarray:
     parts = slice(seen.regimes.parts)
-    enough = seen.counts.sum(axis=0)[:, parts] >= FEWEST
+    enough = seen.counts.sum(axis=0)[:, parts] >= fewest
     return np.asarray(np.min(np.where(enough, seen.means[:, parts], np.inf), axis=1))
 
 
@@ -97,12 +96,13 @@ def _maps(
     masks: Sequence[Sequence[np.ndarray]],
     regimes: Regimes,
     labels: Mapping[str, str],
+    fewest: int,
 ) -> list[Map | None]:
     found: list[Map | None] = []
     start = 0
     for kind in kinds:
         own = [mask[start : start + len(kind)] for mask in masks]
-        found.append(_sums(kind, own, regimes, labels) if kind else None)
+        found.append(_sums(kind, own, regimes, labels, fewest) if kind else None)
         start += len(kind)
     return found
 
@@ -112,8 +112,9 @@ def _sums(
     masks: Sequence[Sequence[np.ndarray]],
     regimes: Regimes,
     labels: Mapping[str, str],
+    fewest: int,
 ) -> Map:
-    units = _units(traces, labels)
+    units = _units(traces, labels, fewest)
     count = 1 + max(int(unit.max()) for unit in units)
     squares = np.zeros((count, len(masks), len(regimes.names)))
     counts = np.zeros(squares.shape)
@@ -127,10 +128,10 @@ def _sums(
     return Map(regimes, squares, counts)
 
 
-def _units(traces: Sequence[Trace], labels: Mapping[str, str]) -> list[np.ndarray]:
+def _units(traces: Sequence[Trace], labels: Mapping[str, str], fewest: int) -> list[np.ndarray]:
     """Return the unit of each trace's samples (N,): the run's programmed motion; few of them are cut in time."""
     order = {label: k for k, label in enumerate(dict.fromkeys(labels[trace.motion.run] for trace in traces))}
-    pieces = 1 if len(order) >= _FEWEST_UNITS else -(-_STRETCHES // len(order))
+    pieces = 1 if len(order) >= fewest else -(-_STRETCHES // len(order))
     return [
         order[labels[trace.motion.run]] * pieces + np.arange(len(trace.residual)) * pieces // len(trace.residual)
         for trace in traces

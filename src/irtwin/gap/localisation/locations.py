@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import false_discovery_control, t
 
-from irtwin.gap.localisation.excess_map import FEWEST, Map
+from irtwin.gap.localisation.excess_map import Map
 from irtwin.gap.localisation.regimes import (
     ACCELERATING,
     BRAKING,
@@ -21,14 +21,10 @@ from irtwin.gap.localisation.regimes import (
     STEADY_SPEED,
 )
 from irtwin.gap.regression.residuals import Trace
+from irtwin.gap.thresholds import Places
 
-_DISCOVERIES = 0.05  # expected share of false ones among the places
-_LEAST_SHARE = 0.02
-_PLACES = 12
-_STANDS_OUT = 1.5  # times the floor's square
 _RESAMPLED = 1000
 _LOADS = ("torque", "torque_squared")  # what the residual has to follow so that its place is the load
-_UNSUITED = 0.5  # of the rank, where a regime does not suit the variable that the residual follows
 _SUITS = {
     "speed": (LOW_SPEED, REVERSAL, STEADY_SPEED, STANDSTILL),
     "acceleration": (ACCELERATING, BRAKING),
@@ -84,6 +80,7 @@ def locate(
     seen: Map,
     level: np.ndarray,
     *,
+    limits: Places,
     reference: Map | None = None,
     explained: Map | None = None,
     acting: np.ndarray | None = None,
@@ -106,7 +103,7 @@ def locate(
     drawn_share, drawn_excess = _shares(seen, level, weights.astype(float))
     of_joint = share[0][:, : seen.regimes.parts].sum(axis=1)
     concentration = _concentration(seen, share[0], of_joint)
-    q = _false_discovery(_p_values(seen, level, reference, explained, acting))
+    q = _false_discovery(_p_values(seen, level, reference, explained, acting, limits))
 
     def location(place: int, r: int, rank: float) -> Location:
         return Location(
@@ -126,11 +123,14 @@ def locate(
 
     found = [
         location(
-            place, r, float(share[0, place, r] * np.sqrt(concentration[place, r])) * _suits(follows[place], regime)
+            place,
+            r,
+            float(share[0, place, r] * np.sqrt(concentration[place, r]))
+            * (1.0 if _suits(follows[place], regime) else limits.unsuited),
         )
         for place in range(len(joints))
         for r, regime in enumerate(seen.regimes.names)
-        if share[0, place, r] >= _LEAST_SHARE and q[place, r] <= _DISCOVERIES
+        if share[0, place, r] >= limits.least_share and q[place, r] <= limits.false_discoveries
     ]
     if acting is not None and acts is not None:
         sure = {one.joint for one in found}
@@ -139,11 +139,11 @@ def locate(
     found = [one for one in found if one.regime != LOADED or one.follows in _LOADS]
     last = np.zeros(len(joints), dtype=bool) if acting is None else ~acting
     order = {joint: (bool(last[place]), -of_joint[place]) for place, joint in enumerate(joints)}
-    return sorted(found, key=lambda location: (order[location.joint], -location.rank))[:_PLACES]
+    return sorted(found, key=lambda location: (order[location.joint], -location.rank))[: limits.most]
 
 
-def _suits(follows: str | None, regime: str) -> float:
-    return 1.0 if regime in _SUITS.get(follows or "", (regime,)) else _UNSUITED
+def _suits(follows: str | None, regime: str) -> bool:
+    return regime in _SUITS.get(follows or "", (regime,))
 
 
 def _where_added(acts: Map, place: int) -> list[tuple[int, float]]:
@@ -164,11 +164,11 @@ def _concentration(seen: Map, share: np.ndarray, of_joint: np.ndarray) -> np.nda
     return np.asarray(np.divide(within, part, out=np.zeros_like(share), where=part > 0))
 
 
-def standing_out(traces: Sequence[Trace], place: int, level: float) -> tuple[str, ...]:
+def standing_out(traces: Sequence[Trace], place: int, level: float, limits: Places) -> tuple[str, ...]:
     """Return the runs whose mean square stands out over a level, the worst first."""
     squares = {trace.motion.run: trace.residual[:, place] ** 2 for trace in traces}
     means = {run: float(np.nanmean(own)) for run, own in squares.items() if np.isfinite(own).any()}
-    above = [run for run, mean in means.items() if mean > _STANDS_OUT * level]
+    above = [run for run, mean in means.items() if mean > limits.run_stands_out * level]
     return tuple(sorted(above, key=lambda run: -means[run]))
 
 
@@ -183,19 +183,25 @@ def _shares(seen: Map, level: np.ndarray, weights: np.ndarray) -> tuple[np.ndarr
 
 
 def _p_values(
-    seen: Map, level: np.ndarray, reference: Map | None, explained: Map | None, acting: np.ndarray | None
+    seen: Map,
+    level: np.ndarray,
+    reference: Map | None,
+    explained: Map | None,
+    acting: np.ndarray | None,
+    limits: Places,
 ) -> np.ndarray:
     """Return one-sided p-values of the excess, (g, R); NaN where too few units tell."""
-    mean, variance, freedom = _moments(_logarithms(seen, level))
+    fewest = limits.fewest_samples
+    mean, variance, freedom = _moments(_logarithms(seen, level, fewest))
     if reference is not None:
-        _, other, of_other = _moments(_logarithms(reference, level))
+        _, other, of_other = _moments(_logarithms(reference, level, fewest))
         parts = variance**2 / np.maximum(freedom, 1) + np.where(of_other > 0, other**2 / np.maximum(of_other, 1), 0.0)
         variance = variance + np.where(of_other > 0, other, 0.0)
         freedom = np.where(freedom > 0, variance**2 / np.maximum(parts, np.finfo(float).tiny), 0)
     beyond = _student(mean, variance, freedom)
     if explained is None or acting is None:
         return beyond
-    closed = _student(*_moments(_logarithms(seen, level) - _logarithms(explained, level)))
+    closed = _student(*_moments(_logarithms(seen, level, fewest) - _logarithms(explained, level, fewest)))
     either = np.minimum(2 * np.fmin(beyond, closed), 1.0)  # Bonferroni
     return np.asarray(np.where(acting[:, None], either, beyond))
 
@@ -205,9 +211,9 @@ def _student(mean: np.ndarray, variance: np.ndarray, freedom: np.ndarray) -> np.
     return np.asarray(np.where(freedom > 0, p, np.nan))
 
 
-def _logarithms(one: Map, level: np.ndarray) -> np.ndarray:
+def _logarithms(one: Map, level: np.ndarray, fewest: int) -> np.ndarray:
     """Return the logarithm of mean square over level, (U, g, R); NaN of units with too few samples."""
-    enough = one.counts >= FEWEST
+    enough = one.counts >= fewest
     ratio = np.divide(one.squares, one.counts * level, out=np.ones_like(one.squares), where=enough)
     return np.where(enough, np.log(np.maximum(ratio, np.finfo(float).tiny)), np.nan)
 

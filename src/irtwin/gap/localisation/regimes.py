@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irtwin.gap.thresholds import Regimes
 from irtwin.signals.motion import Motion
 
 STANDSTILL, LOW_SPEED, STEADY_SPEED = "standstill", "low_speed", "steady_speed"
@@ -17,17 +18,11 @@ ROBOT_REGIMES = (STANDSTILL, STEADY_SPEED, ACCELERATING, BRAKING, REGENERATING, 
 JOINT_PARTS, ROBOT_PARTS = 6, 4  # the first of them, which part the samples; the others overlap with these
 
 _LARGE = 0.99  # quantile that counts as a signal's largest value: a filter's ends may ring beyond it
-_STANDING = 1e-3  # rad/s
-_SLOW = 0.1  # of the joint's largest speed
-_STEADY = 0.2  # of the joint's largest acceleration
-_EVEN = 0.1  # of the robot's largest gain of speed
-_REVERSAL = 0.1  # s, around a change of direction
-_LOADED = 0.5  # of the joint's largest torque; of the robot's largest load
-_GIVING = 0.05  # of the largest mechanical power
-_AFTERWARDS = 2.0  # s, after the last joint stopped
 
 
-def joint_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], joint: int) -> list[np.ndarray]:
+def joint_regimes(
+    motions: Sequence[Motion], torques: Sequence[np.ndarray], joint: int, limits: Regimes
+) -> list[np.ndarray]:
     """Return for each motion which of `JOINT_REGIMES` a joint is in, (N, 7); torques: (N, n) as predicted, N m."""
     fastest = _largest([motion.dq[:, joint] for motion in motions])
     sharpest = _largest([motion.ddq[:, joint] for motion in motions])
@@ -35,18 +30,18 @@ def joint_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], join
     found = []
     for motion, torque in zip(motions, torques, strict=True):
         speed, acceleration = motion.dq[:, joint], motion.ddq[:, joint]
-        standing = _standing(motion)[:, joint]
-        turning = _around_reversals(speed, standing, max(1, round(_REVERSAL * motion.rate)))
-        slow = np.asarray(np.abs(speed) < _SLOW * fastest)
-        steady = np.asarray(np.abs(acceleration) < _STEADY * sharpest)
+        standing = _standing(motion, limits.standing)[:, joint]
+        turning = _around_reversals(speed, standing, max(1, round(limits.reversal * motion.rate)))
+        slow = np.asarray(np.abs(speed) < limits.slow * fastest)
+        steady = np.asarray(np.abs(acceleration) < limits.steady * sharpest)
         gaining = speed * acceleration > 0
         taken = _first_true([turning, standing, slow, steady, gaining, ~gaining])
         parts = [taken[:, place] for place in (1, 2, 3, 4, 5, 0)]
-        found.append(np.stack([*parts, np.abs(torque[:, joint]) > _LOADED * heaviest], axis=1))
+        found.append(np.stack([*parts, np.abs(torque[:, joint]) > limits.loaded * heaviest], axis=1))
     return found
 
 
-def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray]) -> list[np.ndarray]:
+def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], limits: Regimes) -> list[np.ndarray]:
     """Return for each motion which of `ROBOT_REGIMES` the robot is in, (N, 7); torques: (N, n) as predicted, N m."""
     joints = range(motions[0].dq.shape[1]) if motions else range(0)
     fastest = np.array([_largest([motion.dq[:, j] for motion in motions]) for j in joints])
@@ -58,14 +53,14 @@ def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray]) -> l
     most_gain, most_power, most_load = _largest(gains), _largest(powers), _largest(loads)
     found = []
     for motion, gain, power, load in zip(motions, gains, powers, loads, strict=True):
-        standing = np.asarray(_standing(motion).all(axis=1))
-        even = np.asarray(np.abs(gain) < _EVEN * most_gain)
+        standing = np.asarray(_standing(motion, limits.standing).all(axis=1))
+        even = np.asarray(np.abs(gain) < limits.even * most_gain)
         parts = _first_true([standing, even, np.asarray(gain > 0), np.asarray(gain <= 0)])
         since = motion.time - np.maximum.accumulate(np.where(standing, -np.inf, motion.time))
         overlapping = [
-            power < -_GIVING * most_power,
-            load > _LOADED * most_load,
-            standing & (since <= _AFTERWARDS),
+            power < -limits.regenerating * most_power,
+            load > limits.loaded * most_load,
+            standing & (since <= limits.after_motion),
         ]
         found.append(np.column_stack([parts, *overlapping]))
     return found
@@ -76,8 +71,8 @@ def _largest(signals: Sequence[np.ndarray]) -> float:
     return max(float(np.quantile(values, _LARGE)), np.finfo(float).tiny)
 
 
-def _standing(motion: Motion) -> np.ndarray:
-    slow = np.abs(motion.dq) < _STANDING
+def _standing(motion: Motion, least: float) -> np.ndarray:
+    slow = np.abs(motion.dq) < least
     return np.asarray(slow if motion.standing is None else motion.standing | slow)
 
 

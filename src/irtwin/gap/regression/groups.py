@@ -9,22 +9,23 @@ import numpy as np
 
 from irtwin.identification.accumulate import Block
 
-_FEWEST_GROUPS = 4
-
-
 _GROUPS = 8  # of time, where the runs are fewer
 
 
 @dataclass(frozen=True)
 class Grouping:
-    """Which runs are left out together: `label` of each run's programmed motion; `observed` runs' names."""
+    """Which runs are left out together: `label` of each run's programmed motion; `observed` runs' names.
+
+    Fewer programmed motions than `fewest` are cut in time.
+    """
 
     label: dict[str, str]
     observed: frozenset[str]
+    fewest: int
 
     def few(self, runs: Iterable[str]) -> bool:
         """Return whether the programmed motions of these runs are too few to leave each out in turn."""
-        return len({self.label[run] for run in runs if run in self.observed}) < _FEWEST_GROUPS
+        return len({self.label[run] for run in runs if run in self.observed}) < self.fewest
 
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
         """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""

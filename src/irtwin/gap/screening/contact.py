@@ -16,21 +16,12 @@ import numpy as np
 from irtwin.effects.load import ExternalContact
 from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.thresholds import Contact
 from irtwin.robot.description import Robot
 
-_FEWEST_JOINTS = 3
 _LENGTHS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)  # s
 _STRIDE = 0.125  # s, between windows, or a quarter of their length
-_MOST = 0.7  # of a run: what lasts longer is no episode
 _STRETCH = 2.0  # s: of each the best window says what chance reaches
-_DECAY = 1.1  # of chance's gains beyond their median, in logs: times the distance to the upper quartile
-_TAIL = 0.25  # that decay at least
-_ALPHA = 0.01  # of the whole search
-_STEADY = 0.5  # of a window's gain one force over the whole run may explain
-_JOINING = 0.05  # of one window in one more run
-_AGREEING = 0.5  # of what a run's own force explains, the first run's force has to
-_HARM = 0.1  # of what the force explains in some joints it may spoil in others
-_QUIET = 0.1  # of the largest gain: runs with less at its clock tell what chance reaches; friction spreads an event
 _SPREAD = 200.0  # N, of the force before any data
 _SLOW = 0.02  # rad/s, across which friction changes its sign
 _AT_ONCE = 4096  # windows
@@ -40,26 +31,26 @@ Clock = tuple[float, float]
 """Start and stop of the run's clock, s."""
 
 
-def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> Transient | None:
+def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray, limits: Contact) -> Transient | None:
     """Return the clearest contact, in all observed runs that show its force at its clock; None where none stands out.
 
     noise: (n,) RMS of each joint's residual, N m. Of an arm of one or two joints nothing is said: hardly any agree.
     """
-    if len(robot.joints) < _FEWEST_JOINTS:
+    if len(robot.joints) < limits.fewest_joints:
         return None
-    return _contact([_Run(one, ExternalContact().columns(robot, one.motion), noise) for one in left])
+    return _contact([_Run(one, ExternalContact().columns(robot, one.motion), noise, limits) for one in left], limits)
 
 
-def _contact(runs: Sequence[_Run]) -> Transient | None:
+def _contact(runs: Sequence[_Run], limits: Contact) -> Transient | None:
     found = _leader(runs)
     if found is None:
         return None
     run, gain, clock = found
-    quiet = [one for one in runs if one.judged(*one.samples(clock))[0].sum() < _QUIET * gain]
-    chance = _Chance.of(quiet or runs, clock)
-    transient = _episode(runs, run, clock, chance, chance.p(gain, chance.count))
+    quiet = [one for one in runs if one.judged(*one.samples(clock))[0].sum() < limits.quiet * gain]
+    chance = _Chance.of(quiet or runs, clock, limits)
+    transient = _episode(runs, run, clock, chance, chance.p(gain, chance.count), limits)
     worse, better = -transient.gain.clip(max=0.0).sum(), transient.gain.clip(min=0.0).sum()
-    return transient if transient.p <= _ALPHA and worse <= _HARM * better else None
+    return transient if transient.p <= limits.alpha and worse <= limits.harm * better else None
 
 
 def _leader(runs: Sequence[_Run]) -> tuple[_Run, float, Clock] | None:
@@ -74,7 +65,7 @@ def _leader(runs: Sequence[_Run]) -> tuple[_Run, float, Clock] | None:
     return found
 
 
-def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p: float) -> Transient:
+def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p: float, limits: Contact) -> Transient:
     """Join the runs that show the first one's force at its clock, and place start and stop by all of them.
 
     p: of the first; each further motion makes chance as much less likely, of however many runs it was one.
@@ -85,7 +76,9 @@ def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p
         window = run.samples(clock)
         gains, own = run.judged(*window)
         alone = chance.p(float(gains.sum()), 1)
-        if alone <= _JOINING and run.explained(*window, force) >= _AGREEING * run.explained(*window, own):
+        if alone <= limits.joining_alpha and run.explained(*window, force) >= limits.agreeing * run.explained(
+            *window, own
+        ):
             if run.label not in [member.label for member in members]:
                 p *= min(1.0, alone * len(others))
             members.append(run)
@@ -121,11 +114,11 @@ class _Chance:
     count: int
 
     @classmethod
-    def of(cls, runs: Sequence[_Run], clock: Clock) -> _Chance:
+    def of(cls, runs: Sequence[_Run], clock: Clock, limits: Contact) -> _Chance:
         best = [value for run in runs for value in run.best_of_stretches(_away(run, clock))]
         logs = np.log(np.maximum(best, 1.0)) if best else np.zeros(1)
         middle, upper = np.quantile(logs, [0.5, 0.75])
-        return cls(float(middle), max(_DECAY * float(upper - middle), _TAIL), max(len(best), 1))
+        return cls(float(middle), max(limits.decay * float(upper - middle), limits.least_decay), max(len(best), 1))
 
     def p(self, gain: float, count: int) -> float:
         """Return how likely chance reaches a gain in one of so many stretches."""
@@ -145,8 +138,9 @@ class _Run:
     What friction explains is taken out first: it differs from run to run.
     """
 
-    def __init__(self, left: Remainder, jacobian: np.ndarray, noise: np.ndarray):
+    def __init__(self, left: Remainder, jacobian: np.ndarray, noise: np.ndarray, limits: Contact):
         """Take a remainder, the transposed Jacobian (N, n, 3) of its motion, and the noise (n,) N m."""
+        self._limits = limits
         motion = left.motion
         self.name, self.label, self.time, self.observed = motion.run, left.label, motion.time, left.observed
         known = np.isfinite(left.residual)
@@ -169,7 +163,7 @@ class _Run:
         parts = [np.zeros((0, 2), dtype=int)]
         for length in _LENGTHS:
             size = round(length / step)
-            if 2 <= size <= _MOST * len(self.time):
+            if 2 <= size <= self._limits.longest * len(self.time):
                 starts = np.arange(0, len(self.time) - size, max(1, int(max(_STRIDE, length / 8) / step)))
                 parts.append(np.column_stack([starts, starts + size]))
         return np.concatenate(parts)
@@ -184,7 +178,7 @@ class _Run:
     def sudden(self) -> np.ndarray:
         """(W,) whether one force over the whole run explains much less: a payload or a tilted base is no transient."""
         whole = float(self.judged(np.array([0]), np.array([len(self.time)]))[0].sum())
-        return np.asarray(whole <= _STEADY * self.gain)
+        return np.asarray(whole <= self._limits.steady * self.gain)
 
     def clock(self, window: int) -> Clock:
         """Return a window's start and stop, s."""

@@ -15,11 +15,9 @@ from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import flange_frame, to_body
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.thresholds import SomePayload
 from irtwin.robot.description import Robot
 
-_FEWEST_RUNS = 4
-_MATTERS = 0.03  # of the mean square of one joint's residual
-_ALPHA = 0.01
 _FLIPS = 999
 _SWEEPS = 10
 
@@ -38,12 +36,14 @@ class UntoldPayload:
     p: float
 
 
-def untold_payload(robot: Robot, system: System, noise: np.ndarray, seed: int) -> UntoldPayload | None:
+def untold_payload(
+    robot: Robot, system: System, noise: np.ndarray, limits: SomePayload, seed: int
+) -> UntoldPayload | None:
     """Return the payload that some observed runs carry and others do not; None where none shows.
 
     system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m.
     """
-    parts = _Parts.of(robot, system, noise)
+    parts = _Parts.of(robot, system, noise, limits.fewest_runs)
     if parts is None:
         return None
     with_load = parts.carrying(np.arange(len(parts.runs)))
@@ -53,7 +53,7 @@ def untold_payload(robot: Robot, system: System, noise: np.ndarray, seed: int) -
     mean, t = float(gain.mean()), float(gain.mean() / max(gain.std(ddof=1) / np.sqrt(len(gain)), 1e-12))
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, len(gain)))
     p = float((1 + np.sum(signs @ gain >= gain.sum())) / (1 + _FLIPS))
-    if mean < _MATTERS or p > _ALPHA:
+    if mean < limits.least_gain or p > limits.alpha:
         return None
     runs = tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries)
     return UntoldPayload(Payload(runs=runs), mean, t, p)
@@ -71,14 +71,14 @@ class _Parts:
     base: int
 
     @classmethod
-    def of(cls, robot: Robot, system: System, noise: np.ndarray) -> _Parts | None:
+    def of(cls, robot: Robot, system: System, noise: np.ndarray, fewest: int) -> _Parts | None:
         """Take the runs apart; None where too few are observed, or groups are stretches of runs."""
         runs = tuple(dict.fromkeys(block.run for block in system.blocks))
         groups = [{int(g) for g, b in zip(system.group, system.blocks, strict=True) if b.run == run} for run in runs]
         seen = {block.run for block, observed in zip(system.blocks, system.observed, strict=True) if observed}
         observed = np.array([run in seen for run in runs])
         onto = _payload_columns(robot, system)
-        if onto is None or observed.sum() < _FEWEST_RUNS or any(len(one) > 1 for one in groups):
+        if onto is None or observed.sum() < fewest or any(len(one) > 1 for one in groups):
             return None
         base, size = system.base, system.base + onto.shape[1] + 1
         full = np.zeros((base + 1, size))

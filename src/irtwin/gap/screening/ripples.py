@@ -13,10 +13,9 @@ from irtwin.robot.description import Robot
 
 _TURN = 4096  # parts of a turn by which angles are told apart: ten a period at the fastest
 _FINE = 4  # points of the spectrum for each that is independent
-_CLEAR = 0.04  # of a joint's mean square that a ripple explains, to be tried
 
 
-def fast_ripples(robot: Robot, left: Sequence[Remainder]) -> list[TorqueRipple]:
+def fast_ripples(robot: Robot, left: Sequence[Remainder], least_share: float) -> list[TorqueRipple]:
     """Return a ripple for each joint whose residual in observed runs has a clear line beyond the slow orders.
 
     Slow orders are tried one by one; of the fast ones there are too many, and a line is told from its neighbours only
@@ -27,13 +26,13 @@ def fast_ripples(robot: Robot, left: Sequence[Remainder]) -> list[TorqueRipple]:
         parts = [(one.motion.q[:, joint], one.residual[:, joint]) for one in left if one.observed]
         angle, residual = (np.concatenate([part[k] for part in parts] or [np.zeros(0)]) for k in range(2))
         kept = np.isfinite(residual)
-        order = _clearest(angle[kept], residual[kept])
+        order = _clearest(angle[kept], residual[kept], least_share)
         if order is not None:
             found.append(TorqueRipple(N=order, joints=(name,)))
     return found
 
 
-def _clearest(angle: np.ndarray, residual: np.ndarray) -> float | None:
+def _clearest(angle: np.ndarray, residual: np.ndarray, least_share: float) -> float | None:
     """Return the order, a turn, of the strongest line among fast ones; None where it explains too little.
 
     Sums over parts of a turn take the place of the samples, so that a Fourier transform gives all orders at once.
@@ -46,6 +45,6 @@ def _clearest(angle: np.ndarray, residual: np.ndarray) -> float | None:
     length = _TURN * _FINE * max(1, -(-len(sums) // _TURN))
     orders = np.fft.rfftfreq(length, 1 / _TURN)
     explained = 2 * np.abs(np.fft.rfft(sums, length)) ** 2 / (len(residual) * square)
-    lines, _ = find_peaks(explained, height=_CLEAR)
+    lines, _ = find_peaks(explained, height=least_share)
     fast = [k for k in lines if max(SLOW_ORDERS) < orders[k] <= TorqueRipple.ranges["N"][1]]
     return float(orders[max(fast, key=lambda k: explained[k])]) if fast else None

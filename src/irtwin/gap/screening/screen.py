@@ -42,7 +42,7 @@ class Screened:
 
 def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
     """Search the runs' torque; system: its equations, with the terms of the twin at least."""
-    noise = noise_before(system)
+    noise, limits = noise_before(system), case.thresholds
     values = twin_values(system, system.solution((), np.sum(system.moments(noise), axis=0)))
     left = []
     for motion in case.with_torque:
@@ -50,8 +50,12 @@ def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
         residual = torque_residual(stack, motion, values)
         observed = motion.run in case.observed
         left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
-    ripples = fast_ripples(case.robot, left)
-    return Screened(contact(case.robot, left, noise), untold_payload(case.robot, system, noise, seed), tuple(ripples))
+    ripples = fast_ripples(case.robot, left, limits.ripples.least_share)
+    return Screened(
+        contact(case.robot, left, noise, limits.contact),
+        untold_payload(case.robot, system, noise, limits.some_payload, seed),
+        tuple(ripples),
+    )
 
 
 def acting(variants: Sequence[Variant]) -> dict[str, Any]:

@@ -109,5 +109,9 @@ def _text(question: str) -> str:
     if _QUERY_FORM.search(question):
         return question
     near = get_close_matches(question, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+    hint = (
+        f"did you mean {near[0]}?"
+        if near
+        else "`irtwin query` alone lists them; SPARQL begins with SELECT, ASK or CONSTRUCT"
+    )
     raise InputError(f"there is no question {question!r}: {hint}")

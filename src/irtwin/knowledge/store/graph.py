@@ -29,6 +29,7 @@ from irtwin.knowledge.store.rdf_input import read_rdf, refuse
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
+from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import Table, to_python
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, check, keeping_union
@@ -241,7 +242,7 @@ class KnowledgeGraph:
                 custom_functions=self._functions({} if faults is None else faults),
             )
         except SyntaxError as error:
-            raise InputError(f"not a SPARQL query: {error}") from error
+            raise InputError(f"not a SPARQL query: {in_words(error, text)}") from error
         except RuntimeError as error:
             if "function" in str(error):
                 raise InputError(f"{error}: see the functions of ontology/providers.ttl and of SPARQL 1.1") from None

@@ -13,6 +13,7 @@ from pyoxigraph import NamedNode
 from irtwin.errors import InputError
 from irtwin.knowledge.store.keywords import fault_without, is_update, parse_update
 from irtwin.knowledge.store.sparql_text import after_prologue
+from irtwin.knowledge.store.syntax_error import in_words
 
 MOST_PLACES = 100  # each is tried, and costs some parses
 
@@ -32,7 +33,7 @@ def using(text: str, default_graphs: Sequence[str], named_graphs: Sequence[str],
     except ValueError as error:
         raise InputError(f"a graph's name is no IRI: {error}") from error
     except SyntaxError as error:
-        raise InputError(f"not a SPARQL update: {error}") from error
+        raise InputError(f"not a SPARQL update: {in_words(error, text)}") from error
     if fault_without(text, ("using", "with"), parse_update, base) is not None:
         raise InputError("the update has USING or WITH and the request has using-graph-uri; use only one")
     places = [found.start() for found in _WHERE.finditer(text)]

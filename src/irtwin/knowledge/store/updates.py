@@ -15,6 +15,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.keywords import is_update, parse_update, refuse_service_and_load
 from irtwin.knowledge.store.sparql_text import SPACE, after_prologue
+from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE, PREFIXES
 
 _BEFORE = f"{GRAPH}before"  # there only while an update lasts
@@ -27,7 +28,7 @@ def check(text: str, base: str | None, on_server: bool = False) -> None:
     try:
         parse_update(text, base)
     except SyntaxError as error:
-        raise InputError(f"not a SPARQL update: {_in_place(text, base) or error}") from error
+        raise InputError(f"not a SPARQL update: {in_words(_in_place(text, base) or error, text)}") from error
 
 
 def as_change(

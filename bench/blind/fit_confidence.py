@@ -1,0 +1,115 @@
+"""`python -m blind.fit_confidence DIAGNOSES LABELS`: fit the confidence to causes named in development cases.
+
+A cause is right where its effect is one of the label's. Prints the weights for `irtwin.gap.thresholds.Confidence`, and
+the expected calibration error of the shipped weights and, cross-validated over cases, of the fitted ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import expit
+
+from blind.compare import answers
+from blind.score import calibration, ranked
+from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.thresholds import DEFAULT, Confidence
+
+FITTED = ("constant", "per_t", "per_closed", "per_gain", "per_share", "per_count", "unexplained")
+_FOLDS = 10
+_RIDGE = 1e-3  # of the squared weights but the constant's, a cause: what the causes do not tell stays small
+
+
+@dataclass(frozen=True)
+class Named:
+    """A cause that was named: what its confidence depends on, and whether it is right."""
+
+    case: str
+    t: float
+    gain: float
+    closed: float
+    share: float
+    count: int
+    unexplained: bool
+    right: bool
+
+    def logit(self, weights: Confidence) -> float:
+        """Return the logarithm of the odds that weights give."""
+        sure = confidence(self.t, self.gain, self.closed, self.share, self.count, weights, unexplained=self.unexplained)
+        return float(np.log(sure / (1 - sure)))
+
+
+def named(diagnoses: Mapping[str, Any], labels: Mapping[str, Any]) -> Iterator[Named]:
+    """Yield the causes of the cases that have a label."""
+    for case in sorted(set(diagnoses) & set(labels)):
+        causes, true = ranked(diagnoses[case]), {effect["effect"] for effect in labels[case]["effects"]}
+        most = max((cause["evidence"]["gain_on_groups_left_out"] for cause in causes), default=1.0)
+        for cause in causes:
+            evidence = cause["evidence"]
+            yield Named(
+                case,
+                evidence["t_between_groups"],
+                evidence["gain_on_groups_left_out"],
+                evidence["closed_where_it_acts"],
+                min(evidence["gain_on_groups_left_out"] / most, 1.0),
+                len(causes),
+                diagnoses[case]["verdict"] == "unexplained",
+                cause["effect"] in true,
+            )
+
+
+def fit(causes: list[Named]) -> Confidence:
+    """Return the weights of a logistic regression on causes; the bounds of t and gain stay."""
+    none = replace(DEFAULT.confidence, **dict.fromkeys(FITTED, 0.0))
+    features = np.array([[one.logit(replace(none, **{name: 1.0})) for name in FITTED] for one in causes])
+    right = np.array([one.right for one in causes], dtype=float)
+
+    def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
+        logit = features @ weights
+        small = len(right) * _RIDGE * np.append(0.0, weights[1:])
+        value = np.logaddexp(0.0, logit).sum() - right @ logit + 0.5 * small @ weights
+        return float(value), features.T @ (expit(logit) - right) + small
+
+    found = minimize(loss, np.zeros(len(FITTED)), jac=True, method="BFGS")
+    return replace(none, **{name: float(value) for name, value in zip(FITTED, found.x, strict=True)})
+
+
+def error(causes: list[Named], weights: list[Confidence]) -> float:
+    """Return the expected calibration error of causes, each by its own weights."""
+    given = zip(causes, weights, strict=True)
+    return calibration([(float(expit(one.logit(own))), one.right) for one, own in given])[0]
+
+
+def cross_validated(causes: list[Named]) -> list[Confidence]:
+    """Return for each cause the weights fitted without a tenth of the cases, its own among them."""
+    cases = sorted({one.case for one in causes})
+    fold = {case: place % _FOLDS for place, case in enumerate(np.random.default_rng(0).permutation(cases).tolist())}
+    own = [fit([one for one in causes if fold[one.case] != k]) for k in range(_FOLDS)]
+    return [own[fold[one.case]] for one in causes]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m blind.fit_confidence", description=__doc__)
+    parser.add_argument("diagnoses", type=Path, help="folder of CASE.json, of a development split")
+    parser.add_argument("labels", type=Path)
+    given = parser.parse_args()
+    causes = list(named(answers(given.diagnoses), json.loads(given.labels.read_text(encoding="utf-8"))))
+    right = sum(one.right for one in causes)
+    print(f"{len(causes)} causes, {100 * right / max(len(causes), 1):.0f} % of them right")
+    found = fit(causes)
+    for name in FITTED:
+        print(f"{name} = {getattr(found, name):.3f}  (shipped: {getattr(DEFAULT.confidence, name):.3f})")
+    shipped = error(causes, [DEFAULT.confidence] * len(causes))
+    fitted = error(causes, cross_validated(causes))
+    print(f"expected calibration error: shipped {shipped:.3f}, fitted and cross-validated {fitted:.3f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,330 @@
+"""The thresholds of a diagnosis: every value by which it decides what is said, with its meaning, unit and origin.
+
+A group for each step. `diagnose` takes them whole, and each step its own group; `changed` makes a variant, as
+`bench/blind/sweep.py` does. What only sets the effort or precision of an algorithm stands beside that algorithm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from irtwin.errors import InputError
+
+_CASES = "development cases of bench/blind"
+_JUDGEMENT = "judgement"
+
+
+def _threshold(value: Any, meaning: str, unit: str, source: str) -> Any:
+    return field(default=value, metadata={"meaning": meaning, "unit": unit, "source": source})
+
+
+def _given(value: Mapping[str, float], meaning: str, unit: str, source: str) -> Any:
+    return field(default_factory=lambda: dict(value), metadata={"meaning": meaning, "unit": unit, "source": source})
+
+
+_RESIDUAL = "share of the mean square of one equation's residual"
+_FLOOR = "floor squared"
+_ERRORS = "standard errors between groups"
+_OF_GAIN = "share of the cause's gain"
+_P = "probability"
+
+
+@dataclass(frozen=True)
+class Admission:
+    """Whether a data set can be diagnosed."""
+
+    least_time: float = _threshold(1.0, "observed runs last so long together", "s", _JUDGEMENT)
+    moving_speed: float = _threshold(1e-3, "a joint that moves exceeds it", "rad/s, m/s", "noise of measured speeds")
+    moving_range: float = _threshold(1e-3, "a joint that moves spans more", "rad, m", "noise of measured positions")
+    fewest_groups: int = _threshold(
+        4, "fewer programmed motions are few: blocks of time make the groups", "groups", _CASES
+    )
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Which runs repeat a motion, so that their difference is noise."""
+
+    largest_shift: float = _threshold(1.0, "time between the starts of a motion and its repeat", "s", _JUDGEMENT)
+    largest_difference: float = _threshold(
+        0.1, "repeats differ in position by no more", "share of the motion's standard deviation", _JUDGEMENT
+    )
+    stop_band: float = _threshold(
+        1.05, "where the stop band begins, from which noise is taken without repeats", "times the cutoff", "the filter"
+    )
+
+
+@dataclass(frozen=True)
+class SameRobot:
+    """Whether the other runs are of the robot that was observed."""
+
+    foreign: Mapping[str, float] = _given(
+        {"reference": 0.06, "simulated": 0.3},
+        "the bodies fitted to the other runs leave more in a joint that is foreign, by their role",
+        "share of the joint's mean square",
+        "twice what gains of 0.7 or 1.4 on two joints leave; a simulator's masses may be off by tens of percent",
+    )
+    foreign_joints: int = _threshold(2, "foreign joints make another robot", "joints", _CASES)
+    opposed: float = _threshold(0.3, "friction of the other sign, to count", "share of the observed", _JUDGEMENT)
+    opposed_joints: float = _threshold(0.5, "joints with opposed friction make another robot", "share", _JUDGEMENT)
+    heaviest_load: float = _threshold(
+        20.0, "load that may have come or gone (or half the arm's mass)", "kg", "data sheets of arms"
+    )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A force at the flange for a while."""
+
+    fewest_joints: int = _threshold(3, "of fewer joints, hardly any agree on a force", "joints", _JUDGEMENT)
+    longest: float = _threshold(0.7, "a longer force is no episode", "share of the run", _JUDGEMENT)
+    alpha: float = _threshold(0.01, "largest p of the whole search", _P, _CASES)
+    decay: float = _threshold(1.1, "decay of chance's gains beyond their median", "upper quartiles, in logs", _CASES)
+    least_decay: float = _threshold(0.25, "that decay at least", "logs", _CASES)
+    steady: float = _threshold(
+        0.5, "a force over the whole run explains no more of the window's gain", "share of the gain", _CASES
+    )
+    joining_alpha: float = _threshold(0.05, "largest p of the same window in one more run", _P, _CASES)
+    agreeing: float = _threshold(
+        0.5, "the first run's force explains so much of what a run's own does", "share of the gain", _CASES
+    )
+    harm: float = _threshold(0.1, "the force may spoil so much in other joints", "share of the gain", _CASES)
+    quiet: float = _threshold(
+        0.1, "runs that gain less at the same time tell what chance reaches", "share of the gain", _CASES
+    )
+
+
+@dataclass(frozen=True)
+class SomePayload:
+    """A payload in some of the runs."""
+
+    fewest_runs: int = _threshold(4, "fewer observed runs cannot be parted", "runs", _JUDGEMENT)
+    least_gain: float = _threshold(0.03, "least that it explains on joints left out", _RESIDUAL, _CASES)
+    alpha: float = _threshold(0.01, "largest p under random signs of groups", _P, _CASES)
+
+
+@dataclass(frozen=True)
+class Ripples:
+    """Fast torque ripples."""
+
+    least_share: float = _threshold(
+        0.04, "least that a line of the spectrum explains, to be tried", _RESIDUAL, "decisions/gap-fast-ripples.md"
+    )
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which hypothesis becomes a cause."""
+
+    least_gain: float = _threshold(0.08, "least gain of a cause", _RESIDUAL, "decisions/gap-bounds-of-a-cause.md")
+    least_of_floor_in_power: float = _threshold(
+        0.25, "least gain of a cause of power", _FLOOR, "decisions/gap-least-cause-of-power.md"
+    )
+    least_of_floor_imitated: float = _threshold(
+        0.5,
+        "least gain of an effect that friction of another form imitates",
+        _FLOOR,
+        "decisions/gap-effects-that-friction-imitates.md",
+    )
+    alpha: float = _threshold(0.02, "largest p, adjusted for the catalogue", _P, "decisions/gap-bounds-of-a-cause.md")
+    large_gain: float = _threshold(0.3, "gain from which `alpha_of_large` holds", _RESIDUAL, _CASES)
+    alpha_of_large: float = _threshold(0.1, "largest p of a large gain", _P, "decisions/gap-bounds-of-a-cause.md")
+    least_t: float = _threshold(2.3, "least t of the gain", _ERRORS, "decisions/gap-bounds-of-a-cause.md")
+    second_joint_gain: float = _threshold(
+        0.5, "least gain at a second joint", "share of `least_gain`", "decisions/gap-second-joints.md"
+    )
+    second_joint_t: float = _threshold(2.0, "least t at a second joint", _ERRORS, "decisions/gap-second-joints.md")
+    few_groups: float = _threshold(
+        3.0, "a rare effect speaks in no more groups", "groups, effectively", "decisions/gap-rare-effects.md"
+    )
+    rare_gain: float = _threshold(0.12, "least gain of a rare effect", _RESIDUAL, "decisions/gap-rare-effects.md")
+    rare_lead: float = _threshold(
+        3.0, "least gain of a rare effect", "times the best common effect's", "decisions/gap-rare-effects.md"
+    )
+    leads_too: float = _threshold(
+        0.9, "least gain at another joint where the same effect is taken along", "share of the best there", _CASES
+    )
+    plain_first: float = _threshold(
+        0.5,
+        "least gain of a plain form that goes before what refines it",
+        "share of the best",
+        "decisions/gap-plain-forms-first.md",
+    )
+    as_good: float = _threshold(
+        0.05, "of equals within it the least flexible is taken", _OF_GAIN, "decisions/gap-least-flexible-of-equals.md"
+    )
+    speaks: float = _threshold(
+        0.05,
+        "a group counts where a hypothesis adds so much",
+        "share of what it adds in its strongest group",
+        "decisions/gap-groups-that-count.md",
+    )
+    fewest_speaking: int = _threshold(3, "with fewer such groups all count", "groups", _JUDGEMENT)
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """Which effects form an ambiguity group with a cause."""
+
+    rival_gain: float = _threshold(
+        0.8, "least gain of an effect of the group", _OF_GAIN, "decisions/gap-ambiguity-group.md"
+    )
+    apart: float = _threshold(2.0, "a gain so far behind is worse", _ERRORS, "decisions/gap-ambiguity-group.md")
+    no_difference: float = _threshold(0.01, "a smaller difference of gains is none", _OF_GAIN, _JUDGEMENT)
+    least_share: float = _threshold(
+        0.01, "least gain to be named", "share of the largest cause's", "decisions/gap-bounds-of-a-cause.md"
+    )
+
+
+@dataclass(frozen=True)
+class PowerConsistency:
+    """When power decides between mechanics and the torque sensor."""
+
+    least_gain: float = _threshold(
+        0.03, "least change of power's residual, in logs", "share of its mean square", _CASES
+    )
+    least_t: float = _threshold(2.5, "least t of that change", _ERRORS, _CASES)
+
+
+@dataclass(frozen=True)
+class Detectability:
+    """What the data can show."""
+
+    least_visible: float = _threshold(
+        0.05, "least that an effect of expected size adds beyond the rest", "mean square of the noise", _CASES
+    )
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """When the diagnosis abstains."""
+
+    excess: float = _threshold(
+        3.5, "what is left beyond is a gap without a cause", _FLOOR, "decisions/gap-unexplained-verdict.md"
+    )
+    closed: float = _threshold(
+        0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-unexplained-verdict.md"
+    )
+
+
+_LOGIT = "logit"
+_FITTED = "607 causes of 836 development cases; bench/blind/fit_confidence.py"
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """The weights of the logistic regression that gives a cause's confidence."""
+
+    constant: float = _threshold(2.780, "constant", _LOGIT, _FITTED)
+    per_t: float = _threshold(0.023, "per unit of t, up to `most_t`", _LOGIT, _FITTED)
+    most_t: float = _threshold(10.0, "t counts up to it", "1", _JUDGEMENT)
+    per_closed: float = _threshold(1.513, "for all of the gap closed where the cause acts", _LOGIT, _FITTED)
+    per_gain: float = _threshold(0.982, "per natural logarithm of the gain, up to 1", _LOGIT, _FITTED)
+    least_gain: float = _threshold(1e-3, "the gain counts from it", "mean square of what was left", _JUDGEMENT)
+    per_share: float = _threshold(0.356, "per natural logarithm of the gain over the largest", _LOGIT, _FITTED)
+    per_count: float = _threshold(-2.416, "per natural logarithm of the number of causes", _LOGIT, _FITTED)
+    unexplained: float = _threshold(-2.640, "beside the verdict `unexplained`", _LOGIT, _FITTED)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Which joints and regimes are named."""
+
+    false_discoveries: float = _threshold(0.05, "expected share of false places", "share", "decisions/gap-locations.md")
+    least_share: float = _threshold(0.02, "least share of a place", "share of the channel's excess", _JUDGEMENT)
+    most: int = _threshold(12, "places that are named", "places", "for a reader")
+    run_stands_out: float = _threshold(1.5, "a run is named with a place beyond it", _FLOOR, _JUDGEMENT)
+    unsuited: float = _threshold(
+        0.5,
+        "factor on the rank of a regime that does not suit the variable that the residual follows",
+        "1",
+        "decisions/gap-locations.md",
+    )
+    fewest_samples: int = _threshold(20, "a regime with fewer says nothing", "samples", _JUDGEMENT)
+    fewest_units: int = _threshold(4, "fewer runs are cut in stretches of time", "runs", _JUDGEMENT)
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """The bounds of the regimes of motion."""
+
+    standing: float = _threshold(1e-3, "a slower joint stands", "rad/s, m/s", "noise of measured speeds")
+    slow: float = _threshold(0.1, "low speed ends", "share of the joint's largest speed", _JUDGEMENT)
+    steady: float = _threshold(0.2, "steady speed ends", "share of the joint's largest acceleration", _JUDGEMENT)
+    even: float = _threshold(0.1, "the robot's steady speed ends", "share of its largest gain of speed", _JUDGEMENT)
+    reversal: float = _threshold(0.1, "time around a change of direction", "s", _JUDGEMENT)
+    loaded: float = _threshold(0.5, "a load begins", "share of the largest torque", _JUDGEMENT)
+    regenerating: float = _threshold(
+        0.05, "power given back begins", "share of the largest mechanical power", _JUDGEMENT
+    )
+    after_motion: float = _threshold(2.0, "time after the last joint stopped", "s", _JUDGEMENT)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Which experiment is proposed."""
+
+    enough: float = _threshold(5.0, "separation that answers a question", "standard deviations", _JUDGEMENT)
+    least_unimitated: float = _threshold(
+        0.06,
+        "least of a cause that its rival must not imitate",
+        "share of its mean square",
+        "a little more than `selection.as_good`",
+    )
+    identical: float = _threshold(1e-3, "less apart is the same in other words", "share of its mean square", _JUDGEMENT)
+    helps: float = _threshold(1.1, "an experiment worth making separates so much", "times what is", _JUDGEMENT)
+    most_rivals: int = _threshold(4, "effects of an ambiguity group that are told apart", "effects", "time it takes")
+    least_gap: float = _threshold(
+        0.1, "a smaller gap is not parted into what could be closed", "floor's mean square", _JUDGEMENT
+    )
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """All of them."""
+
+    admission: Admission = Admission()
+    repeats: Repeats = Repeats()
+    same_robot: SameRobot = field(default_factory=SameRobot)
+    contact: Contact = Contact()
+    some_payload: SomePayload = SomePayload()
+    ripples: Ripples = Ripples()
+    selection: Selection = Selection()
+    ambiguity: Ambiguity = Ambiguity()
+    power_consistency: PowerConsistency = PowerConsistency()
+    detectability: Detectability = Detectability()
+    verdict: Verdict = Verdict()
+    confidence: Confidence = Confidence()
+    places: Places = Places()
+    regimes: Regimes = Regimes()
+    experiment: Experiment = Experiment()
+
+    def changed(self, name: str, value: float) -> Thresholds:
+        """Return them with another value of "group.threshold"; InputError on a name that there is not."""
+        group, _, own = name.partition(".")
+        if not any(name == each.name for each in self.listed()):
+            raise InputError(f'there is no threshold "{name}"; choose from {", ".join(t.name for t in self.listed())}')
+        return replace(self, **{group: replace(getattr(self, group), **{own: value})})
+
+    def listed(self) -> Iterator[Threshold]:
+        """Return each with its name, "group.threshold", and what is known of it."""
+        for group in fields(self):
+            one = getattr(self, group.name)
+            for each in fields(one):
+                yield Threshold(f"{group.name}.{each.name}", getattr(one, each.name), **each.metadata)
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """One threshold: what it decides, its unit, and where its value comes from."""
+
+    name: str
+    value: Any
+    meaning: str
+    unit: str
+    source: str
+
+
+DEFAULT = Thresholds()
