@@ -12,7 +12,8 @@ from typing import Any
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
-from irtwin.signals.samples import Signals, read_signals
+from irtwin.signals.channels import Signals
+from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
 
