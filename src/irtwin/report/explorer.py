@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from irtwin.report.energy.sampling import Samples, extremes, pack
 from irtwin.report.questions import Answers, Row
+from irtwin.signals.channels import CHANNELS
 
 ReadSeries = Callable[[str, str], pa.Table]  # path in the workspace, checksum
 
@@ -18,7 +19,7 @@ _POINTS = 2_000  # a curve, more than a screen is wide
 _FEWEST = 300
 _BUDGET = 160_000  # points of all charts of all runs: about 1.3 MB of page
 
-_TORQUE = "tau_"
+_TORQUE, _POWER = CHANNELS["torque"], CHANNELS["power"].prefix
 _MODEL = "_model"
 _HELD_OUT = "held_out"
 
@@ -46,11 +47,11 @@ class Columns:
     @property
     def joints(self) -> tuple[str, ...]:
         """Joints whose torque was modelled, in the order of the columns."""
-        names = self.samples
+        before = _TORQUE.column("")
         return tuple(
-            name.removeprefix(_TORQUE).removesuffix(_MODEL)
-            for name in names
-            if name.startswith(_TORQUE) and name.endswith(_MODEL)
+            name.removeprefix(before).removesuffix(_MODEL)
+            for name in self.samples
+            if name.startswith(before) and name.endswith(_MODEL)
         )
 
 
@@ -87,16 +88,16 @@ def explorer(answers: Answers, read_series: ReadSeries) -> dict[str, Any] | None
 
 def _run(row: Row, columns: Columns, points: int) -> dict[str, Any]:
     torques = [
-        _chart(columns, f"{_TORQUE}{joint}", joint, points)
+        _chart(columns, _TORQUE.column(joint), joint, points)
         for joint in columns.joints
-        if columns.get(f"{_TORQUE}{joint}") is not None
+        if columns.get(_TORQUE.column(joint)) is not None
     ]
     return {
         "name": row["run_name"],
         "part": row["part"],
         "held_out": _held_out(row, columns),
         "torque": torques,
-        "power": _chart(columns, "power", "power", points),
+        "power": _chart(columns, _POWER, "power", points),
         "energy": _chart(columns, "energy", "energy used so far", points),
     }
 

@@ -38,9 +38,13 @@ class Channel:
     streamed: str | None = None
     strict: bool = False
 
+    def column(self, joint: str) -> str:
+        """Return the name of its column for a joint; of the whole robot's, whatever the joint."""
+        return f"{self.prefix}_{joint}" if self.per_joint else self.prefix
+
     def columns(self, joints: Iterable[str]) -> tuple[str, ...]:
         """Return the names of its columns for a robot of these joints."""
-        return tuple(f"{self.prefix}_{joint}" for joint in joints) if self.per_joint else (self.prefix,)
+        return tuple(map(self.column, joints)) if self.per_joint else (self.prefix,)
 
     def unit_of(self, joint: Joint) -> str:
         """Return its unit at a joint."""

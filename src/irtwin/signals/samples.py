@@ -36,7 +36,7 @@ def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bo
     if len(columns["time"]) < FEWEST:
         raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {FEWEST}")
     for joint in robot.joints:
-        _check_unit(columns["time"], columns[f"q_{joint.name}"], joint, path)
+        _check_unit(columns["time"], columns[CHANNELS["q"].column(joint.name)], joint, path)
     signals = _signals(columns, robot, path)
     if measured and signals.torque is None and signals.power is None:
         raise InputError(f"{path}: has neither torque nor power; {_remedy(signals)}")
@@ -126,7 +126,7 @@ def _check_unit(time: np.ndarray, q: np.ndarray, joint: Joint, path: Path) -> No
     unbounded = not np.isfinite(bounds) and np.ptp(q) > 100
     if too_far or unbounded or (too_fast and np.abs(q).max() > 2 * np.pi):
         raise InputError(
-            f"{path}: column q_{joint.name} spans {np.ptp(q):.3g} at up to {speed:.3g} per second, "
+            f"{path}: column {CHANNELS['q'].column(joint.name)} spans {np.ptp(q):.3g} at up to {speed:.3g} per second, "
             f"far beyond the joint's limits in rad: it looks like degrees; convert it to rad"
         )
 
