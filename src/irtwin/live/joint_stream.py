@@ -5,7 +5,7 @@
 
 `robot` is its name, or its identifier; `time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must,
 the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg,
-counts where a run begins.
+counts where a run begins. The keys of values are those of the table of channels.
 """
 
 from __future__ import annotations
