@@ -51,7 +51,7 @@ def test_columns_are_those_of_the_log_format() -> None:
 
 def test_a_joint_that_slides_has_units_of_its_own() -> None:
     robot: Robot = arm(2, slides=(1,))
-    of = {name: [channel.unit_of(joint) for joint in robot.joints] for name, channel in CHANNELS.items()}
+    of = {name: [channel.unit_of(joint.kind) for joint in robot.joints] for name, channel in CHANNELS.items()}
     assert of["q"] == ["rad", "m"]
     assert of["torque"] == ["N m", "N"]
     assert of["temperature"] == ["degC", "degC"]

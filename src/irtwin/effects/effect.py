@@ -269,7 +269,7 @@ def size(values: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
 
 def force_unit(joint: Joint) -> str:
     """Return the unit of the joint's effort: "N m", or "N" where it slides."""
-    return CHANNELS["torque"].unit_of(joint)
+    return CHANNELS["torque"].unit_of(joint.kind)
 
 
 def inertia_unit(joint: Joint) -> str:

@@ -13,8 +13,6 @@ from typing import Annotated, Any, Self, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-from irtwin.robot.description import Joint
-
 Samples = npt.NDArray[np.float64]
 Logged = Samples | None
 
@@ -46,9 +44,9 @@ class Channel:
         """Return the names of its columns for a robot of these joints."""
         return tuple(map(self.column, joints)) if self.per_joint else (self.prefix,)
 
-    def unit_of(self, joint: Joint) -> str:
-        """Return its unit at a joint."""
-        return self.sliding or self.unit if joint.kind == "prismatic" else self.unit
+    def unit_of(self, kind: str) -> str:
+        """Return its unit at a joint of a kind: "prismatic" ones slide."""
+        return self.sliding if self.sliding and kind == "prismatic" else self.unit
 
 
 @dataclass(frozen=True)
