@@ -15,8 +15,8 @@ from tests import rows
 from irtwin.errors import InputError
 from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, load_run
 from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, Run
-from irtwin.signals.samples import Signals
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run as Row
 

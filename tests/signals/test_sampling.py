@@ -15,9 +15,9 @@ from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
 from irtwin.gap.predict import predict
+from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import Run, read_data_set
-from irtwin.signals.samples import Signals
 from irtwin.signals.sampling import as_sampled, interval
 from irtwin.twin.identify import identify
 

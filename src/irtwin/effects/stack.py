@@ -107,7 +107,7 @@ class Stack:
         shape = (16, len(self.robot.joints))
         q, dq, ddq = rng.uniform(-2, 2, (3, *shape))
         warm = np.full(shape, 50.0)
-        probe = Motion("probe", np.arange(16.0), q, dq, ddq, temperature=warm)
+        probe = Motion(np.arange(16.0), q, dq, ddq, run="probe", temperature=warm)
         predicted = Predicted(rng.uniform(-50, 50, shape))
         found = [
             np.array([[term.joint == name for term in effect.terms(self.robot)] for name in self.robot.joint_names])

@@ -16,9 +16,9 @@ from sqlalchemy import select
 from irtwin.errors import InputError
 from irtwin.identification.validation import split
 from irtwin.providers.identification import twin_made
+from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import identifier, load_robot, load_run, robot_iri, run_iri
-from irtwin.signals.conditioning import condition
+from irtwin.providers.records import identifier, robot_iri, run_iri
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.files import inside
@@ -92,15 +92,10 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
         )
     text = workspace.read_document(found.twin_file, found.twin_sha256).decode()
     twin = from_json(text, inside(workspace.folder, found.twin_file))
-    robot = load_robot(workspace, robot_id)
-    keys = _run_ids(workspace, robot_id)
-    runs = {run_id: load_run(workspace, robot, run_id) for run_id in keys.values()}
-    runs = dict(sorted(runs.items(), key=lambda item: (item[1].started, item[0])))  # as every twin's are split
-    motions = [condition(run, robot, twin.cutoff) for run in runs.values() if run.name in twin.fitted]
-    parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
+    known = robot_motions(workspace, robot_id)
+    parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
-    by_name = {run.name: run_id for run_id, run in runs.items()}
-    made = twin_made(robot_id, identify(robot, parts.fit, twin.effects), by_name, parts)
+    made = twin_made(robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts)
     used = [*made.used, f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")

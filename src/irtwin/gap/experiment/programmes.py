@@ -178,7 +178,7 @@ class _Yard:
         for start, stop, speed, acceleration in moves:
             parts += [_move(start, stop, speed, acceleration, self.rate), (stop + rest, rest, rest)]
         q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return Motion("planned", np.arange(len(q)) / self.rate, q, dq, ddq, cutoff=self.cutoff)
+        return Motion(np.arange(len(q)) / self.rate, q, dq, ddq, run="planned", cutoff=self.cutoff)
 
     def by_joint(self, values: np.ndarray) -> dict[str, list[float]]:
         """Return (M, n) values of the joints that move, by name, to four digits."""
@@ -333,7 +333,7 @@ def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
     except InputError:
         return None
     time, q, dq, ddq = found.sample(yard.rate)
-    motion = Motion("planned", time, q, dq, ddq, cutoff=yard.cutoff)
+    motion = Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff)
     return Programme(
         "exciting_motion",
         f"an exciting motion of all joints, {_EXCITING:g} s",

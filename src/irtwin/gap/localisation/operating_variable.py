@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 
 from irtwin.gap.regression.residuals import Trace
+from irtwin.signals.channels import CHANNELS
 
 _BINS = 12
 _UNITS = {
-    "angle": "rad",
-    "speed": "rad/s",
-    "acceleration": "rad/s^2",
-    "torque": "N m",
-    "temperature": "degC",
-    "time": "s",
-    "mechanical_power": "W",
+    "angle": CHANNELS["q"].unit,
+    "speed": CHANNELS["dq"].unit,
+    "acceleration": CHANNELS["ddq"].unit,
+    "torque": CHANNELS["torque"].unit,
+    "temperature": CHANNELS["temperature"].unit,
+    "time": CHANNELS["time"].unit,
+    "mechanical_power": CHANNELS["power"].unit,
     "torque_squared": "N^2 m^2",
 }
 

@@ -72,4 +72,4 @@ def acting(variants: Sequence[Variant]) -> dict[str, Any]:
 
 def _every(motion: Motion, step: int) -> Motion:
     cut = slice(None, None, step)
-    return Motion(motion.run, motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut])
+    return Motion(motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut], run=motion.run)
