@@ -12,7 +12,7 @@ from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Store, Triple, par
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import closure as owl_rl
-from irtwin.knowledge.owl_rl.closure import Closure, Contradiction, closure
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE
 
@@ -22,6 +22,10 @@ PREFIXES = """
 @prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
 @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
 """
+
+
+def closure(given: Iterable[Triple]) -> set[Triple]:
+    return Closure(given).worth_keeping()
 
 
 def triples(turtle: str) -> set[Triple]:

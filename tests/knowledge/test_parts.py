@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests import small_fleet
+from tests.individuals import individual
 
 from irtwin import workflow
 from irtwin.knowledge import owl_dl, parts, reasoning
@@ -25,7 +26,6 @@ from irtwin.knowledge.vocabulary import (
     RDF,
     RDFS,
     XSD,
-    individual,
     term,
 )
 from irtwin.resources import folder

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
+from tests.individuals import individual
 
 from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
@@ -18,7 +19,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SWRL,
     RDF,
     RDFS,
-    individual,
     term,
 )
 

@@ -16,7 +16,6 @@ from urllib.error import URLError
 from urllib.request import urlopen
 
 import pytest
-import rdflib
 from pyoxigraph import Literal, NamedNode, Quad
 
 from irtwin.errors import InputError
@@ -105,15 +104,6 @@ def test_construct_ask_bindings_and_faults(served: KnowledgeGraph) -> None:
         served.query("SELECT * { ?s ?p }")
     with pytest.raises(InputError, match="not allowed"):
         served.query("SELECT * { SERVICE <http://example.org/> { ?s ?p ?o } }")
-
-
-def test_rdflib_sees_the_same(served: KnowledgeGraph, graph: KnowledgeGraph) -> None:
-    text = "SELECT ?name { ?run <https://w3id.org/irtwin#Run_Name> ?name }"
-    names = sorted(str(row[0]) for row in graph.as_rdflib().query(text))
-    assert len(names) == 5
-    assert sorted(str(row[0]) for row in served.as_rdflib().query(text)) == names
-    name = rdflib.URIRef(term("Run_Name"))
-    assert len(list(served.as_rdflib().subjects(name))) == len(list(graph.as_rdflib().subjects(name))) == 5
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.flange import flange_position
 
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import Row, from_table
-from irtwin.robot.kinematics import flange_position
 
 # Universal Robots UR10, as the maker publishes it
 UR10 = (

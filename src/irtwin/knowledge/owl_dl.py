@@ -33,11 +33,6 @@ _LONGEST_SEARCH = 120  # seconds
 _INFERRED = "http://inferrences/"  # the ontology that owlready2 puts a reasoner's results into
 
 
-def check_consistency(triples: Iterable[Triple]) -> None:
-    """Let HermiT look for a contradiction in ontology and individuals; Contradiction says which statements clash."""
-    classify(triples)
-
-
 def classify(triples: Iterable[Triple]) -> set[Triple]:
     """Return the superclasses and types that HermiT infers in OWL 2 DL, the nearest alone.
 

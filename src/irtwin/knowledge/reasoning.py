@@ -121,13 +121,6 @@ def around(graph: KnowledgeGraph, nodes: Iterable[NamedNode]) -> set[Triple]:
     return graph.construct(_AROUND.replace("?nodes", values))
 
 
-def check_consistency(graph: KnowledgeGraph) -> None:
-    """Let HermiT look for a contradiction in what is asserted; InputError where there is one."""
-    from irtwin.knowledge import owl_dl  # starts Java: only where it is needed
-
-    owl_dl.check_consistency(asserted(graph))
-
-
 def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences | None:
     """Reason over the parts that changed; None where that would not do."""
     if not changed:

@@ -5,8 +5,6 @@ What the terms mean stands in `ontology/`; a test holds every term that the code
 
 from __future__ import annotations
 
-from urllib.parse import quote
-
 ONTOLOGY = "https://w3id.org/irtwin"
 IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
@@ -57,11 +55,6 @@ GRAPH_CHANGED = f"{GRAPH}changed"  # individuals that are to be reasoned over or
 def term(name: str) -> str:
     """Return the IRI of a class or property of the model: `term("Industrial_Robot")`."""
     return IRT + name
-
-
-def individual(kind: str, *parts: str) -> str:
-    """Return the IRI of an individual: `individual("joint", "UR10", "elbow")` ends in `id/joint/UR10/elbow`."""
-    return ID + "/".join(quote(part, safe="") for part in (kind, *parts))
 
 
 def shorten(iri: str) -> str:
