@@ -9,6 +9,7 @@ ONTOLOGY = "https://w3id.org/irtwin"
 IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
+REASONER = f"{ONTOLOGY}/reasoner/"
 SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
 ID = f"{ONTOLOGY}/id/"
 
@@ -26,6 +27,7 @@ PREFIXES = {
     "irt": IRT,
     "effect": EFFECT,
     "provider": PROVIDER,
+    "reasoner": REASONER,
     "series": SERIES,
     "id": ID,
     "rdf": RDF,

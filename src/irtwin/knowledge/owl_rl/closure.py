@@ -247,6 +247,11 @@ def _truisms() -> frozenset[Fact]:
     return frozenset(Closure([])._round)
 
 
+def says_something(triple: Triple) -> bool:
+    """Whether a conclusion is worth keeping in a graph, as `Closure.worth_keeping` has it."""
+    return triple.subject != triple.object and not _is_hidden(triple.subject) and not _is_hidden(triple.object)
+
+
 def _is_hidden(term: Node) -> bool:
     if isinstance(term, NamedNode):
         return term.value in _TRIVIAL or datatypes.is_datatype(term.value)
