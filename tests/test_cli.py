@@ -16,6 +16,8 @@ from irtwin.knowledge.vocabulary import GRAPH_OWL_RL
 from irtwin.workflow import unpack_demo
 from tests.data_sets import few_runs_of_the_demo
 
+pytestmark = pytest.mark.slow
+
 HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "plotly", "owlready2", "pyarrow")
 
 

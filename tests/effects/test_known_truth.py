@@ -22,6 +22,8 @@ from irtwin.twin.files import load as load_twin
 from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
 
+pytestmark = pytest.mark.slow
+
 TRUE = truth(arm(3))
 ROBOT = with_constants(arm(3))
 # rotors as on their data sheet: torque alone does not tell a rotor's inertia from a link's

@@ -18,6 +18,8 @@ from irtwin.gap.isolation.finding import find
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 NOISE = 0.2
 

@@ -14,6 +14,8 @@ from irtwin.gap.localisation.operating_variable import followed
 from irtwin.gap.localisation.regimes import JOINT_REGIMES
 from irtwin.gap.regression.residuals import Trace
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 JOINTS = ROBOT.joint_names
 FLOOR = np.full(3, 0.5)

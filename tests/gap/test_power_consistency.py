@@ -15,6 +15,8 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.power_consistency import PowerBalance, filtered, kind_of, refuted
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 KNOWN = catalogue()
 WITH_LOSS = (*BASELINE, "copper_loss")

@@ -141,6 +141,7 @@ def test_without_java_hermit_is_refused_and_what_was_concluded_stays(graph: Know
         )
 
 
+@pytest.mark.slow
 def test_without_java_the_swrl_rules_are_named_until_there_is_one(
     graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,6 +21,8 @@ from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Joint
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module", params=gap_cases.VERDICTS)
 def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, KnowledgeGraph]:

@@ -183,6 +183,7 @@ def test_contradiction_is_refused_by_the_name_of_its_rule(premise: str, rule: st
         closure(triples(premise))
 
 
+@pytest.mark.slow
 def test_a_run_that_is_a_robot_is_refused(graph: KnowledgeGraph) -> None:
     wrong = triples("<https://w3id.org/irtwin/id/run/Arm_A.fit_1> a irt:Industrial_Robot .")
     with pytest.raises(InputError, match=r"id:run/Arm_A\.fit_1"):
@@ -195,6 +196,7 @@ def test_two_values_where_there_can_be_one_are_refused(graph: KnowledgeGraph) ->
         closure(graph.triples() | wrong)
 
 
+@pytest.mark.slow
 def test_agrees_with_owlrl_on_two_robots(graph: KnowledgeGraph) -> None:
     """Apart from what is true of everything, and what is said of anonymous classes or literals."""
     premise = graph.triples(GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_ACTIVITY)

@@ -92,6 +92,7 @@ ex:C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty ex:p ; owl:someValuesF
 """
 
 
+@pytest.mark.slow
 def test_classification_by_hermit(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
     source.write_text(DL)
@@ -101,6 +102,7 @@ def test_classification_by_hermit(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "in.ttl"
     source.write_text(DL + "ex:D owl:disjointWith ex:D .")
@@ -108,6 +110,7 @@ def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
         close_file(source, tmp_path / "out.nt", "hermit")
 
 
+@pytest.mark.slow
 def test_clash_that_only_dl_sees_names_its_statements(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
     source.write_text(DL + "ex:D rdfs:subClassOf owl:Nothing .")

@@ -24,6 +24,8 @@ from irtwin.knowledge.vocabulary import (
 )
 from irtwin.resources import folder
 
+pytestmark = pytest.mark.slow
+
 TYPE = RDF + "type"
 RUN = "Arm_A.idle_1"
 CONCLUSIONS = {

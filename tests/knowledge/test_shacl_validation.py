@@ -9,6 +9,8 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, term
 
+pytestmark = pytest.mark.slow
+
 RUN = individual("run", "Arm_A.fit_1")
 JOINT = individual("joint", "Arm_A", "j1")
 PARAMETER = individual("parameter", "Arm_A.t1.coulomb_friction.j1.Fc")

@@ -76,6 +76,7 @@ def test_every_question_has_the_answer_of_the_embedded_store(served: KnowledgeGr
         assert ask(served, name) == ask(graph, name), name
 
 
+@pytest.mark.slow
 def test_what_is_there_already_is_left_alone(served: KnowledgeGraph, two_robots: list[Quad]) -> None:
     """The server calls blank nodes as it likes: the ontology is the same all the same."""
     served._store.update(f"INSERT DATA {{ GRAPH <{A}> {{ <https://example.org/x> a <https://example.org/X> }} }}")

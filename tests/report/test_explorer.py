@@ -1,5 +1,6 @@
 import numpy as np
 import pyarrow as pa
+import pytest
 from tests.report.robots import Factory, answers, power_only, six_axis
 from tests.report.test_sampling import unpack
 
@@ -25,6 +26,7 @@ def test_curves_keep_the_extremes_of_the_samples(graph: KnowledgeGraph):
     np.testing.assert_allclose([drawn.min(), drawn.max()], [samples.min(), samples.max()], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_many_runs_share_the_page(graph: KnowledgeGraph):
     factory = six_axis(graph, runs=30)
     curves = explorer(answers(graph, factory), factory.read_series)

@@ -45,6 +45,7 @@ def modified(row: Row, angle: float) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("convention", "is_modified"), [(standard, False), (modified, True)])
 @given(q=st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 def test_the_flange_is_where_the_product_of_matrices_puts_it(convention, is_modified, q):

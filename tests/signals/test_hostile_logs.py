@@ -65,6 +65,7 @@ def test_values_that_no_toml_should_have(folder, value, message):
     assert re.search(message, refused(folder))
 
 
+@pytest.mark.slow
 def test_tables_in_tables_without_end(folder):
     rewrite(folder, "^role.*$", ".".join("a" * 50_000) + " = 1")
     assert "nested too deeply" in refused(folder)
@@ -164,6 +165,7 @@ def test_decimals_are_numbers(folder):
     np.testing.assert_array_equal(run.signals.q, 1.0)
 
 
+@pytest.mark.slow
 def test_a_small_file_of_many_samples_is_refused_unread(folder):
     (file,) = (folder / "runs").iterdir()
     schema = pa.schema([(name, pa.float64()) for name in ("time", "q_joint_1", "tau_joint_1")])
@@ -183,6 +185,7 @@ def test_columns_that_nobody_asked_for_are_not_read(folder):
     assert len(run.signals.time) == 200
 
 
+@pytest.mark.slow
 def test_damaged_parquet_is_said_to_be(folder):
     (file,) = (folder / "runs").iterdir()
     whole = file.read_bytes()
