@@ -395,7 +395,8 @@ def reason(
     native  OWL 2 RL by the rules that ship. Takes under 1 s for 10,000 triples.
             Finds nothing that needs unnamed individuals or a choice of cases.
     owlrl   The same rules by the Python package owlrl, to check the native engine.
-            Takes 10 s for 10,000 triples, 300,000 at most. Compares no literals.
+            Takes 10 s for 10,000 triples, twice for a workspace; 300,000 at most.
+            Compares no literals.
     hermit  OWL 2 DL by HermiT, and what OWL 2 RL concludes from its results.
             Finds that too. Takes 5 s for 10,000 triples. Needs Java, and an
             ontology that is OWL 2 DL.
