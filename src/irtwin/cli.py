@@ -398,8 +398,8 @@ def reason(
             Takes 10 s for 10,000 triples, twice for a workspace; 300,000 at most.
             Compares no literals.
     hermit  OWL 2 DL by HermiT, and what OWL 2 RL concludes from its results.
-            Finds that too. Takes 5 s for 10,000 triples. Needs Java, and an
-            ontology that is OWL 2 DL.
+            Also finds what native cannot. Takes 5 s for 10,000 triples. Needs Java
+            and an ontology that is OWL 2 DL.
     """
     from irtwin.knowledge.owl_rl.closure import Contradiction
 
