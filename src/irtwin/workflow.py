@@ -16,7 +16,9 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
+from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import explain_one
+from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
@@ -140,6 +142,23 @@ def adopt(
         return _report(place, graph, robot_id)
 
 
+def reason_again(
+    workspace: Path | str = WORKSPACE,
+    *,
+    engine: str = NATIVE,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> None:
+    """Draw the conclusions in a workspace's graph by an engine, in place of those that are there.
+
+    They stay until the graph changes, or the native engine is asked again. Raises InputError where the engine cannot
+    run, Contradiction where the graph contradicts itself.
+    """
+    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        conclude(graph, _clocked(announce), engine)
+
+
 def backup(
     archive: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> None:
@@ -219,11 +238,15 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
     return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
 
 
-def conclude(graph: KnowledgeGraph, announce: Announce) -> None:
+def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) -> None:
     """Reason over the graph and check its constraints; say what was found."""
     announce("Reasoning")
-    inferred = reason(graph)
-    announce(f"  {inferred.owl_rl} triples from OWL 2 RL, {inferred.swrl} from SWRL, {inferred.shacl} from SHACL rules")
+    inferred = reason(graph, engine)
+    by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
+    announce(f"  {inferred.owl_rl} triples from {by}, {inferred.swrl} from SWRL, {inferred.shacl} from SHACL rules")
+    if inferred.not_run:
+        announce(f"  without Java, these SWRL rules did not run: {', '.join(inferred.not_run)}")
+        announce(f"  to get them: {HOW_TO_GET}, and run the data set again")
     if inferred.joined_by:
         announce(
             f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"

@@ -20,6 +20,8 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import Run
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 SIX = arm(6)
 HEAVY = parse_urdf(re.sub(r'mass value="(.*?)"', lambda found: f'mass value="{6 * float(found[1])}"', SIX.urdf))

@@ -16,6 +16,8 @@ from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 
 

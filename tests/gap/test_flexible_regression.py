@@ -19,6 +19,8 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.thresholds import DEFAULT
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 NOISE = 0.2
 

@@ -15,6 +15,8 @@ from irtwin.gap.localisation.regimes import JOINT_REGIMES
 from irtwin.gap.regression.residuals import Trace
 from irtwin.gap.thresholds import DEFAULT
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 JOINTS = ROBOT.joint_names
 FLOOR = np.full(3, 0.5)

@@ -28,6 +28,8 @@ from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.report.gap.figures import experiment
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 NOISE = 0.2
 

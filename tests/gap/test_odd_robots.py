@@ -72,6 +72,7 @@ def one_stands(q):
 ROBOTS = {"one joint": arm(1), "two joints": arm(2), "a gantry": gantry(), "a gantry without masses": gantry("")}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("lacking", ["power", "torque"])
@@ -80,6 +81,7 @@ def test_small_robots_are_diagnosed(robot, lacking, tmp_path):
     assert checked(ROBOTS[robot], made, tmp_path) in ("no_gap", "attributed", "ambiguous")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize(
     "changes",

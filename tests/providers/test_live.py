@@ -27,6 +27,8 @@ from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
 
+pytestmark = pytest.mark.slow
+
 NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 UNSAID = (math.nan, math.nan)
 NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {

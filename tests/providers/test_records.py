@@ -59,6 +59,7 @@ def test_plain_names_are_their_own_identifiers():
         assert identifier(name) == name
 
 
+@pytest.mark.slow
 @given(st.lists(st.text(), min_size=2, max_size=2, unique_by=lambda name: unicodedata.normalize("NFC", name)))
 @example(["机器人", "人器机"])
 @example(["R 1", "R_1"])

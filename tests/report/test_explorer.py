@@ -1,5 +1,6 @@
 import numpy as np
 import pyarrow as pa
+import pytest
 from tests.report.robots import Factory, answers, power_only, six_axis
 from tests.report.test_sampling import unpack
 
@@ -36,6 +37,7 @@ def test_a_chart_has_the_unit_of_its_joint(graph: KnowledgeGraph):
     assert (run["power"]["unit"], run["energy"]["unit"]) == ("W", "J")
 
 
+@pytest.mark.slow
 def test_many_runs_share_the_page(graph: KnowledgeGraph):
     factory = six_axis(graph, runs=30)
     curves = explorer(answers(graph, factory), factory.read_series)

@@ -26,6 +26,8 @@ from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Joint
 
+pytestmark = pytest.mark.slow
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 ORDER = ["summary", "where", "which", "shrink", "next", "untestable", "provenance"]
 

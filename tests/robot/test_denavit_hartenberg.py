@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.flange import flange_position
 
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import Row, from_table
-from irtwin.robot.kinematics import flange_position
 
 # Universal Robots UR10, as the maker publishes it
 UR10 = (
@@ -45,6 +45,7 @@ def modified(row: Row, angle: float) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("convention", "is_modified"), [(standard, False), (modified, True)])
 @given(q=st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 def test_the_flange_is_where_the_product_of_matrices_puts_it(convention, is_modified, q):

@@ -182,6 +182,7 @@ def test_decimals_are_numbers(folder):
     np.testing.assert_array_equal(run.signals.q, 1.0)
 
 
+@pytest.mark.slow
 def test_a_small_file_of_many_samples_is_refused_unread(folder):
     (file,) = (folder / "runs").iterdir()
     schema = pa.schema([(name, pa.float64()) for name in ("time", "q_joint_1", "tau_joint_1")])
@@ -201,6 +202,7 @@ def test_columns_that_nobody_asked_for_are_not_read(folder):
     assert len(run.signals.time) == 200
 
 
+@pytest.mark.slow
 def test_damaged_parquet_is_said_to_be(folder):
     (file,) = (folder / "runs").iterdir()
     whole = file.read_bytes()

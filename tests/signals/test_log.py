@@ -208,6 +208,7 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
     assert np.array_equal(read.time, np.delete(signals["time"], sorted(bad)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

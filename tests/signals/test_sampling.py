@@ -98,6 +98,7 @@ def test_the_median_of_bursts_is_not_the_interval():
     assert as_sampled(signals(time), FILE)[1] == []
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.lists(st.floats(1e-6, 1e9), min_size=19, max_size=200))
 def test_no_times_ask_for_many_more_rows_than_there_are_samples(gaps):

@@ -179,16 +179,6 @@ class Stack:
         ]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
 
-    def predicted(self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None = None) -> Predicted:
-        """Return what all the effects predict over the motion's whole run: what a further effect is built on."""
-        whole = motion.whole or motion
-        torque = self.real_torque(whole, torque_values)
-        values = self._expected(self.power_terms) if power_values is None else power_values
-        columns = self.predicted_power_columns(whole, torque_values, values)
-        axes = np.array([_on_the_bus(effect, term) for effect, term in self.power_terms], dtype=bool)
-        power = columns @ values
-        return Predicted(torque, power, columns[:, axes] @ values[axes], self.bodies(whole, torque_values))
-
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""
         parts = [

@@ -23,16 +23,5 @@ def flange(robot: Robot) -> str:
     return max(_frames(robot), key=lambda entry: depths[entry[1]])[0].name
 
 
-def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Return the flange's position in the base frame, (N, 3) m, along the joint positions `q`: (N, n) rad."""
-    model, data = robot.model, robot.model.createData()
-    frame = model.getFrameId(flange(robot), pin.FrameType.BODY)
-    positions = np.empty((len(q), 3))
-    for row, sample in enumerate(np.asarray(q, dtype=float)):
-        pin.forwardKinematics(model, data, sample)
-        positions[row] = pin.updateFramePlacement(model, data, frame).translation
-    return positions
-
-
 def _frames(robot: Robot) -> list[tuple[Link, int]]:
     return [(link, robot.model.getFrameId(link.name, pin.FrameType.BODY)) for link in robot.links]
