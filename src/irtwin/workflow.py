@@ -102,14 +102,13 @@ def diagnose(
     for line in data_set.repairs:
         announce(f"  {line}")
     found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
-    document = found.to_json()
     if json_file is not None:
-        write(json_file, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+        write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
         write(twin_file, to_json(found.twin).encode())
     if report is not None:
         announce("Writing the report")
-        render_alone(data_set, document, found.evidence, report)
+        render_alone(data_set, found.document, found.evidence, report)
     if workspace is not None:
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
@@ -118,7 +117,7 @@ def diagnose(
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
-                record(apart, robot_id, document, found.evidence, twin)
+                record(apart, robot_id, found.document, found.evidence, twin)
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)

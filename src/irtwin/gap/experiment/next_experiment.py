@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
+from irtwin.gap.document.experiment import Considered, Experiment, Question
 from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
 from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
@@ -63,16 +64,13 @@ class Weight:
             return self.expected >= ENOUGH and self.share >= _LEAST_VISIBLE
         return self.added >= ENOUGH and self.share >= _LEAST_SHARE
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name."""
+    @property
+    def question(self) -> Question:
+        """The question with its numbers, as a diagnosis says it."""
         kind = "not_imitated" if len(self.effects) > 1 else "visibility"
-        return {
-            "effects": list(self.effects),
-            "separation_now": _rounded(self.now),
-            "expected_separation": _rounded(self.expected),
-            f"{kind}_now": _rounded(self.share_now),
-            f"expected_{kind}": _rounded(self.share),
-        }
+        shares = {f"{kind}_now": _rounded(self.share_now), f"expected_{kind}": _rounded(self.share)}
+        now, expected = _rounded(self.now), _rounded(self.expected)
+        return Question(effects=self.effects, separation_now=now, expected_separation=expected, **shares)
 
 
 @dataclass(frozen=True)
@@ -92,25 +90,26 @@ class Proposal:
     by_hand: tuple[str, ...]
     note: str | None
 
-    def to_json(self) -> dict[str, Any]:
-        """Return `next_experiment` of the contract: texts, numbers and the programme to run."""
+    @property
+    def experiment(self) -> Experiment:
+        """What a diagnosis says of it: texts, numbers and the programme to run."""
         chosen = self.programme
-        return {
-            "purpose": self.purpose,
-            "effects": list(self.effects),
-            "joints": list(self.joints),
-            "motions": [*([chosen.text] if chosen else []), *self.by_hand],
-            "expected_separation": min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
-            "separation_now": min((_rounded(w.now) for w in self.weights), default=None),
-            "separation_that_is_enough": ENOUGH,
-            "questions": [weight.to_json() for weight in self.weights],
-            "programme": chosen.to_json() if chosen else None,
-            "considered": [
-                {"kind": one.kind, "minutes": round(one.cost / 60, 1), "expected_separation": _rounded(worth)}
+        return Experiment(
+            purpose=self.purpose,
+            effects=self.effects,
+            joints=self.joints,
+            motions=(*([chosen.text] if chosen else []), *self.by_hand),
+            expected_separation=min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
+            separation_now=min((_rounded(w.now) for w in self.weights), default=None),
+            separation_that_is_enough=ENOUGH,
+            questions=tuple(weight.question for weight in self.weights),
+            programme=chosen.said if chosen else None,
+            considered=tuple(
+                Considered(kind=one.kind, minutes=round(one.cost / 60, 1), expected_separation=_rounded(worth))
                 for one, worth in self.considered
-            ],
-            "note": self.note,
-        }
+            ),
+            note=self.note,
+        )
 
     @property
     def curve(self) -> dict[str, Any] | None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from irtwin.report import wording
 from irtwin.report.energy.figures import MEASURED, PALETTE, Figure, plain
-from irtwin.report.gap import document as gap_document
+from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers
 
 Evidence = Mapping[str, Any]
@@ -26,8 +26,8 @@ _JOINTS_DRAWN = 7
 _CURVES = 3  # of one effect
 
 
-def figures(answers: Answers, evidence: Evidence, document: Evidence) -> dict[str, Figure]:
-    """Return every figure that there is evidence for, by name; `document`: the diagnosis itself."""
+def figures(answers: Answers, evidence: Evidence) -> dict[str, Figure]:
+    """Return every figure that there is something to draw for, by name."""
     drawn = {"heat_map": heat_map(evidence.get("heat_map") or {})}
     for place, curve in enumerate(evidence.get("follows") or []):
         drawn[f"follows_{place}"] = follows(curve, effect_names(answers))
@@ -35,7 +35,7 @@ def figures(answers: Answers, evidence: Evidence, document: Evidence) -> dict[st
         if name == "runs_power" or joint is not None:
             drawn[name] = runs(evidence.get("runs") or [], joint)
     drawn["by_cause"] = by_cause(answers)
-    drawn["budget"] = budget(answers, document)
+    drawn["budget"] = budget(answers)
     drawn["experiment"] = experiment(evidence.get("experiment") or {})
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
@@ -92,11 +92,9 @@ def foremost_curves(curves: Sequence[Evidence], answers: Answers) -> list[Eviden
 
 def effect_names(answers: Answers) -> dict[str, str]:
     """Return what the ontology calls the effects that the diagnosis names, by their ids."""
-    named = [
-        (row[key], row["label"])
-        for question, key in (("causes", "effect"), ("rivals", "rival"), ("not_testable", "effect"))
-        for row in answers[question].rows
-    ]
+    questions = ("causes", "not_testable")
+    named = [(row["effect"], row["label"]) for question in questions for row in answers[question].rows]
+    named += [(row["rival"], row["rival_label"]) for row in answers["rivals"].rows]
     return {wording.local_name(effect): label for effect, label in named if label}
 
 
@@ -190,16 +188,16 @@ def by_cause(answers: Answers) -> Figure | None:
     """
     of_any = answers["changes_by_cause"].rows
     rows = [row for row in of_any if row["measure"] == of_any[0]["measure"]]
-    if len({row["rank"] for row in rows}) < 2:
+    if len({row["cause"] for row in rows}) < 2:
         return None
     unit = rows[0]["unit"]
-    place_of = {row["rank"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
-    rows = sorted(rows, key=lambda row: place_of[row["rank"]])
+    place_of = {row["cause"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
+    rows = sorted(rows, key=lambda row: place_of[row["cause"]])
     data = []
     for name, part, colour in (("cause alone", "alone", AFTER), ("all causes but this one", "without", PALETTE[4])):
         of_part = [row for row in rows if row["part"] == part]
         bars = {
-            "type": "bar", "name": name, "x": [plain(f"{place_of[row['rank']]}. {row['label']}") for row in of_part],
+            "type": "bar", "name": name, "x": [plain(f"{place_of[row['cause']]}. {row['label']}") for row in of_part],
             "y": [row["after"] for row in of_part], "marker": {"color": colour},
             "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
         }  # fmt: skip
@@ -215,12 +213,12 @@ def by_cause(answers: Answers) -> Figure | None:
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
 
 
-def budget(answers: Answers, document: Evidence) -> Figure | None:
+def budget(answers: Answers) -> Figure | None:
     """Draw where each channel's gap goes: closed by each cause, closeable without a name, and what is left."""
-    given = gap_document.budgets(document)
+    given = {row["channel"]: row for row in answers["closeable"].rows}
     if not given:
         return None
-    names, parts = list(given), gap_document.shares(document)
+    names, parts = list(given), {row["cause"]: row for row in answers["closed_by_cause"].rows}
     data = []
 
     def bar(name: str, of_channel: Mapping[str, float], colour: str) -> None:
@@ -232,20 +230,10 @@ def budget(answers: Answers, document: Evidence) -> Figure | None:
             }
         )  # fmt: skip
 
-    channel_of = {
-        rank: (cause.get("evidence") or {}).get("channel", "torque")
-        for rank, cause in enumerate(document["causes"], start=1)
-    }
     for place, row in enumerate(answers["causes"].rows):
-        channel, share = channel_of[row["rank"]], max(parts.get(row["rank"], 0.0), 0.0)
-        if channel in given and share:
-            whole = sum(max(parts.get(rank, 0.0), 0.0) for rank, of in channel_of.items() if of == channel)
-            name = str(row["label"] or wording.local_name(row["effect"]).replace("_", " "))
-            bar(
-                f"{place + 1}. {name}",
-                {channel: given[channel]["closed"] * share / whole},
-                _CAUSES[place % len(_CAUSES)],
-            )
+        if closed := parts.get(row["cause"]):
+            of_channel = {closed["channel"]: closed["part"]}
+            bar(f"{place + 1}. {effect_name(row)}", of_channel, _CAUSES[place % len(_CAUSES)])
     bar("could be closed, cause unknown", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
     bar("not closed", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
     xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
