@@ -254,6 +254,9 @@ def _causes(draw: random.Random, robot_id: str, verdict: str, of: dict[str, Any]
         }  # fmt: skip
     if verdict == "ambiguous":
         yield "gap_experiment", of | {"purpose": f"tell {causes[0]} from {causes[1]}", "enough": 5.0}
+        yield "gap_experiment_instruction", of | {"number": 1, "text": "a ladder of 8 constant speeds, each both ways"}
+        for effect in causes:
+            yield "gap_experiment_effect", of | {"effect": effect}
 
 
 def _text(moment: datetime) -> str:

@@ -19,7 +19,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Joint
 
 pytestmark = pytest.mark.system
-QUESTIONS = ("why_more_energy", "where_is_the_gap", "what_to_do", "gap_shrinkage", "not_testable")
+QUESTIONS = ("why_more_energy", "where_is_the_gap", "what_to_do", "gap_shrinkage", "not_testable", "next_experiment")
 MAPPINGS = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
 
 
