@@ -91,7 +91,7 @@ def diagnose(
     `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
     kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
     all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added.
-    Raises InputError on bad input, before anything is written.
+    The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     for file in filter(None, (json_file, report, twin_file)):
