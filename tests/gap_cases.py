@@ -6,6 +6,7 @@ import copy
 import math
 from typing import Any
 
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
@@ -29,14 +30,20 @@ def diagnosis(verdict: str) -> dict[str, Any]:
     return copy.deepcopy({"verdict": verdict, "robot": "KR6", "gap": _gap(verdict)} | _NOTHING | _CASES[verdict])
 
 
+def curves(verdict: str) -> Curves:
+    """What a page draws of it."""
+    return Curves.from_json(evidence(verdict))
+
+
 def evidence(verdict: str) -> dict[str, Any]:
-    """The arrays behind it."""
+    """The JSON of what a page draws, to be changed at will."""
     if verdict == "no_gap":
-        return {"heat_map": _heat_map(0.0), "follows": [], "runs": []}
+        return {"heat_map": _heat_map(0.0), "follows": [], "runs": [], "experiment": None}
     x = [0.02 * step - 1.0 for step in range(101)]
     fitted = [1.8 * math.copysign(1, value or 1) * math.exp(-abs(value) / 0.1) for value in x]
     residual = [value + 0.1 * math.sin(9 * place) for place, value in enumerate(fitted)]
     curve = {
+        "channel": "torque",
         "effect": None if verdict == "unexplained" else "stribeck_friction",
         "joint": "joint_a3",
         "variable": "speed",
@@ -54,8 +61,8 @@ def evidence(verdict: str) -> dict[str, Any]:
     ]
     found = {"heat_map": _heat_map(3.0), "follows": [curve], "runs": judged}
     time = [0.5 * step for step in range(100)]
-    move = {"time": time, "joints": ["joint_a3"], "q": [[math.sin(value) for value in time]]}
-    return found | ({"experiment": move} if verdict == "ambiguous" else {})
+    move = {"time": time, "joints": ["joint_a3"], "units": ["rad"], "q": [[math.sin(value) for value in time]]}
+    return found | {"experiment": move if verdict == "ambiguous" else None}
 
 
 def _gap(verdict: str) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl import rules as shacl_rules
@@ -43,7 +44,8 @@ def page_of(place: Path, said: dict[str, Any], drawn: dict[str, Any] | None = No
     """Return the page of a diagnosis, which is then `place`/p.html."""
     with Workspace(place / "w") as workspace:
         six_axis(workspace)
-        record(workspace, rows.ROBOT, Document.from_json(said), drawn or gap_cases.evidence("attributed"))
+        curves = Curves.from_json(drawn or gap_cases.evidence("attributed"))
+        record(workspace, rows.ROBOT, Document.from_json(said), curves)
         render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, place / "p.html")
     return (place / "p.html").read_text()
 

@@ -108,7 +108,7 @@ def diagnose(
         write(twin_file, to_json(found.twin).encode())
     if report is not None:
         announce("Writing the report")
-        render_alone(data_set, found.document, found.evidence, report)
+        render_alone(data_set, found.document, found.curves, report)
     if workspace is not None:
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
@@ -117,7 +117,7 @@ def diagnose(
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
-                record(apart, robot_id, found.document, found.evidence, twin)
+                record(apart, robot_id, found.document, found.curves, twin)
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)

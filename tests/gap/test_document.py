@@ -14,6 +14,7 @@ from tests import gap_cases
 from irtwin.errors import InputError
 from irtwin.gap.document import form
 from irtwin.gap.document.cause_ids import cause_ids
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Cause, Document, Gap, Location, Shrink, schema
 from irtwin.gap.document.experiment import Experiment
 
@@ -83,7 +84,7 @@ def _typed(kind: str, node: dict[str, Any]) -> st.SearchStrategy[Any]:
     return st.fixed_dictionaries(required, optional=parts)
 
 
-@pytest.mark.parametrize("kind", [Gap, Location, Cause, Shrink, Experiment])
+@pytest.mark.parametrize("kind", [Gap, Location, Cause, Shrink, Experiment, Curves])
 def test_whatever_the_schema_allows_is_read_and_written_alike(kind: type) -> None:
     @settings(max_examples=40, deadline=None)
     @given(json_of(form.schema(kind)))

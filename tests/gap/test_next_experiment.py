@@ -112,17 +112,17 @@ def test_joints_that_are_not_asked_for_stand_still(motions):
 def test_a_page_draws_the_joints_that_move(motions):
     ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
     proposal = Proposal("tell", (), ladder.joints, ROBOT, ladder, (), (), (), None)
-    assert proposal.curve["joints"] == ["joint_2"]
-    assert len(proposal.curve["q"]) == 1
-    assert np.ptp(proposal.curve["q"][0]) > 0
-    assert experiment(proposal.curve) is not None
+    assert proposal.curve.joints == ("joint_2",)
+    assert len(proposal.curve.q) == 1
+    assert np.ptp(proposal.curve.q[0]) > 0
+    assert [line["name"] for line in experiment(proposal.curve)["data"]] == ["joint_2"]
 
 
 def test_positions_of_sliding_joints_are_in_metres(motions):
     gantry = arm(2, slides=(1,))
     both = next(iter(programmes(gantry, [], motions)))
     drawn = Proposal("tell", (), both.joints, gantry, both, (), (), (), None).curve
-    assert drawn["units"] == ["rad", "m"]
+    assert drawn.units == ("rad", "m")
     assert experiment(drawn)["layout"]["yaxis"]["title"]["text"] == "position, rad or m"
     assert "m/s" in next(iter(programmes(gantry, ["joint_2"], motions))).text
 
@@ -241,7 +241,7 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
     assert said.programme.joints == ("joint_2",) or said.programme.kind == "exciting_motion"
     assert said.expected_separation >= said.separation_now
     curve = proposal.curve
-    assert len(curve["q"]) == len(curve["joints"]) and len(curve["q"][0]) == len(curve["time"]) <= 450
+    assert len(curve.q) == len(curve.joints) and len(curve.q[0]) == len(curve.time) <= 450
 
 
 def test_nothing_to_ask(motions):

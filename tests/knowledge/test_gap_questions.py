@@ -33,7 +33,7 @@ def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         ]
         runs = [rows.run(name) for name in gap_cases.RUNS]
         workspace.ingest(rows.robot(), joints, runs, {run.run_id: rows.samples(1) for run in runs})
-        record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.evidence(verdict), "{}")
+        record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
         mappings = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
     shacl_rules.infer(graph)

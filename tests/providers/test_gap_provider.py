@@ -11,6 +11,7 @@ from sqlalchemy import select
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 from irtwin.providers import energy, identification
 from irtwin.providers.gap import adopt, record
@@ -25,6 +26,7 @@ from irtwin.twin.identify import identify
 ROBOT = "arm_2"
 BARE = ("rigid_body", "viscous_friction")
 FULL = (*BARE, "coulomb_friction")
+NOTHING = Curves(follows=(), runs=(), experiment=None)
 
 
 def diagnosis(**changes: Any) -> Document:
@@ -114,19 +116,22 @@ def count(workspace: Workspace, table: Any) -> int:
 
 
 def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
-    first = record(workspace, ROBOT, diagnosis(), {"runs": []}, workspace.better)
-    second = record(workspace, ROBOT, diagnosis(verdict="ambiguous"), {"runs": []}, workspace.better)
+    first = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
+    second = record(workspace, ROBOT, diagnosis(verdict="ambiguous"), NOTHING, workspace.better)
     assert first.diagnosis_id != second.diagnosis_id
     assert {file.name for file in (workspace.folder / "diagnoses").iterdir()} == {
         f"{second.diagnosis_id}{kind}.json" for kind in ("", ".evidence", ".twin")
     }
-    assert workspace.read_document(second.evidence_file, second.evidence_sha256) == b'{"runs": []}'
+    assert (
+        workspace.read_document(second.evidence_file, second.evidence_sha256)
+        == b'{"experiment": null, "follows": [], "runs": []}'
+    )
     assert count(workspace, gap_schema.GapNotTestable) == 2
     assert count(workspace, schema.Twin) == count(workspace, schema.RunEnergy) == 1
 
 
 def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> None:
-    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     with workspace.reading() as session:
         cause = session.scalars(select(gap_schema.GapCause)).one()
         run = session.scalars(select(gap_schema.GapCauseRun)).one()
@@ -138,7 +143,7 @@ def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> Non
 
 
 def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
-    found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     twin_id = adopt(workspace, ROBOT)
     with workspace.reading() as session:
         twin = session.scalars(select(schema.Twin)).one()
@@ -157,7 +162,7 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
 
 
 def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Workspace) -> None:
-    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     adopt(workspace, ROBOT)
     with workspace.reading() as session:
         row = session.scalars(select(schema.Twin)).one()
@@ -171,7 +176,7 @@ def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Works
 
 
 def test_a_run_apart_from_its_twin_has_energy_but_no_error(workspace: Workspace) -> None:
-    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     adopt(workspace, ROBOT)
     for name in ("swing_1", "swing_3"):
         made = energy.provide(workspace, f"{ROBOT}.{name}")
@@ -182,24 +187,24 @@ def test_a_run_apart_from_its_twin_has_energy_but_no_error(workspace: Workspace)
 def test_nothing_to_adopt_is_an_error(workspace: Workspace) -> None:
     with pytest.raises(InputError, match="no diagnosis"):
         adopt(workspace, ROBOT)
-    record(workspace, ROBOT, diagnosis(verdict="unexplained", causes=[]), {})
+    record(workspace, ROBOT, diagnosis(verdict="unexplained", causes=[]), NOTHING)
     with pytest.raises(InputError, match="added nothing to the twin"):
         adopt(workspace, ROBOT)
 
 
 def test_what_the_workspace_lacks_is_named(workspace: Workspace) -> None:
     with pytest.raises(InputError, match="no robot other here"):
-        record(workspace, "other", diagnosis(), {})
+        record(workspace, "other", diagnosis(), NOTHING)
     with pytest.raises(InputError, match='run "swing_9"'):
-        record(workspace, ROBOT, diagnosis(shrink=shrink("swing_9")), {})
+        record(workspace, ROBOT, diagnosis(shrink=shrink("swing_9")), NOTHING)
     size = {"rmse": 1.0, "noise_floor": None, "excess": None}
     with pytest.raises(InputError, match="no joint joint_9"):
-        record(workspace, ROBOT, diagnosis(gap={"energy_error_percent": None, "torque": {"joint_9": size}}), {})
+        record(workspace, ROBOT, diagnosis(gap={"energy_error_percent": None, "torque": {"joint_9": size}}), NOTHING)
     assert count(workspace, gap_schema.GapDiagnosis) == 0
 
 
 def test_a_changed_document_is_told(workspace: Workspace) -> None:
-    found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     (workspace.folder / found.twin_file).write_text("{}")
     with pytest.raises(InputError, match="was changed after it was written"):
         adopt(workspace, ROBOT)

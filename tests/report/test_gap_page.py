@@ -30,7 +30,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for verdict in gap_cases.VERDICTS:
         with Workspace(base / verdict) as workspace:
             six_axis(workspace)
-            record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.evidence(verdict), "{}")
+            record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
             files[verdict] = base / f"{verdict}.html"
             render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, files[verdict])
     return files

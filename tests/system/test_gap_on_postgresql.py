@@ -37,7 +37,7 @@ def fill(workspace: Workspace, verdict: str) -> None:
     ]
     runs = [rows.run(name) for name in gap_cases.RUNS]
     workspace.ingest(rows.robot(), joints, runs, {run.run_id: rows.samples(1) for run in runs})
-    record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.evidence(verdict), "{}")
+    record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
 
 
 def test_postgresql_answers_as_sqlite_does(tmp_path, new_postgresql_database):

@@ -19,6 +19,7 @@ from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.document.cause_ids import cause_ids
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Closeable, Document
 from irtwin.gap.document.experiment import Experiment
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
@@ -51,7 +52,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis: its `document`, and what that stands on; `evidence` holds the curves that a page draws."""
+    """The diagnosis: its `document`, what that stands on, and the `curves` that a page draws."""
 
     description: Robot
     verdict: str
@@ -60,9 +61,9 @@ class Diagnosis:
     locations: tuple[Location, ...]
     untestable: tuple[Untestable, ...]
     runs: tuple[str, ...]
+    curves: Curves
     seed: int = 0
     experiment: Experiment | None = None
-    evidence: dict[str, Any] = field(default_factory=dict)
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
     against: str | None = None  # the role of the runs that the observed ones are held against
@@ -93,6 +94,11 @@ class Diagnosis:
             ),
             next_experiment=self.experiment,
         )
+
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """The curves as JSON."""
+        return self.curves.to_json()
 
     def to_json(self) -> dict[str, Any]:
         """Return the document in the form of its schema, `irtwin.gap.document.document.schema()`."""
@@ -161,7 +167,7 @@ def diagnose(
         runs=tuple(sorted(case.observed)),
         seed=seed,
         experiment=None if proposal is None else proposal.experiment,
-        evidence={**drawn(left, located), "experiment": None if proposal is None else proposal.curve},
+        curves=drawn(left, located, None if proposal is None else proposal.curve),
         twin=closed_twin(case, causes),
         energies=energies,
         against=case.against,

@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import select
 
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 from irtwin.identification.validation import split
 from irtwin.providers import gap_rows
@@ -29,21 +30,19 @@ from irtwin.storage.files import inside
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
 
-Json = Mapping[str, Any]
-
 
 def record(
-    workspace: Workspace, robot_id: str, diagnosis: Document, evidence: Json, twin: str | None = None
+    workspace: Workspace, robot_id: str, diagnosis: Document, curves: Curves, twin: str | None = None
 ) -> gap_schema.GapDiagnosis:
     """Keep a robot's diagnosis, in place of an earlier one; return its row.
 
-    evidence: the arrays of its curves (JSON); twin: text of the twin with the causes added, which `adopt` makes the
-    robot's. Raises InputError where the workspace lacks the robot, or a run or joint that the diagnosis names.
+    curves: what a page draws of it; twin: text of the twin with the causes added, which `adopt` makes the robot's.
+    Raises InputError where the workspace lacks the robot, or a run or joint that the diagnosis names.
     """
     started = datetime.now(UTC)
     runs = _run_ids(workspace, robot_id)
     linear = _linear_joints(workspace, robot_id, diagnosis)
-    row, documents = _row(robot_id, diagnosis, evidence, twin)
+    row, documents = _row(robot_id, diagnosis, curves, twin)
     at = Place(row.diagnosis_id, robot_id, partial(_run_id, runs), linear)
     rows = [row, *gap_rows.rows(diagnosis, at)]
     made = Made(robot_id, [run_iri(run_id) for run_id in runs.values()], rows, documents=documents)
@@ -134,9 +133,11 @@ def _linear_joints(workspace: Workspace, robot_id: str, said: Document) -> froze
 
 
 def _row(
-    robot_id: str, said: Document, evidence: Json, twin: str | None
+    robot_id: str, said: Document, curves: Curves, twin: str | None
 ) -> tuple[gap_schema.GapDiagnosis, dict[str, bytes]]:
-    texts = {"": _text(said.to_json()), ".evidence": _text(evidence)} | ({} if twin is None else {".twin": twin})
+    texts = {"": _text(said.to_json()), ".evidence": _text(curves.to_json())}
+    if twin is not None:
+        texts[".twin"] = twin
     sums = {kind: hashlib.sha256(text.encode()).hexdigest() for kind, text in texts.items()}
     diagnosis_id = f"{robot_id}.{sums[''][:12]}"
     files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}.json" for kind in texts}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
+from irtwin.gap.document.curves import PlannedMotion
 from irtwin.gap.document.experiment import Considered, Experiment, Question
 from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
 from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
@@ -112,7 +112,7 @@ class Proposal:
         )
 
     @property
-    def curve(self) -> dict[str, Any] | None:
+    def curve(self) -> PlannedMotion | None:
         """What a page draws of the programme: time (s) and each joint's position, thinned."""
         if self.programme is None:
             return None
@@ -123,12 +123,12 @@ class Proposal:
             time.append(motion.time[::every] + start)
             q.append(motion.q[::every])
             start = float(time[-1][-1]) + every / motion.rate
-        return {
-            "time": np.concatenate(time).round(3).tolist(),
-            "joints": list(self.programme.joints),
-            "units": [self.robot.joints[joint].unit for joint in moved],
-            "q": np.concatenate(q).T[moved].round(5).tolist(),
-        }
+        return PlannedMotion(
+            time=tuple(np.concatenate(time).round(3).tolist()),
+            joints=self.programme.joints,
+            units=tuple(self.robot.joints[joint].unit for joint in moved),
+            q=tuple(map(tuple, np.concatenate(q).T[moved].round(5).tolist())),
+        )
 
 
 @dataclass(frozen=True)

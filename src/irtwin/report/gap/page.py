@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from irtwin import resources
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl import rules as shacl_rules
@@ -47,16 +49,16 @@ def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path)
         raise InputError(f"{robot}: no diagnosis in the graph; run `irtwin diagnose` with this workspace first")
     bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
     answers = ask(graph, _questions(), bindings)
-    evidence = json.loads(read_document(found["evidence_file"], found["evidence_checksum"]))
-    write(out, _page(answers, bindings, evidence).encode())
+    curves = Curves.from_json(json.loads(read_document(found["evidence_file"], found["evidence_checksum"])))
+    write(out, _page(answers, bindings, curves).encode())
 
 
-def render_alone(data_set: DataSet, diagnosis: Document, evidence: Mapping[str, Any], out: Path) -> None:
+def render_alone(data_set: DataSet, diagnosis: Document, curves: Curves, out: Path) -> None:
     """Write the gap report of a diagnosis that no workspace keeps."""
     robot_id = identifier(data_set.robot.name)
     with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as workspace:
         ingest(workspace, data_set)
-        record(workspace, robot_id, diagnosis, evidence)
+        record(workspace, robot_id, diagnosis, curves)
         graph = KnowledgeGraph()
         graph.load_ontology()
         mappings = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
@@ -69,10 +71,10 @@ def _questions() -> dict[str, Question]:
     return read_questions(resources.folder("reports") / "gap")
 
 
-def _page(answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, Any]) -> str:
+def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
     folder = resources.folder("reports")
-    follows = gap_figures.foremost_curves(evidence.get("follows") or [], answers)
-    drawn = gap_figures.figures(answers, {**evidence, "follows": follows})
+    follows = gap_figures.foremost_curves(curves.follows, answers)
+    drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
     scripts = {
         "plotly": get_plotlyjs(),
         "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
@@ -85,7 +87,7 @@ def _page(answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, 
         causes=[_cause(row, answers) for row in answers["causes"].rows],
         foremost=gap_figures.foremost_joint(answers),
         follows=follows,
-        hidden_curves=len(evidence.get("follows") or []) - len(follows),
+        hidden_curves=len(curves.follows) - len(follows),
         effect_names=gap_figures.effect_names(answers),
         experiment=experiment(answers),
         drawn=drawn,
