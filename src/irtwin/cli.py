@@ -211,7 +211,7 @@ def diagnose(
         twin_file=save_twin,
         announce=_say,
     )
-    click.echo(line(found.to_json(), found.against))
+    click.echo(line(found.document, found.against))
 
 
 @cli.command()

@@ -93,7 +93,7 @@ def diagnose(
     `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
     kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
     all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added.
-    Raises InputError on bad input, before anything is written.
+    The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     for file in filter(None, (json_file, report, twin_file)):
@@ -104,14 +104,13 @@ def diagnose(
     for line in data_set.repairs:
         announce(f"  {line}")
     found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
-    document = found.to_json()
     if json_file is not None:
-        write(json_file, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+        write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
         write(twin_file, to_json(found.twin).encode())
     if report is not None:
         announce("Writing the report")
-        render_alone(data_set, document, found.evidence, report)
+        render_alone(data_set, found.document, found.curves, report)
     if workspace is not None:
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
@@ -120,7 +119,7 @@ def diagnose(
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
-                record(apart, robot_id, document, found.evidence, twin)
+                record(apart, robot_id, found.document, found.curves, twin)
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.thresholds import DEFAULT
 
-PLENTY = {"t": 8.0, "gain": 0.5, "closed": 0.9, "share": 1.0, "count": 1}
+PLENTY = {"t": 8.0, "gain": 0.5, "closed": 0.9, "share": 1.0, "count": 1, "weights": DEFAULT.confidence}
 
 
 @given(
@@ -19,7 +20,7 @@ PLENTY = {"t": 8.0, "gain": 0.5, "closed": 0.9, "share": 1.0, "count": 1}
     unexplained=st.booleans(),
 )
 def test_it_is_a_chance(t, gain, closed, share, count, unexplained) -> None:
-    assert 0 <= confidence(t, gain, closed, share, count, unexplained=unexplained) <= 1
+    assert 0 <= confidence(t, gain, closed, share, count, DEFAULT.confidence, unexplained=unexplained) <= 1
 
 
 def test_weaker_evidence_lowers_it() -> None:

@@ -55,7 +55,7 @@ def checked(robot: Robot, made: list[Run], tmp_path: Path) -> str:
     json.dumps([document, found.evidence], allow_nan=False)
     assert found.twin is not None
     from_json(to_json(found.twin), Path("twin.json"))
-    render_alone(data, document, found.evidence, tmp_path / "page.html")
+    render_alone(data, found.document, found.curves, tmp_path / "page.html")
     return found.verdict
 
 
