@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from irtwin.errors import InputError
 from irtwin.robot.description import Link, Robot
 
 
@@ -23,15 +24,30 @@ def flange(robot: Robot) -> str:
     return max(_frames(robot), key=lambda entry: depths[entry[1]])[0].name
 
 
-def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Return the flange's position in the base frame, (N, 3) m, along the joint positions `q`: (N, n) rad."""
+def link_frame(robot: Robot, link: str) -> int:
+    """Return Pinocchio's number of a link's frame. Raises InputError where the robot has no such link."""
+    if link not in (known.name for known in robot.links):
+        raise InputError(f'{robot.name} has no link "{link}" (it has {", ".join(one.name for one in robot.links)})')
+    return int(robot.model.getFrameId(link, pin.FrameType.BODY))
+
+
+def placements(robot: Robot, q: np.ndarray, link: str | None = None) -> np.ndarray:
+    """Return the placements of a link, the flange where None, in the base frame: (N, 4, 4) m, at `q`: (N, n) rad or m.
+
+    Raises InputError where the robot has no such link.
+    """
     model, data = robot.model, robot.model.createData()
-    frame = model.getFrameId(flange(robot), pin.FrameType.BODY)
-    positions = np.empty((len(q), 3))
+    frame = link_frame(robot, link or flange(robot))
+    result = np.empty((len(q), 4, 4))
     for row, sample in enumerate(np.asarray(q, dtype=float)):
         pin.forwardKinematics(model, data, sample)
-        positions[row] = pin.updateFramePlacement(model, data, frame).translation
-    return positions
+        result[row] = pin.updateFramePlacement(model, data, frame).homogeneous
+    return result
+
+
+def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Return the flange's position in the base frame, (N, 3) m, along the joint positions `q`: (N, n) rad."""
+    return placements(robot, q)[:, :3, 3]
 
 
 def _frames(robot: Robot) -> list[tuple[Link, int]]:
