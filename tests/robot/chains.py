@@ -11,11 +11,11 @@ _AXES = st.sampled_from(["0 0 1", "0 0 -1", "1 0 0", "0 1 0", "0 -1 0", "0.6 0 0
 
 
 @st.composite
-def chains(draw: st.DrawFn) -> str:
-    """Draw the URDF text of an open chain of one to seven joints."""
+def chains(draw: st.DrawFn, most: int = 7) -> str:
+    """Draw the URDF text of an open chain of one to `most` joints."""
     parts = ['<robot name="chain"><link name="base"/>']
     parent = "base"
-    for number in range(1, draw(st.integers(1, 7)) + 1):
+    for number in range(1, draw(st.integers(1, most)) + 1):
         kind = draw(st.sampled_from(["revolute", "revolute", "continuous", "prismatic"]))
         xyz, rpy = _three(draw, _LENGTHS), _three(draw, _ANGLES)
         parts.append(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 import pinocchio as pin
@@ -125,7 +125,8 @@ def to_urdf(name: str, table: Table) -> str:
         parent, start = link, np.eye(4)
     SubElement(root, "link", name="flange")
     _joint(root, _free("flange_joint", names), "fixed", parent, "flange", after @ table.tool)
-    return tostring(root, encoding="unicode")
+    indent(root)
+    return tostring(root, encoding="unicode") + "\n"
 
 
 def _free(name: str, taken: Sequence[str]) -> str:
