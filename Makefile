@@ -3,10 +3,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test fuzz lint ontology lock clean
+.PHONY: demo test check fuzz lint ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
+
+# What to run before each commit, in a minute: everything but the tests that are marked slow or system.
+check: $(VENV)/test lint
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not slow and not system"
 
 test: $(VENV)/test lint
 	$(BIN)/python -m pytest -n auto

@@ -100,7 +100,7 @@ def _motion(stack: Stack, run: Run, samples: int) -> Motion:
         dq += size * speed * np.cos(angle)
         ddq -= size * speed**2 * np.sin(angle)
     warm = 25 + 20 * (1 - np.exp(-time / 600))[:, None] * rng.uniform(0.5, 1, n)
-    return Motion(run.name, time, q, dq, ddq, temperature=warm)
+    return Motion(time, q, dq, ddq, run=run.name, temperature=warm)
 
 
 def _log(stack: Stack, run: Run, motion: Motion) -> dict[str, np.ndarray]:

@@ -217,12 +217,13 @@ def _diagnosis(draw: random.Random, robot_id: str, verdict: str, names: list[str
     for rank, joint in enumerate(draw.sample(JOINTS, 3), 1):
         yield "gap_location", at | {
             "rank": rank, "channel": "torque", "joint": joint, "regime": "low_speed", "follows": "speed",
-            "share": 0.6 / rank,
+            "share": 0.6 / rank, "share_lower": 0.3 / rank, "share_upper": 0.8 / rank, "excess": 9.0,
+            "excess_lower": 5.0, "excess_upper": 12.0, "concentration": 2.0, "false_discovery_rate": 0.01,
         }  # fmt: skip
     yield "gap_shrinkage", of | {"closed_fraction": draw.uniform(0.3, 0.97), "lower": 0.2, "upper": 0.99}
     for measure, unit in [("torque_rmse", "N m"), ("power_rmse", "W"), ("energy_error_percent", "%")]:
         yield "gap_change", of | {
-            "measure": measure, "part": "together", "place": 0, "before": 2.0, "after": 0.7, "noise_floor": 0.4,
+            "measure": measure, "part": "together", "place": "all", "before": 2.0, "after": 0.7, "noise_floor": 0.4,
             "lower": 0.6, "upper": 0.8, "unit": unit,
         }  # fmt: skip
     if verdict != "unexplained":
@@ -232,25 +233,30 @@ def _diagnosis(draw: random.Random, robot_id: str, verdict: str, names: list[str
 def _causes(draw: random.Random, robot_id: str, verdict: str, of: dict[str, Any]) -> Iterator[Row]:
     causes = draw.sample(["stribeck_friction", "viscous_friction", "coulomb_friction", "payload"], 2)
     for rank, effect in enumerate(causes, 1):
-        ranked = of | {"rank": rank}
-        scope = "missing" if verdict == "ambiguous" else "changed"
-        yield "gap_cause", ranked | {
-            "robot_id": robot_id, "effect": effect, "scope": scope,
-            "confidence": draw.uniform(0.4, 0.99), "evidence": "{}",
-        }  # fmt: skip
+        confidence = draw.uniform(0.4, 0.99)
         joint = None if effect == "payload" else draw.choice(JOINTS)
+        named = of | {"cause_id": f"{effect}@{joint}" if joint else effect}
+        scope = "missing" if verdict == "ambiguous" else "changed"
+        yield "gap_cause", named | {
+            "robot_id": robot_id, "rank": rank, "effect": effect, "scope": scope, "channel": "torque",
+            "confidence": confidence, "share_of_closed": 0.5, "closed_where_it_acts": 0.8,
+            "gain_on_groups_left_out": 2.0, "t_between_groups": 5.0, "p_adjusted": 0.01,
+        }  # fmt: skip
         if joint:
-            yield "gap_cause_joint", ranked | {"robot_id": robot_id, "joint": joint}
+            yield "gap_cause_joint", named | {"robot_id": robot_id, "joint": joint}
         if verdict == "ambiguous":
-            yield "gap_cause_rival", ranked | {"effect": causes[2 - rank]}
+            yield "gap_cause_rival", named | {"effect": causes[2 - rank]}
         value = draw.uniform(0.05, 3.0)
         name, unit = {"payload": ("m", "kg"), "viscous_friction": ("Fv", "N m s/rad")}.get(effect, ("Fc", "N m"))
-        yield "gap_cause_parameter", ranked | {
+        yield "gap_cause_parameter", named | {
             "robot_id": robot_id, "number": 1, "joint": joint, "name": name, "value": value, "unit": unit,
             "lower": value - 0.5, "upper": value + 0.5,
         }  # fmt: skip
     if verdict == "ambiguous":
-        yield "gap_experiment", of | {"description": '{"purpose": "tell the rivals apart"}'}
+        yield "gap_experiment", of | {"purpose": f"tell {causes[0]} from {causes[1]}", "enough": 5.0}
+        yield "gap_experiment_instruction", of | {"number": 1, "text": "a ladder of 8 constant speeds, each both ways"}
+        for effect in causes:
+            yield "gap_experiment_effect", of | {"effect": effect}
 
 
 def _text(moment: datetime) -> str:

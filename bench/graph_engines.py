@@ -70,9 +70,9 @@ class Irtwin(Engine):
         self.graph.change(_quads(removed), _quads(added))
 
     def close(self, file: Path) -> set[str]:
-        from irtwin.knowledge.owl_rl.closure import closure
+        from irtwin.knowledge.owl_rl.closure import Closure
 
-        return {str(triple) for triple in closure(quad.triple for quad in _quads(file.read_bytes()))}
+        return {str(triple) for triple in Closure(quad.triple for quad in _quads(file.read_bytes())).worth_keeping()}
 
 
 class IrtwinInMemory(Irtwin):

@@ -6,6 +6,9 @@ import copy
 import math
 from typing import Any
 
+from irtwin.gap.document.curves import Curves
+from irtwin.gap.document.document import Document
+
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
 RUNS = ["reference_1", "reference_2", "work_1", "work_2", "work_3", "work_4"]
 REGIMES = ["standstill", "low_speed", "steady_speed", "accelerating", "braking", "reversal", "loaded"]
@@ -17,21 +20,30 @@ _UNTESTABLE = [
 ]
 
 
+def document(verdict: str) -> Document:
+    """A diagnosis as its document."""
+    return Document.from_json(diagnosis(verdict))
+
+
 def diagnosis(verdict: str) -> dict[str, Any]:
-    """A diagnosis as the contract's schema wants it, to be changed at will."""
-    return copy.deepcopy(
-        {"verdict": verdict, "robot": "KR6", "gap": _gap(verdict), "shrink": {}} | _NOTHING | _CASES[verdict]
-    )
+    """The JSON of a diagnosis, to be changed at will."""
+    return copy.deepcopy({"verdict": verdict, "robot": "KR6", "gap": _gap(verdict)} | _NOTHING | _CASES[verdict])
+
+
+def curves(verdict: str) -> Curves:
+    """What a page draws of it."""
+    return Curves.from_json(evidence(verdict))
 
 
 def evidence(verdict: str) -> dict[str, Any]:
-    """The arrays behind it."""
+    """The JSON of what a page draws, to be changed at will."""
     if verdict == "no_gap":
-        return {"heat_map": _heat_map(0.0), "follows": [], "runs": []}
+        return {"heat_map": _heat_map(0.0), "follows": [], "runs": [], "experiment": None}
     x = [0.02 * step - 1.0 for step in range(101)]
     fitted = [1.8 * math.copysign(1, value or 1) * math.exp(-abs(value) / 0.1) for value in x]
     residual = [value + 0.1 * math.sin(9 * place) for place, value in enumerate(fitted)]
     curve = {
+        "channel": "torque",
         "effect": None if verdict == "unexplained" else "stribeck_friction",
         "joint": "joint_a3",
         "variable": "speed",
@@ -49,8 +61,8 @@ def evidence(verdict: str) -> dict[str, Any]:
     ]
     found = {"heat_map": _heat_map(3.0), "follows": [curve], "runs": judged}
     time = [0.5 * step for step in range(100)]
-    move = {"time": time, "joints": ["joint_a3"], "q": [[math.sin(value) for value in time]]}
-    return found | ({"experiment": move} if verdict == "ambiguous" else {})
+    move = {"time": time, "joints": ["joint_a3"], "units": ["rad"], "q": [[math.sin(value) for value in time]]}
+    return found | {"experiment": move if verdict == "ambiguous" else None}
 
 
 def _gap(verdict: str) -> dict[str, Any]:
@@ -77,22 +89,56 @@ def _heat_map(size: float) -> dict[str, Any]:
     return {"joints": JOINTS, "regimes": REGIMES, "excess": excess}
 
 
-def _cause(effect: str, confidence: float, rivals: list[str], scope: str = "changed") -> dict[str, Any]:
+def _cause(effect: str, confidence: float, share: float, rivals: list[str], scope: str = "changed") -> dict[str, Any]:
     return {
+        "id": f"{effect}@joint_a3",
         "effect": effect,
         "joints": ["joint_a3"],
         "scope": scope,
         "confidence": confidence,
         "parameters": [
             {"name": "Fs", "joint": "joint_a3", "value": 1.82, "unit": "Nm", "interval95": [1.6, 2.04]},
-            {"name": "d", "value": 1.0, "unit": "1", "interval95": None},
+            {"name": "d", "joint": None, "value": 1.0, "unit": "1", "interval95": None},
         ],
         "indistinguishable_from": rivals,
-        "evidence": {"p_value": 0.002, "visibility": 0.61, "gain_on_held_out_runs": 0.83},
+        "evidence": {
+            "channel": "torque",
+            "share_of_what_is_closed": share,
+            "closed_where_it_acts": 0.91,
+            "gain_on_groups_left_out": 0.83,
+            "t_between_groups": 6.4,
+            "p_adjusted_for_the_catalogue": 0.002,
+            "gain_of_rivals": {"backlash": 0.12, "payload": -0.34},
+            "correlation_with_rivals": {"backlash": 0.57, "payload": 0.0},
+            "power_says": "mechanical",
+            "gain_in_power_if_mechanical": 0.21,
+            "t_in_power_between_groups": 3.9,
+        },
     }
 
 
-def _shrink(closed: float | None, after: float, scope: str = "changed") -> dict[str, Any]:
+def _closeable(*given: float | None) -> dict[str, Any]:
+    shares = dict(zip(("closed", "closeable", "by_regression", "nameless"), given, strict=True))
+    of_joints = {f"{name}_by_equation": [share] for name, share in shares.items()}
+    return shares | of_joints | {"of": "the gap above the floor"}
+
+
+def _by_cause(effect: str, scope: str, share: float, alone: list[float], without: list[float]) -> dict[str, Any]:
+    return {
+        "cause": f"{effect}@joint_a3",
+        "effect": effect,
+        "joints": ["joint_a3"],
+        "scope": scope,
+        "channel": "torque",
+        "share": share,
+        "rmse_before": [1.4, 1.5],
+        "rmse_alone": alone,
+        "rmse_when_left_out": without,
+        "rmse_with_all": [0.5, 0.5],
+    }
+
+
+def _shrink(closed: float | None, after: float, by_cause: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "held_out_runs": RUNS[2:],
         "noise_floor_from": "repeats",
@@ -103,68 +149,63 @@ def _shrink(closed: float | None, after: float, scope: str = "changed") -> dict[
             "interval95_after": [after - 0.05, after + 0.05],
         },
         "power_rmse": {"before": 21.0, "after": 17.0, "noise_floor": None, "interval95_after": None},
-        "energy_error_percent": {"before": 8.4, "after": 2.1, "interval95_after": [1.0, 3.3]},
+        "energy_error_percent": {"before": 8.4, "after": 2.1, "noise_floor": None, "interval95_after": [1.0, 3.3]},
         "closed_fraction": None if closed is None else {"value": closed, "interval95": [closed - 0.05, closed + 0.04]},
-        "yardstick": {
-            "torque": {
-                "closed": 0.9,
-                "closeable": 0.95,
-                "by_regression": 0.7,
-                "nameless": 0.04,
-                "of": "the gap above the floor",
-            },
-            "power": {"closed": None, "closeable": None, "by_regression": None, "nameless": None},
-        },
-        "by_cause": [
-            {
-                "effect": "viscous_friction",
-                "scope": scope,
-                "channel": "torque",
-                "share": 0.7,
-                "rmse_before": [1.4, 1.5],
-                "rmse_alone": [0.8, 0.72],
-                "rmse_when_left_out": [1.2, 1.25],
-            },
-            {
-                "effect": "stribeck_friction",
-                "scope": scope,
-                "channel": "torque",
-                "share": 0.3,
-                "rmse_before": [1.4, 1.5],
-                "rmse_alone": [0.6, 0.62],
-                "rmse_when_left_out": [1.3, 1.45],
-            },
-        ],
+        "by_cause": by_cause,
+        "yardstick": {"torque": _closeable(0.9, 0.95, 0.7, 0.04), "power": _closeable(None, None, None, None)},
     }
 
 
+_SURE = {"share_interval95": [0.1, 0.9], "excess_interval95": [8.0, 15.0], "false_discovery_rate": 0.001}
 _LOCATED = [
-    {"channel": "torque", "joint": "joint_a3", "regime": "low_speed", "follows": "speed", "runs": None, "share": 0.81},
-    {"channel": "power", "joint": None, "regime": None, "follows": None, "runs": ["work_1", "work_2"], "share": 0.12},
+    {"channel": "torque", "joint": "joint_a3", "regime": "low_speed", "follows": "speed", "runs": None, "share": 0.81}
+    | {"excess": 12.0, "concentration": 2.5}
+    | _SURE,
+    {"channel": "power", "joint": None, "regime": None, "follows": None, "runs": ["work_1", "work_2"], "share": 0.12}
+    | {"excess": 11.0, "concentration": 1.5}
+    | _SURE,
 ]
 _CASES: dict[str, dict[str, Any]] = {
     "no_gap": {
         "shrink": {
             "held_out_runs": RUNS[2:],
             "noise_floor_from": "out_of_band",
+            "torque_rmse": None,
+            "power_rmse": None,
+            "energy_error_percent": None,
             "closed_fraction": None,
             "by_cause": [],
+            "yardstick": {},
         },
         "not_testable": _UNTESTABLE,
     },
     "attributed": {
         "locations": _LOCATED,
-        "causes": [_cause("stribeck_friction", 0.96, []), _cause("viscous_friction", 0.7, [])],
+        "causes": [_cause("stribeck_friction", 0.96, 0.3, []), _cause("viscous_friction", 0.7, 0.7, [])],
         "not_testable": _UNTESTABLE,
-        "shrink": _shrink(0.93, 0.5),
+        "shrink": _shrink(
+            0.93,
+            0.5,
+            [
+                _by_cause("viscous_friction", "changed", 0.7, [0.8, 0.72], [1.2, 1.25]),
+                _by_cause("stribeck_friction", "changed", 0.3, [0.6, 0.62], [1.3, 1.45]),
+            ],
+        ),
     },
     "ambiguous": {
         "locations": _LOCATED,
         "causes": [
-            _cause("stribeck_friction", 0.52, ["nonlinear_viscous_friction"], "missing"),
-            _cause("nonlinear_viscous_friction", 0.44, ["stribeck_friction"], "missing"),
+            _cause("stribeck_friction", 0.52, 0.6, ["nonlinear_viscous_friction"], "missing"),
+            _cause("nonlinear_viscous_friction", 0.44, 0.4, ["stribeck_friction"], "missing"),
         ],
-        "shrink": _shrink(0.9, 0.5, "missing"),
+        "shrink": _shrink(
+            0.9,
+            0.5,
+            [
+                _by_cause("stribeck_friction", "missing", 0.6, [0.6, 0.62], [1.3, 1.45]),
+                _by_cause("nonlinear_viscous_friction", "missing", 0.4, [0.8, 0.72], [1.2, 1.25]),
+            ],
+        ),
         "next_experiment": {
             "purpose": "tell stribeck_friction from nonlinear_viscous_friction",
             "effects": ["stribeck_friction", "nonlinear_viscous_friction"],
@@ -200,5 +241,5 @@ _CASES: dict[str, dict[str, Any]] = {
             "note": None,
         },
     },
-    "unexplained": {"locations": _LOCATED, "not_testable": _UNTESTABLE, "shrink": _shrink(None, 1.4)},
+    "unexplained": {"locations": _LOCATED, "not_testable": _UNTESTABLE, "shrink": _shrink(None, 1.4, [])},
 }

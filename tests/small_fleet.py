@@ -13,6 +13,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from irtwin.knowledge.vocabulary import ID
+from irtwin.storage import experiment_schema as experiment
 from irtwin.storage import gap_schema as gap
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
@@ -174,29 +175,52 @@ def _energies() -> Iterator[Base]:
             yield schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot, energy_j=taken, activity_id=made)
 
 
+_SURE = {  # of a location
+    "share_lower": 0.1, "share_upper": 0.8, "excess": 9.0, "excess_lower": 5.0, "excess_upper": 12.0,
+    "concentration": 2.0, "false_discovery_rate": 0.01,
+}  # fmt: skip
+
+
 def _diagnoses() -> Iterator[Base]:
     yield from _diagnosis("Arm_A", "attributed", 12.0)
     yield from _cause("Arm_A", 1, "coulomb_friction", "j2", "changed", 0.9, ("Fc", 0.8, "N m", 0.4, 1.2))
     yield from _cause("Arm_A", 2, "viscous_friction", "j1", "changed", 0.6, ("Fv", 0.1, "N m s/rad", -0.1, 0.3))
     of = {"diagnosis_id": "Arm_A.d1", "activity_id": "diagnosis.Arm_A"}
     yield gap.GapLocation(
-        **of, robot_id="Arm_A", rank=1, channel="torque", joint="j2", regime="low_speed", follows="speed", share=0.7
+        **of,
+        robot_id="Arm_A",
+        rank=1,
+        channel="torque",
+        joint="j2",
+        regime="low_speed",
+        follows="speed",
+        share=0.7,
+        **_SURE,
     )
-    yield gap.GapLocation(**of, robot_id="Arm_A", rank=2, channel="power", share=0.2)
+    yield gap.GapLocation(**of, **_SURE, robot_id="Arm_A", rank=2, channel="power", share=0.2)
     yield gap.GapShrinkage(**of, closed_fraction=0.8, lower=0.7, upper=0.9)
     yield gap.GapChange(
-        **of, measure="torque_rmse", part="together", place=0, before=1.0, after=0.4, noise_floor=0.3, lower=0.35,
+        **of, measure="torque_rmse", part="together", place="all", before=1.0, after=0.4, noise_floor=0.3, lower=0.35,
         upper=0.45, unit="N m",
     )  # fmt: skip
-    yield gap.GapChange(**of, measure="torque_rmse", part="alone", place=1, rank=1, before=1.0, after=0.6, unit="N m")
+    yield gap.GapChange(
+        **of, measure="torque_rmse", part="alone", place="coulomb_friction@j2", cause_id="coulomb_friction@j2",
+        before=1.0, after=0.6, unit="N m",
+    )  # fmt: skip
     yield gap.GapNotTestable(**of, number=1, effect="payload", why="no run carries a load")
     yield from _diagnosis("Arm_B", "ambiguous", 5.0)
     of = {"diagnosis_id": "Arm_B.d1", "activity_id": "diagnosis.Arm_B"}
     yield from _cause("Arm_B", 1, "payload", None, "missing", 0.5, ("m", 1.5, "kg", 1.3, 1.7))
     yield from _cause("Arm_B", 2, "torque_constant_error", "j2", "missing", 0.4, ("g", 0.1, "1", 0.05, 0.15))
-    yield gap.GapCauseRival(**of, rank=1, effect="torque_constant_error")
-    yield gap.GapCauseRival(**of, rank=2, effect="payload")
-    yield gap.GapExperiment(**of, description='{"motions": ["lift a known mass"]}')
+    yield gap.GapCauseRival(**of, cause_id="payload", effect="torque_constant_error")
+    yield gap.GapCauseRival(**of, cause_id="torque_constant_error@j2", effect="payload")
+    yield experiment.GapExperiment(
+        **of, purpose="tell payload from torque_constant_error", separation_now=1.5, expected_separation=8.0, enough=5.0
+    )
+    yield experiment.GapExperimentEffect(**of, effect="payload")
+    yield experiment.GapExperimentEffect(**of, effect="torque_constant_error")
+    yield experiment.GapExperimentInstruction(**of, number=1, text="lift a known mass")
+    yield experiment.GapExperimentInstruction(**of, number=2, text="hang another on joint 2")
     yield from _diagnosis("Arm_C", "unexplained", None)
 
 
@@ -213,8 +237,12 @@ def _diagnosis(robot: str, verdict: str, error: float | None) -> Iterator[Base]:
 def _cause(
     robot: str, rank: int, effect: str, joint: str | None, scope: str, confidence: float, parameter: tuple[Any, ...]
 ) -> Iterator[Base]:
-    of: dict[str, Any] = {"diagnosis_id": f"{robot}.d1", "rank": rank, "activity_id": f"diagnosis.{robot}"}
-    yield gap.GapCause(**of, robot_id=robot, effect=effect, scope=scope, confidence=confidence, evidence="{}")
+    cause_id = f"{effect}@{joint}" if joint else effect
+    of: dict[str, Any] = {"diagnosis_id": f"{robot}.d1", "cause_id": cause_id, "activity_id": f"diagnosis.{robot}"}
+    yield gap.GapCause(
+        **of, robot_id=robot, rank=rank, effect=effect, scope=scope, confidence=confidence, channel="torque",
+        closed_where_it_acts=0.8, gain_on_groups_left_out=2.0, t_between_groups=5.0, p_adjusted=0.01,
+    )  # fmt: skip
     if joint is not None:
         yield gap.GapCauseJoint(**of, robot_id=robot, joint=joint)
     name, value, unit, lower, upper = parameter

@@ -10,9 +10,9 @@ import pinocchio as pin
 
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.channels import Signals
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
-from irtwin.signals.samples import Signals
 
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0", "0 1 0")
 
@@ -45,11 +45,11 @@ def swing(robot: Robot, seed: int, seconds: float = 20.0, rate: float = 100.0) -
     sizes, phases = rng.uniform(0.1, 0.35, (4, n)), rng.uniform(0, 2 * np.pi, (4, n))
     angle = time[:, None, None] * speeds + phases
     return Motion(
-        f"swing_{seed}",
         time,
         (sizes * np.sin(angle)).sum(axis=1),
         (sizes * speeds * np.cos(angle)).sum(axis=1),
         -(sizes * speeds**2 * np.sin(angle)).sum(axis=1),
+        run=f"swing_{seed}",
     )
 
 

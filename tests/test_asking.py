@@ -17,6 +17,8 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 from tests.endpoint import make_graph
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = "SELECT ?robot { ?robot a irt:Industrial_Robot }"
 
 

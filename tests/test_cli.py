@@ -1,6 +1,8 @@
 """The command line as a newcomer meets it: help, answers, and what bad input gets."""
 
 import json
+import re
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -10,7 +12,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from irtwin.knowledge.vocabulary import GRAPH_OWL_RL
 from irtwin.workflow import unpack_demo
+from tests.data_sets import few_runs_of_the_demo
+
+pytestmark = pytest.mark.slow
 
 HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "plotly", "owlready2", "pyarrow")
 
@@ -22,14 +28,7 @@ def irtwin(*arguments: object, folder: Path | None = None) -> subprocess.Complet
 
 @pytest.fixture(scope="session")
 def small_data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shipped data set with four of its runs."""
-    folder = unpack_demo(tmp_path_factory.mktemp("demo"))
-    head, *runs = (folder / "dataset.toml").read_text().split("[[run]]")
-    kept = [
-        run for run in runs if any(f"runs/{name}.parquet" in run for name in ("exciting_2", "exciting_3", "waiting"))
-    ]
-    (folder / "dataset.toml").write_text("[[run]]".join([head, *kept]))
-    return folder
+    return few_runs_of_the_demo(tmp_path_factory.mktemp("demo"))
 
 
 @pytest.fixture(scope="session")
@@ -207,7 +206,7 @@ def test_any_database_serves(small_data_set, tmp_path, new_postgresql_database):
     done = irtwin("run", small_data_set, "--workspace", tmp_path, "--database", url)
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "irtwin.db").exists()
-    asked = irtwin("query", "worst_run", "--workspace", tmp_path, "--database", url, "--format", "json")
+    asked = irtwin("query", "worst_run", "--workspace", tmp_path, "--format", "json")
     assert json.loads(asked.stdout)[0]["robot"] == "KUKA_KR6_R700"
 
 
@@ -226,3 +225,34 @@ def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
     individuals, inconsistent = map(int, done.stdout.split())
     assert individuals > 100
     assert inconsistent == 0
+
+
+@pytest.mark.slow
+def test_owlrl_concludes_what_the_native_engine_does(workspace, tmp_path):
+    copy = shutil.copytree(workspace, tmp_path / "copy")
+
+    def conclusions() -> set[str]:
+        question = f"SELECT ?s ?p ?o {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }}"
+        asked = irtwin("query", question, "--workspace", copy, "--format", "csv")
+        assert asked.returncode == 0, asked.stderr
+        return set(asked.stdout.splitlines())
+
+    native = conclusions()
+    done = irtwin("reason", "--engine", "owlrl", "--workspace", copy)
+    assert done.returncode == 0, done.stderr
+    assert f"{len(native) - 1} triples from OWL by owlrl" in done.stderr
+    assert conclusions() == native
+
+
+def test_reason_says_what_goes_together(tmp_path):
+    done = irtwin("reason", tmp_path / "in.ttl")
+    assert (done.returncode, "Missing option '--out'" in done.stderr) == (2, True), done.stderr
+    done = irtwin("reason", "--out", tmp_path / "out.ttl")
+    assert (done.returncode, "SOURCE and --out go together" in done.stderr) == (2, True), done.stderr
+
+
+@pytest.mark.parametrize("command", ["query", "explain", "export"])
+def test_commands_that_only_read_the_graph_take_no_database(command):
+    done = irtwin(command, "--database", "sqlite:///x.db")
+    assert done.returncode == 2
+    assert re.search("No such option.*--database", done.stderr), done.stderr

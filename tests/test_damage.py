@@ -23,6 +23,8 @@ from irtwin.storage.schema import Base
 from tests.data_sets import irtwin
 from tests.small_robots import data_set
 
+pytestmark = pytest.mark.slow
+
 COUNT = "SELECT (COUNT(*) AS ?count) { ?s ?p ?o }"
 NAMES = "SELECT ?name { ?robot irt:IR_Name ?name } ORDER BY ?name"
 Damage = Callable[[Path], object]

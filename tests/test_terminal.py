@@ -11,6 +11,8 @@ import pytest
 
 from tests.data_sets import irtwin
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "irtwin"]
 
 

@@ -15,6 +15,8 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 from tests import rows
 
+pytestmark = pytest.mark.slow
+
 
 def irtwin(*arguments: object, **options: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "irtwin", *map(str, arguments)]

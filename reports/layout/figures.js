@@ -87,13 +87,11 @@
     document.getElementById("run-part").textContent = PARTS[run.part] || "";
     const torque = document.getElementById("figure-torque"), power = document.getElementById("figure-power");
     if (torque) {
-      const charts = run.torque.map((chart) => Object.assign({ unit: "N m" }, chart));
-      const figure = panels(charts, run.held_out, torque.clientWidth < 620 ? 1 : 2, 150);
+      const figure = panels(run.torque, run.held_out, torque.clientWidth < 620 ? 1 : 2, 150);
       Plotly.react(torque, figure.data, figure.layout, CONFIG);
     }
     if (power) {
-      const charts = [[run.power, "W"], [run.energy, "J"]].filter((pair) => pair[0]);
-      const figure = panels(charts.map((pair) => Object.assign({ unit: pair[1] }, pair[0])), run.held_out, 1, 190);
+      const figure = panels([run.power, run.energy].filter((chart) => chart), run.held_out, 1, 190);
       Plotly.react(power, figure.data, figure.layout, CONFIG);
     }
   }

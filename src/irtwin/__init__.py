@@ -1,7 +1,8 @@
 """A digital twin of an industrial robot's energy, held in a knowledge graph.
 
 As a library: `read_data_set` reads a data set, `identify` fits a `Twin` to it, `predict` says what the twin expects of
-a run, `diagnose` says where twin and robot differ and why; `read_urdf` gives a `Robot`, `catalogue` the effects.
+a run, `diagnose` says where twin and robot differ and why, a `Diagnosis` whose `document` is what JSON, graph and page
+say; `read_urdf` gives a `Robot`, `catalogue` the effects.
 With a workspace: `run`, `adopt`, `ask`, `export`.
 """
 
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 __all__ = [
     "DataSet",
+    "Diagnosis",
     "Robot",
     "Twin",
     "adopt",
@@ -30,6 +32,7 @@ __all__ = [
 if TYPE_CHECKING:
     from irtwin.asking import ask, export
     from irtwin.effects.catalogue import catalogue
+    from irtwin.gap.diagnosis import Diagnosis
     from irtwin.modelling import identify, predict
     from irtwin.robot.description import Robot
     from irtwin.robot.urdf import read_urdf
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "DataSet": "signals.log",
+    "Diagnosis": "gap.diagnosis",
     "Robot": "robot.description",
     "Twin": "twin.twin",
     "adopt": "workflow",

@@ -83,7 +83,6 @@ _database = click.option(
     envvar="IRTWIN_DATABASE",
     help="SQLAlchemy URL of the database. Default: SQLite in the workspace.",
 )
-_no_database = click.option("--database", hidden=True, expose_value=False)  # as other commands have; not needed to read
 _graph = click.option(
     "--graph",
     "graph_url",
@@ -128,7 +127,6 @@ def demo(workspace: Path) -> None:
 @click.argument("question", required=False)
 @click.option("--robot", metavar="NAME", help="Ask about this robot only.")
 @_workspace
-@_no_database
 @_graph
 @click.option(
     "--format",
@@ -216,7 +214,7 @@ def diagnose(
         twin_file=save_twin,
         announce=_say,
     )
-    click.echo(line(found.to_json(), found.against))
+    click.echo(line(found.document, found.against))
 
 
 @cli.command()
@@ -261,7 +259,6 @@ def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | No
 
 @cli.command()
 @_workspace
-@_no_database
 @_graph
 @click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
 def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
@@ -376,29 +373,58 @@ def _announce(address: str) -> None:
 
 
 @cli.command()
-@click.argument("source", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF file to write.")
-@click.option("--dl", is_flag=True, help="Check consistency and classify with HermiT (OWL 2 DL) instead.")
-def reason(source: Path, out: Path, dl: bool) -> None:
-    """Write an RDF file together with everything that OWL 2 RL infers.
+@click.argument("source", type=click.Path(path_type=Path), required=False)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="RDF file to write, with SOURCE.")
+@click.option(
+    "--engine",
+    type=click.Choice(["native", "owlrl", "hermit"]),
+    default="native",
+    show_default=True,
+    help="Who draws the conclusions, see above.",
+)
+@_workspace
+@_database
+@_graph
+def reason(
+    source: Path | None, out: Path | None, engine: str, workspace: Path, database: str | None, graph_url: str | None
+) -> None:
+    """Draw all conclusions from the graph, or from an RDF file.
 
-    The file suffixes decide the formats. If SOURCE contradicts itself, nothing is written and the exit status is 3.
+    Without SOURCE, the conclusions in the workspace's graph are drawn again. With SOURCE, OUT gets what SOURCE says
+    and all that follows; the file suffixes decide the formats. If it contradicts itself, nothing is written and the
+    exit status is 3.
+
+    \b
+    native  OWL 2 RL by the rules that ship. Takes under 1 s for 10,000 triples.
+            Finds nothing that needs unnamed individuals or a choice of cases.
+    owlrl   The same rules by the Python package owlrl, to check the native engine.
+            Takes 10 s for 10,000 triples, twice for a workspace; 300,000 at most.
+            Compares no literals.
+    hermit  OWL 2 DL by HermiT, and what OWL 2 RL concludes from its results.
+            Also finds what native cannot. Takes 5 s for 10,000 triples. Needs Java
+            and an ontology that is OWL 2 DL.
     """
     from irtwin.knowledge.owl_rl.closure import Contradiction
-    from irtwin.knowledge.owl_rl.file import close_file
 
+    if (source is None) != (out is None):
+        raise click.UsageError("SOURCE and --out go together." if source is None else "Missing option '--out'.")
     try:
-        inferred = close_file(source, out, dl=dl)
+        if source is not None and out is not None:
+            from irtwin.knowledge.owl_rl.file import close_file
+
+            click.echo(f"{out}: {close_file(source, out, engine)} triples inferred by {engine}")
+        else:
+            from irtwin.workflow import reason_again
+
+            reason_again(workspace, engine=engine, database=database, graph_url=graph_url, announce=_say)
     except Contradiction as clash:
-        click.echo(f"irtwin: {source}: {clash}", err=True)
+        _say(f"irtwin: {source or workspace}: {clash}")
         sys.exit(3)
-    click.echo(f"{out}: {inferred} triples inferred")
 
 
 @cli.command()
 @click.argument("triple", nargs=-1, required=True)
 @_workspace
-@_no_database
 @_graph
 @click.option("--json", "as_json", is_flag=True, help="Write nested JSON objects instead of an outline.")
 def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool) -> None:

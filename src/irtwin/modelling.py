@@ -13,7 +13,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
 from irtwin.gap import predict as predicted
 from irtwin.signals.conditioning import choose_cutoff, condition
-from irtwin.signals.log import DataSet, read_data_set
+from irtwin.signals.log import DataSet, own_runs, read_data_set
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit
@@ -37,7 +37,7 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     ('joint_a1', 'N m', True)
     """
     given = data_set if isinstance(data_set, DataSet) else read_data_set(Path(data_set))
-    own = [run for run in given.runs if run.role != "simulated"] or list(given.runs)
+    own = own_runs(given.runs)
     cutoff = choose_cutoff(own)
     motions = [condition(run, given.robot, cutoff) for run in own]
     return fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)

@@ -180,13 +180,14 @@ def _read_positions(file: Path, described: Robot) -> np.ndarray:
     import numpy as np
 
     from irtwin.input_file import read_input
+    from irtwin.signals.channels import CHANNELS
 
     try:
         lines = csv.reader(read_input(file, _LARGEST).decode("utf-8-sig").splitlines())
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from error
     head = [name.strip() for name in next(lines, [])]
-    wanted = [f"q_{name}" for name in described.joint_names]
+    wanted = list(CHANNELS["q"].columns(described.joint_names))
     missing = [name for name in wanted if name not in head]
     if missing:
         raise InputError(f"{file}, line 1: there is no column {missing[0]}; give one for each joint of the robot")

@@ -16,7 +16,9 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
+from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import explain_one
+from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
@@ -91,7 +93,7 @@ def diagnose(
     `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
     kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
     all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added.
-    Raises InputError on bad input, before anything is written.
+    The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     for file in filter(None, (json_file, report, twin_file)):
@@ -102,14 +104,13 @@ def diagnose(
     for line in data_set.repairs:
         announce(f"  {line}")
     found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
-    document = found.to_json()
     if json_file is not None:
-        write(json_file, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+        write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
         write(twin_file, to_json(found.twin).encode())
     if report is not None:
         announce("Writing the report")
-        render_alone(data_set, document, found.evidence, report)
+        render_alone(data_set, found.document, found.curves, report)
     if workspace is not None:
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
@@ -118,7 +119,7 @@ def diagnose(
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
-                record(apart, robot_id, document, found.evidence, twin)
+                record(apart, robot_id, found.document, found.curves, twin)
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)
@@ -138,6 +139,23 @@ def adopt(
         map_rows(place, graph)
         reason(graph)
         return _report(place, graph, robot_id)
+
+
+def reason_again(
+    workspace: Path | str = WORKSPACE,
+    *,
+    engine: str = NATIVE,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> None:
+    """Draw the conclusions in a workspace's graph by an engine, in place of those that are there.
+
+    They stay until the graph changes, or the native engine is asked again. Raises InputError where the engine cannot
+    run, Contradiction where the graph contradicts itself.
+    """
+    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        conclude(graph, _clocked(announce), engine)
 
 
 def backup(
@@ -219,11 +237,15 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
     return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
 
 
-def conclude(graph: KnowledgeGraph, announce: Announce) -> None:
+def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) -> None:
     """Reason over the graph and check its constraints; say what was found."""
     announce("Reasoning")
-    inferred = reason(graph)
-    announce(f"  {inferred.owl_rl} triples from OWL 2 RL, {inferred.swrl} from SWRL, {inferred.shacl} from SHACL rules")
+    inferred = reason(graph, engine)
+    by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
+    announce(f"  {inferred.owl_rl} triples from {by}, {inferred.swrl} from SWRL, {inferred.shacl} from SHACL rules")
+    if inferred.not_run:
+        announce(f"  without Java, these SWRL rules did not run: {', '.join(inferred.not_run)}")
+        announce(f"  to get them: {HOW_TO_GET}, and run the data set again")
     if inferred.joined_by:
         announce(
             f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"

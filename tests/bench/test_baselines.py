@@ -15,6 +15,8 @@ from irtwin.gap.data.case import case_of
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 NAMES = ("bic_greedy", "f_test", "e_sindy")
 STICKS = ("stribeck_friction", "joint_2")

@@ -14,7 +14,7 @@ SOURCE = Path(irtwin.__file__).parent
 # words that happen to be an effect's id as well
 OTHER_MEANINGS = {
     "gap/experiment/programmes.py": {"payload"},  # a kind of programme
-    "report/gap/document.py": {"payload"},
+    "report/gap/experiment.py": {"payload"},
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows
     "gap/localisation/locations.py": {"mechanical_power"},
     "live/joint_stream.py": {"payload"},  # a field of a message

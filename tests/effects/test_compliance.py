@@ -68,7 +68,7 @@ def test_what_the_rotor_has_of_the_inertia_does_not_pass_the_gap():
 
 def test_by_way_all_of_the_load_is_lost_until_the_motor_has_crossed_the_gap():
     time = np.arange(0, 1, 1 / 1000)[:, None]
-    motion = Motion("slow", time[:, 0], 0.1 * time, np.full_like(time, 0.1), np.zeros_like(time))
+    motion = Motion(time[:, 0], 0.1 * time, np.full_like(time, 0.1), np.zeros_like(time), run="slow")
     load = 4 * (time - 0.3)
     (lost,) = Backlash(b=0.02, by_way=True).samples(arm(1), motion, Predicted(load, load=load))
     free, bound = (time > 0.302) & (time < 0.498), (time < 0.298) | (time > 0.502)  # 0.02 rad at 0.1 rad/s

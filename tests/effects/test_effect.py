@@ -108,6 +108,7 @@ def test_torque_is_that_of_inverse_dynamics(robot):
     np.testing.assert_allclose(stack.torque_columns(motion) @ nominal, rigid_torque(robot, motion), atol=1e-10)
 
 
+@pytest.mark.slow
 def test_torque_is_that_of_mujoco():
     mujoco = pytest.importorskip("mujoco")
     robot = arm(6)

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
+from tests.flange import flange_position
 from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects import compliance, drive, friction, load, sensing, supply, transmission
@@ -18,8 +19,10 @@ from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.robot.urdf import parse_urdf
 from irtwin.twin.files import load as load_twin
-from irtwin.twin.files import save
+from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
+
+pytestmark = pytest.mark.slow
 
 TRUE = truth(arm(3))
 ROBOT = with_constants(arm(3))
@@ -138,8 +141,6 @@ def ball(state):
 
 def push(state, force=(30.0, -20.0, 40.0)):
     """A force at the flange from second 4 to 9, through the slope of the flange's place."""
-    from irtwin.robot.kinematics import flange_position
-
     q, step = state.motion.q, 1e-6
     slopes = [
         (flange_position(ROBOT, q + step * e) - flange_position(ROBOT, q - step * e)) / (2 * step) for e in np.eye(3)
@@ -346,7 +347,7 @@ def test_truth_is_found_predicted_booked_and_saved(case, tmp_path):
     which = int(case.effect.signal == "power")
     assert errors(twin)[which] < (0.6 * errors(without)[which] if case.visible else 1.2 * case.noise)
     assert sum(entry.energy for entry in twin.ledger(again)) == pytest.approx(twin.energy(again), rel=1e-9)
-    save(twin, tmp_path / "twin.json")
+    (tmp_path / "twin.json").write_text(to_json(twin))
     loaded = load_twin(tmp_path / "twin.json")
     assert loaded.effects == twin.effects and loaded.quantities == twin.quantities
     np.testing.assert_array_equal(loaded.torque(again), twin.torque(again))

@@ -8,6 +8,8 @@ import pytest
 from tests.fuzz.case import read_case
 from tests.fuzz.commands import try_case
 
+pytestmark = pytest.mark.slow
+
 KEPT = sorted((Path(__file__).parent / "kept").glob("*.json"))
 
 

@@ -20,6 +20,8 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import Run
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 SIX = arm(6)
 HEAVY = parse_urdf(re.sub(r'mass value="(.*?)"', lambda found: f'mass value="{6 * float(found[1])}"', SIX.urdf))
@@ -124,7 +126,7 @@ def test_a_reference_run_with_other_joints_is_refused(tmp_path):
     pq.write_table(renamed.rename_columns([n.replace("joint_3", "elbow") for n in renamed.column_names]), file)
     said = irtwin("diagnose", data, "--json", tmp_path / "out.json")
     assert said.status == 2
-    assert 'reference_0.parquet: column q_elbow: the URDF has no moving joint "elbow"' in said.err
+    assert 'reference_0.parquet: column q_elbow: the robot has no moving joint "elbow"' in said.err
 
 
 def test_bad_samples_are_named_and_repaired(tmp_path):

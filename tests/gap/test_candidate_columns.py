@@ -30,6 +30,7 @@ def effects(signal):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", effects("torque"), ids=lambda effect: f"{effect.id}{list(effect.shape.values())}")
 def test_parts_join_to_the_whole_where_the_effect_acts(effect, monkeypatch):
     monkeypatch.setattr(
@@ -61,6 +62,7 @@ def test_parts_of_power_join_to_the_whole():
     assert place == joined.shape[1] == len(columns)
 
 
+@pytest.mark.slow
 def test_one_run_is_held_at_a_time():
     asked = []
 

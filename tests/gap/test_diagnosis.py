@@ -14,7 +14,10 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.document.document import Document, schema
 from irtwin.signals.log import DataSet
+
+pytestmark = pytest.mark.slow
 
 ROBOT = arm(3)
 
@@ -53,9 +56,11 @@ def on_joint(joint, function):
 
 def valid(diagnosis):
     document = diagnosis.to_json()
-    schema = json.loads((resources.files("irtwin.gap") / "diagnosis.schema.json").read_text())
+    contract = json.loads((resources.files("irtwin.gap") / "diagnosis.schema.json").read_text())
     jsonschema = pytest.importorskip("jsonschema")
-    jsonschema.validate(document, schema)
+    jsonschema.validate(document, contract)
+    jsonschema.validate(document, schema())
+    assert Document.from_json(document) == diagnosis.document
     return document
 
 

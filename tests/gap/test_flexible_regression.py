@@ -19,6 +19,8 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.thresholds import DEFAULT
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 NOISE = 0.2
 
@@ -70,18 +72,18 @@ def test_what_no_effect_names_is_nameless():
     finding, found = of(runs(on_second(lambda q, dq: np.exp(-(((q - 0.3) / 0.2) ** 2)) * np.tanh(3 * dq))))
     assert not finding.causes
     shares = found.shares()
-    assert shares["nameless"] > 0.6
-    assert shares["nameless"] == pytest.approx(shares["closeable"], rel=1e-3)
-    assert shares["nameless_by_equation"][1] > 0.6
+    assert shares.nameless > 0.6
+    assert shares.nameless == pytest.approx(shares.closeable, rel=1e-3)
+    assert shares.nameless_by_equation[1] > 0.6
 
 
 def test_what_a_cause_closes_is_not_nameless():
     finding, found = of(runs(on_second(lambda q, dq: 3 * np.sign(dq) * np.exp(-np.abs(dq) / 0.1))))
     assert [cause.effect for cause in finding.causes] == ["stribeck_friction"]
     shares = found.shares()
-    assert shares["closeable"] > 0.9
-    assert shares["by_regression"] > 0.5
-    assert shares["nameless"] < 0.05
+    assert shares.closeable > 0.9
+    assert shares.by_regression > 0.5
+    assert shares.nameless < 0.05
 
 
 def test_the_same_seed_gives_the_same_yardstick():
@@ -98,11 +100,11 @@ def test_one_short_run_has_none():
 def test_without_a_floor_shares_are_of_the_mean_square():
     made = FlexibleRegression(np.array([4.0]), np.array([1.0]), np.array([2.0]), np.array([1.0]), None, 0.1)
     shares = made.shares()
-    assert (shares["closeable"], shares["nameless"]) == (0.75, 0.25)
-    assert "no floor" in shares["of"]
+    assert (shares.closeable, shares.nameless) == (0.75, 0.25)
+    assert "no floor" in shares.of
 
 
 def test_without_a_gap_there_are_no_shares():
     one = np.array([1.0])
-    assert FlexibleRegression(one, one, one, one, np.array([1.1]), 0.1).shares()["closeable"] is None
-    assert FlexibleRegression(one, one, one, one, np.array([0.98]), 0.1).shares()["closeable_by_equation"] == [None]
+    assert FlexibleRegression(one, one, one, one, np.array([1.1]), 0.1).shares().closeable is None
+    assert FlexibleRegression(one, one, one, one, np.array([0.98]), 0.1).shares().closeable_by_equation == (None,)

@@ -58,6 +58,7 @@ def test_what_is_there_is_found_and_nothing_else():
     assert found(np.eye(4), np.zeros(4)) == []
 
 
+@pytest.mark.slow
 def test_what_two_runs_alone_show_is_found_where_it_leads_by_far_and_is_rare():
     def causes(coefficient, speaking, effect="joint_elasticity"):
         system, candidates = system_of(np.eye(4), [coefficient, 0.0, 0.0, 0.0], silent=range(RUNS - speaking))
@@ -122,6 +123,7 @@ def test_effects_that_share_nothing_do_not_correlate():
     assert cause.rival_correlations["effect_1"] < 0.05
 
 
+@pytest.mark.slow
 @given(st.floats(-0.99, 0.99))
 def test_the_canonical_correlation_of_two_columns_is_their_correlation(correlation):
     products = 1e6 * np.array([[1.0, 0, 0, 0], [0, 1, correlation, 0], [0, correlation, 1, 0], [0, 0, 0, 1]])
@@ -147,6 +149,7 @@ def test_groups_that_an_effect_says_nothing_of_do_not_count():
     )  # of one that speaks nothing can be said
 
 
+@pytest.mark.slow
 @given(arrays(float, 6, elements=st.integers(-50, 50), unique=True), st.floats(0.1, 10))
 def test_the_unit_of_gain_does_not_matter(gain, unit):
     said = np.arange(1.0, 7.0)

@@ -33,6 +33,7 @@ def test_no_more_than_all_is_closed():
     assert value == upper == 1.0
 
 
+@pytest.mark.slow
 def test_the_interval_covers_the_truth_nineteen_times_in_twenty():
     generator = np.random.default_rng(3)
     covered = []

@@ -15,6 +15,8 @@ from irtwin.gap.localisation.regimes import JOINT_REGIMES
 from irtwin.gap.regression.residuals import Trace
 from irtwin.gap.thresholds import DEFAULT
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 JOINTS = ROBOT.joint_names
 FLOOR = np.full(3, 0.5)
@@ -143,9 +145,9 @@ def test_places_without_a_known_floor_stand_out_of_their_joint():
 def test_a_map_has_every_joint_and_regime():
     (seen,) = joint_maps([traces()], labels(traces()), DEFAULT)
     drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None, DEFAULT.places.fewest_samples))
-    assert drawn["regimes"] == list(JOINT_REGIMES)
-    assert np.array(drawn["excess"]).shape == (3, len(JOINT_REGIMES))
-    assert np.all(np.isfinite(drawn["excess"]))
+    assert drawn.regimes == JOINT_REGIMES
+    assert np.array(drawn.excess).shape == (3, len(JOINT_REGIMES))
+    assert np.all(np.isfinite(drawn.excess))
 
 
 def test_power_that_is_given_back_is_located():

@@ -12,6 +12,7 @@ from tests.synthetic import arm, measure, swing
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
+from irtwin.gap.document.form import to_json
 from irtwin.gap.experiment.next_experiment import Proposal, next_experiment
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.experiment.programmes import programmes
@@ -27,6 +28,8 @@ from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.report.gap.figures import experiment
+
+pytestmark = pytest.mark.slow
 
 ROBOT = arm(2)
 NOISE = 0.2
@@ -87,7 +90,7 @@ def test_programmes_keep_the_limits_of_the_joints(motions):
     assert [one.kind for one in made][:2] == ["speed_ladder", "slow_sweep"]
     assert {"exciting_motion", "payload", "warm_up", "without_payload"} <= {one.kind for one in made}
     for one in made:
-        json.dumps(one.to_json(), allow_nan=False)
+        json.dumps(to_json(one.said), allow_nan=False)
         for motion in one.motions:
             assert np.all((motion.q > limits.lower) & (motion.q < limits.upper))
             assert np.all(np.abs(motion.dq) <= limits.speed)
@@ -108,23 +111,23 @@ def test_speeds_and_accelerations_of_a_programme_belong_to_its_positions(motions
 def test_joints_that_are_not_asked_for_stand_still(motions):
     ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
     assert np.ptp(ladder.motions[0].q[:, 0]) == 0
-    assert set(ladder.settings["speeds"]) == {"joint_2"}
+    assert set(ladder.settings.speeds) == {"joint_2"}
 
 
 def test_a_page_draws_the_joints_that_move(motions):
     ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
     proposal = Proposal("tell", (), ladder.joints, ROBOT, ladder, (), (), (), None, 5.0)
-    assert proposal.curve["joints"] == ["joint_2"]
-    assert len(proposal.curve["q"]) == 1
-    assert np.ptp(proposal.curve["q"][0]) > 0
-    assert experiment(proposal.curve) is not None
+    assert proposal.curve.joints == ("joint_2",)
+    assert len(proposal.curve.q) == 1
+    assert np.ptp(proposal.curve.q[0]) > 0
+    assert [line["name"] for line in experiment(proposal.curve)["data"]] == ["joint_2"]
 
 
 def test_positions_of_sliding_joints_are_in_metres(motions):
     gantry = arm(2, slides=(1,))
     both = next(iter(programmes(gantry, [], motions)))
     drawn = Proposal("tell", (), both.joints, gantry, both, (), (), (), None, 5.0).curve
-    assert drawn["units"] == ["rad", "m"]
+    assert drawn.units == ("rad", "m")
     assert experiment(drawn)["layout"]["yaxis"]["title"]["text"] == "position, rad or m"
     assert "m/s" in next(iter(programmes(gantry, ["joint_2"], motions))).text
 
@@ -204,7 +207,7 @@ def test_of_two_names_for_one_thing_none_is_told(motions):
     proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
     assert proposal.programme is None
     assert "cannot be told apart" in proposal.note
-    assert proposal.to_json()["expected_separation"] is None
+    assert proposal.experiment.expected_separation is None
 
 
 def test_a_payload_in_every_run_asks_for_runs_without(motions):
@@ -221,14 +224,14 @@ def test_temperature_that_nobody_logged_asks_for_a_warm_up(motions):
         ROBOT, [channel], [catalogue()["temperature_dependent_friction"]], motions, DEFAULT.experiment
     )
     assert proposal.programme.kind == "warm_up"
-    assert proposal.to_json()["programme"]["temperatures"] == [25.0, 45.0]
+    assert proposal.experiment.programme.temperatures == (25.0, 45.0)
 
 
 def test_what_no_signal_shows_is_said_in_words(motions):
     channel = ground_of(motions, ["payload"])
-    document = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions, DEFAULT.experiment).to_json()
-    assert document["programme"] is None
-    assert "log power" in document["motions"][0]
+    said = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions, DEFAULT.experiment).experiment
+    assert said.programme is None
+    assert "log power" in said.motions[0]
 
 
 def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
@@ -239,13 +242,13 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
         ["nonlinear_viscous_friction"],
     )
     proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
-    document = proposal.to_json()
-    json.dumps(document, allow_nan=False)
-    assert document["purpose"] == "tell stribeck_friction from nonlinear_viscous_friction"
-    assert document["programme"]["joints"] == ["joint_2"] or document["programme"]["kind"] == "exciting_motion"
-    assert document["expected_separation"] >= document["separation_now"]
+    said = proposal.experiment
+    json.dumps(to_json(said), allow_nan=False)
+    assert said.purpose == "tell stribeck_friction from nonlinear_viscous_friction"
+    assert said.programme.joints == ("joint_2",) or said.programme.kind == "exciting_motion"
+    assert said.expected_separation >= said.separation_now
     curve = proposal.curve
-    assert len(curve["q"]) == len(curve["joints"]) and len(curve["q"][0]) == len(curve["time"]) <= 450
+    assert len(curve.q) == len(curve.joints) and len(curve.q[0]) == len(curve.time) <= 450
 
 
 def test_nothing_to_ask(motions):

@@ -55,7 +55,7 @@ def checked(robot: Robot, made: list[Run], tmp_path: Path) -> str:
     json.dumps([document, found.evidence], allow_nan=False)
     assert found.twin is not None
     from_json(to_json(found.twin), Path("twin.json"))
-    render_alone(data, document, found.evidence, tmp_path / "page.html")
+    render_alone(data, found.document, found.curves, tmp_path / "page.html")
     return found.verdict
 
 
@@ -72,6 +72,7 @@ def one_stands(q):
 ROBOTS = {"one joint": arm(1), "two joints": arm(2), "a gantry": gantry(), "a gantry without masses": gantry("")}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("lacking", ["power", "torque"])
@@ -80,6 +81,7 @@ def test_small_robots_are_diagnosed(robot, lacking, tmp_path):
     assert checked(ROBOTS[robot], made, tmp_path) in ("no_gap", "attributed", "ambiguous")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize(
     "changes",

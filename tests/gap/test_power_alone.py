@@ -13,6 +13,8 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(3)
 WITH_LOSS = (*BASELINE, "copper_loss")
 

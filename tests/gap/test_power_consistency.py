@@ -16,6 +16,8 @@ from irtwin.gap.isolation.power_consistency import PowerBalance, filtered, kind_
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.slow
+
 ROBOT = arm(2)
 KNOWN = catalogue()
 WITH_LOSS = (*BASELINE, "copper_loss")

@@ -13,7 +13,7 @@ from tests.data_sets import irtwin, write
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.effects.rigid_body import flange_frame
-from irtwin.twin.files import save
+from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
 
 ROBOT = arm(2)
@@ -38,10 +38,8 @@ def loaded(motion):
 def folder(tmp_path_factory):
     """A twin, and a data set whose runs it has not seen: bare, and with a payload."""
     place = tmp_path_factory.mktemp("predict")
-    save(
-        identify(ROBOT, [measure(ROBOT, swing(ROBOT, seed, seconds=10.0)) for seed in (1, 2)]),
-        place / "twin.json",
-    )
+    twin = identify(ROBOT, [measure(ROBOT, swing(ROBOT, seed, seconds=10.0)) for seed in (1, 2)])
+    (place / "twin.json").write_text(to_json(twin))
     bare = as_run(replace(measure(ROBOT, swing(ROBOT, 3, seconds=10.0)), run="bare"))
     heavy = as_run(replace(loaded(swing(ROBOT, 4, seconds=10.0)), run="loaded"))
     write(place / "data", ROBOT, [bare, heavy])
@@ -91,7 +89,7 @@ def broken(folder, tmp_path, fault):
     pq.write_table(table, run)
     if fault == "another robot":
         pq.write_table(table.rename_columns([n.replace("joint_2", "elbow") for n in table.column_names]), run)
-        return (twin, run, "--out", out), 'run.parquet: column q_elbow: the URDF has no moving joint "elbow"'
+        return (twin, run, "--out", out), 'run.parquet: column q_elbow: the robot has no moving joint "elbow"'
     if fault == "no twin":
         return (run, run, "--out", out), "name a twin that irtwin saved"
     if fault == "no run":

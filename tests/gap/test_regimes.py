@@ -23,7 +23,9 @@ def trapezoid():
     half = np.interp(np.arange(0, 5, 1 / RATE), [0, 1, 2, 3, 4, 5], [0, 0, 1, 1, 0, 0])
     speed = np.concatenate([half, -half])[:, None]
     time = np.arange(len(speed)) / RATE
-    return Motion("there_and_back", time, np.cumsum(speed, axis=0) / RATE, speed, np.gradient(speed, 1 / RATE, axis=0))
+    return Motion(
+        time, np.cumsum(speed, axis=0) / RATE, speed, np.gradient(speed, 1 / RATE, axis=0), run="there_and_back"
+    )
 
 
 def at(found, names, second):
@@ -48,7 +50,7 @@ def test_a_joint_rests_speeds_up_keeps_its_speed_and_brakes():
 def test_a_reversal_is_a_change_of_direction_alone():
     time = np.arange(0, 4, 1 / RATE)
     speed = np.cos(np.pi * time / 2)[:, None]  # turns round at 1 s and 3 s
-    motion = Motion("swing", time, np.sin(np.pi * time / 2)[:, None], speed, np.gradient(speed, 1 / RATE, axis=0))
+    motion = Motion(time, np.sin(np.pi * time / 2)[:, None], speed, np.gradient(speed, 1 / RATE, axis=0), run="swing")
     (found,) = joint_regimes([motion], [np.zeros_like(speed)], 0, DEFAULT.regimes)
     turning = found[:, JOINT_REGIMES.index("reversal")]
     assert turning[100] and turning[300] and not turning[200]
@@ -66,7 +68,7 @@ def test_a_loaded_joint_may_stand_still():
 def test_what_a_noisy_sensor_shows_at_rest_is_no_reversal():
     motion = trapezoid()
     shaken = motion.dq + np.where(motion.dq == 0, 5e-4 * np.sin(40 * motion.time)[:, None], 0.0)
-    still = Motion("noisy", motion.time, motion.q, shaken, motion.ddq)
+    still = Motion(motion.time, motion.q, shaken, motion.ddq, run="noisy")
     (found,) = joint_regimes([still], [np.zeros_like(shaken)], 0, DEFAULT.regimes)
     assert at(found, JOINT_REGIMES, 0.5) == {"standstill"}
 

@@ -63,6 +63,7 @@ def test_twins_share_alike():
     assert found == pytest.approx([0.5, 0.5], abs=0.02)
 
 
+@pytest.mark.slow
 def test_many_causes_are_shared_by_orders_drawn():
     count = 10
     system, attribution = system_of(np.eye(count), np.arange(1.0, count + 1))

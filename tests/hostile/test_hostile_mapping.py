@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PREFIXES = (
     "@prefix rr: <http://www.w3.org/ns/r2rml#> . @prefix : <http://e/> . "
     "@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .\n"

@@ -85,6 +85,7 @@ def test_rdf_xml(refused: Callable[..., str], tmp_path: Path, name: str) -> None
     check(refused, tmp_path, "in.owl", *XML[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TURTLE)
 def test_turtle(refused: Callable[..., str], tmp_path: Path, name: str) -> None:
     text, message = TURTLE[name]

@@ -9,6 +9,8 @@ import psutil
 import pytest
 from tests.endpoint import Server, make_graph, serving
 
+pytestmark = pytest.mark.slow
+
 SECONDS, MEGABYTES = 3, 128
 GOOD = (
     "PREFIX e: <http://e/> SELECT DISTINCT ?a (SUM(?v) AS ?n) WHERE { ?a a e:C ; e:p ?v . "

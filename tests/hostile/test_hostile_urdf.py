@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from tests.hostile.xml_attacks import attacks
 
+pytestmark = pytest.mark.slow
+
 LINK = (
     '<link name="{}"><inertial><mass value="1"/>'
     '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'

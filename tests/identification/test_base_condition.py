@@ -22,7 +22,7 @@ def test_its_columns_are_those_of_the_effects() -> None:
     robot = kr6()
     regressor, stack = BaseRegressor(robot), Stack(robot, EXCITED)
     q, dq, ddq = motion(6)
-    columns = stack.torque_columns(Motion("run", np.arange(len(q)), q, dq, ddq))[:, :, regressor.columns]
+    columns = stack.torque_columns(Motion(np.arange(len(q)), q, dq, ddq, run="run"))[:, :, regressor.columns]
     np.testing.assert_allclose(regressor.matrix(q, dq, ddq), columns.reshape(-1, len(regressor.columns)), atol=1e-9)
 
 

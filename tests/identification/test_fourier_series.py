@@ -31,6 +31,7 @@ def test_the_bases_give_the_series_motion_at_the_grid() -> None:
         np.testing.assert_allclose(basis @ x, values, atol=1e-12)
 
 
+@pytest.mark.slow
 @given(st.integers(2, 10), st.integers(0, 2**32 - 1))
 def test_between_samples_bounds_what_a_fine_grid_shows(harmonics: int, seed: int) -> None:
     series = RestSeries(1.0, harmonics).series(np.random.default_rng(seed).normal(size=(2 * harmonics - 1, 2)))

@@ -14,6 +14,8 @@ from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:

@@ -11,6 +11,8 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.export import export_owl
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
+pytestmark = pytest.mark.slow
+
 IRT = rdflib.Namespace("https://w3id.org/irtwin#")
 
 

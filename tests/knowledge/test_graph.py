@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad
+from tests.individuals import individual
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store import graph as graph_module
 from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, individual, term
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, term
 
 A, B = "https://example.org/g/a", "https://example.org/g/b"
 

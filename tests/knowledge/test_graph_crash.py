@@ -12,6 +12,8 @@ import pytest
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
+pytestmark = pytest.mark.slow
+
 # Writes without end: each step makes a new graph of 50 facts, or lets one of three graphs count on; says which is done.
 WRITER = """
 import itertools, sys

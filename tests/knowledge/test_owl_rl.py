@@ -12,7 +12,7 @@ from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Store, Triple, par
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import closure as owl_rl
-from irtwin.knowledge.owl_rl.closure import Closure, Contradiction, closure
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE
 
@@ -22,6 +22,10 @@ PREFIXES = """
 @prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
 @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
 """
+
+
+def closure(given: Iterable[Triple]) -> set[Triple]:
+    return Closure(given).worth_keeping()
 
 
 def triples(turtle: str) -> set[Triple]:
@@ -179,6 +183,7 @@ def test_contradiction_is_refused_by_the_name_of_its_rule(premise: str, rule: st
         closure(triples(premise))
 
 
+@pytest.mark.slow
 def test_a_run_that_is_a_robot_is_refused(graph: KnowledgeGraph) -> None:
     wrong = triples("<https://w3id.org/irtwin/id/run/Arm_A.fit_1> a irt:Industrial_Robot .")
     with pytest.raises(InputError, match=r"id:run/Arm_A\.fit_1"):
@@ -191,6 +196,7 @@ def test_two_values_where_there_can_be_one_are_refused(graph: KnowledgeGraph) ->
         closure(graph.triples() | wrong)
 
 
+@pytest.mark.slow
 def test_agrees_with_owlrl_on_two_robots(graph: KnowledgeGraph) -> None:
     """Apart from what is true of everything, and what is said of anonymous classes or literals."""
     premise = graph.triples(GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_ACTIVITY)

@@ -92,26 +92,29 @@ ex:C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty ex:p ; owl:someValuesF
 """
 
 
+@pytest.mark.slow
 def test_classification_by_hermit(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
     source.write_text(DL)
-    assert CliRunner().invoke(cli, ["reason", str(source), "--out", str(out), "--dl"]).exit_code == 0
+    assert CliRunner().invoke(cli, ["reason", str(source), "--out", str(out), "--engine", "hermit"]).exit_code == 0
     assert "<https://example.org/C> <http://www.w3.org/2000/01/rdf-schema#subClassOf> <https://example.org/E>" in (
         out.read_text()
     )
 
 
+@pytest.mark.slow
 def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "in.ttl"
     source.write_text(DL + "ex:D owl:disjointWith ex:D .")
     with pytest.raises(InputError, match="HermiT cannot read this as OWL 2 DL"):
-        close_file(source, tmp_path / "out.nt", dl=True)
+        close_file(source, tmp_path / "out.nt", "hermit")
 
 
+@pytest.mark.slow
 def test_clash_that_only_dl_sees_names_its_statements(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
     source.write_text(DL + "ex:D rdfs:subClassOf owl:Nothing .")
-    outcome = CliRunner().invoke(cli, ["reason", str(source), "--out", str(out), "--dl"])
+    outcome = CliRunner().invoke(cli, ["reason", str(source), "--out", str(out), "--engine", "hermit"])
     assert outcome.exit_code == 3
     assert "These statements cannot all be true" in outcome.output
     assert "some D" in outcome.output

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests import small_fleet
+from tests.individuals import individual
 
 from irtwin import workflow
 from irtwin.knowledge import owl_dl, parts, reasoning
@@ -25,7 +26,6 @@ from irtwin.knowledge.vocabulary import (
     RDF,
     RDFS,
     XSD,
-    individual,
     term,
 )
 from irtwin.resources import folder
@@ -170,6 +170,7 @@ def test_robots_are_parts_of_their_own() -> None:
     assert len({top(node) for triple in graph.triples(SOURCE) for node in ontology.nodes(triple)}) == len(ROBOTS)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4),
@@ -307,11 +308,13 @@ def ontology() -> list[Quad]:
     return list(in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY))
 
 
+@pytest.mark.slow
 def test_two_robots_one_by_one(two_robots: list[Quad], ontology: list[Quad]) -> None:
     graph = one_by_one(two_robots, ontology)
     assert conclusions(graph) == as_one_part(graph)
 
 
+@pytest.mark.slow
 def test_a_fleet_one_by_one(tmp_path: Path, ontology: list[Quad]) -> None:
     with Workspace(tmp_path) as place, KnowledgeGraph() as mapped:
         small_fleet.fill(place)

@@ -4,10 +4,11 @@ import pyshacl
 import pytest
 import rdflib
 from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
+from tests.individuals import individual
 
 from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
-from irtwin.knowledge.reasoning import check_consistency, reason
+from irtwin.knowledge.reasoning import asserted, reason
 from irtwin.knowledge.shacl import rules as shacl_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
 from irtwin.knowledge.vocabulary import (
@@ -18,11 +19,12 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SOURCE,
     GRAPH_SWRL,
     RDF,
-    individual,
     shorten,
     term,
 )
 from irtwin.resources import folder
+
+pytestmark = pytest.mark.slow
 
 TYPE = RDF + "type"
 RUN = "Arm_A.idle_1"
@@ -122,12 +124,12 @@ def test_rules_have_the_same_names_in_both_languages() -> None:
 
 
 def test_hermit_finds_two_robots_consistent(graph: KnowledgeGraph) -> None:
-    check_consistency(graph)
+    owl_dl.classify(asserted(graph))
 
 
 def test_hermit_finds_the_kr6_sheet_consistent(graph: KnowledgeGraph) -> None:
     sheet = set(read_turtle(folder("ontology") / "robots" / "kuka_kr6_r700.ttl"))
-    owl_dl.check_consistency(graph.triples(GRAPH_ONTOLOGY) | sheet)
+    owl_dl.classify(graph.triples(GRAPH_ONTOLOGY) | sheet)
 
 
 @pytest.mark.parametrize(
@@ -149,11 +151,11 @@ def test_hermit_finds_a_contradiction(
     monkeypatch.setattr(owl_dl, "_clash", lambda world: "")  # the search takes seconds, and has a test of its own
     wrong = Triple(NamedNode(subject), NamedNode(predicate), value)
     with pytest.raises(InputError, match="contradict each other"):
-        owl_dl.check_consistency(graph.triples() | {wrong})
+        owl_dl.classify(graph.triples() | {wrong})
 
 
 def test_hermit_names_a_class_that_nothing_can_belong_to(graph: KnowledgeGraph) -> None:
     subclass = NamedNode("http://www.w3.org/2000/01/rdf-schema#subClassOf")
     wrong = Triple(NamedNode(term("Idle_Heavy_Run")), subclass, NamedNode(term("Series")))
     with pytest.raises(InputError, match="irtwin#Idle_Heavy_Run"):
-        owl_dl.check_consistency(graph.triples(GRAPH_ONTOLOGY) | {wrong})
+        owl_dl.classify(graph.triples(GRAPH_ONTOLOGY) | {wrong})

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
+from tests.individuals import individual
 
 from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
@@ -18,7 +19,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SWRL,
     RDF,
     RDFS,
-    individual,
     term,
 )
 
@@ -83,6 +83,7 @@ def anew(quads: list[Quad]) -> dict[str, set]:
     return inferred(graph)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4))
 def test_any_change_gives_what_a_full_run_gives(states: list[list[Quad]]) -> None:

@@ -1,12 +1,15 @@
 import pyshacl
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
+from tests.individuals import individual
 
 from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, individual, term
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, term
+
+pytestmark = pytest.mark.slow
 
 RUN = individual("run", "Arm_A.fit_1")
 JOINT = individual("joint", "Arm_A", "j1")

@@ -32,6 +32,7 @@ def write(graph: KnowledgeGraph, number: int) -> None:
     graph.replace(in_graph([triple], "http://e/live"), "http://e/live")
 
 
+@pytest.mark.slow
 def test_a_view_lasts_when_its_files_are_removed(folder: Path) -> None:
     """Only sixteen files are opened with the store; a query that missed another went on for ever."""
     with KnowledgeGraph(folder) as graph:
@@ -77,6 +78,7 @@ def seen(snapshot: Snapshot) -> list[int]:
     return [row["v"] for row in snapshot.current(at_once=True).query(VALUES).rows]
 
 
+@pytest.mark.slow
 def test_readers_see_the_last_whole_graph_while_it_is_rewritten(folder: Path) -> None:
     with KnowledgeGraph(folder) as graph:
         write(graph, 1)
@@ -92,6 +94,7 @@ def test_readers_see_the_last_whole_graph_while_it_is_rewritten(folder: Path) ->
     assert views(folder) == []
 
 
+@pytest.mark.slow
 def test_what_a_killed_writer_kept_is_seen_no_more(folder: Path) -> None:
     with KnowledgeGraph(folder) as graph:
         write(graph, 1)

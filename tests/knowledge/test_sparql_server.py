@@ -16,7 +16,6 @@ from urllib.error import URLError
 from urllib.request import urlopen
 
 import pytest
-import rdflib
 from pyoxigraph import Literal, NamedNode, Quad
 
 from irtwin.errors import InputError
@@ -77,6 +76,7 @@ def test_every_question_has_the_answer_of_the_embedded_store(served: KnowledgeGr
         assert ask(served, name) == ask(graph, name), name
 
 
+@pytest.mark.slow
 def test_what_is_there_already_is_left_alone(served: KnowledgeGraph, two_robots: list[Quad]) -> None:
     """The server calls blank nodes as it likes: the ontology is the same all the same."""
     served._store.update(f"INSERT DATA {{ GRAPH <{A}> {{ <https://example.org/x> a <https://example.org/X> }} }}")
@@ -105,15 +105,6 @@ def test_construct_ask_bindings_and_faults(served: KnowledgeGraph) -> None:
         served.query("SELECT * { ?s ?p }")
     with pytest.raises(InputError, match="not allowed"):
         served.query("SELECT * { SERVICE <http://example.org/> { ?s ?p ?o } }")
-
-
-def test_rdflib_sees_the_same(served: KnowledgeGraph, graph: KnowledgeGraph) -> None:
-    text = "SELECT ?name { ?run <https://w3id.org/irtwin#Run_Name> ?name }"
-    names = sorted(str(row[0]) for row in graph.as_rdflib().query(text))
-    assert len(names) == 5
-    assert sorted(str(row[0]) for row in served.as_rdflib().query(text)) == names
-    name = rdflib.URIRef(term("Run_Name"))
-    assert len(list(served.as_rdflib().subjects(name))) == len(list(graph.as_rdflib().subjects(name))) == 5
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import pytest
 from irtwin.knowledge.store import store_files
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:

@@ -31,6 +31,7 @@ def test_odd_in_speed(drawings: Drawings) -> None:
     np.testing.assert_allclose(_steady(drawings, 1.0), -_steady(drawings, -1.0), rtol=0.01)
 
 
+@pytest.mark.slow
 def test_falls_as_the_oil_warms_and_rises_with_load(drawings: Drawings) -> None:
     cold, warm = _steady(drawings, 3.0, 22.0), _steady(drawings, 3.0, 47.0)
     assert ((warm / cold > 0.5) & (warm / cold < 0.85)).all()

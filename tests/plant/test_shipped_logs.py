@@ -54,6 +54,7 @@ def test_stays_within_what_the_robot_can_do(data_set: DataSet, drawings: Drawing
         assert 95 < signals.power.min() < 130 and signals.power.max() < 2000, run.name
 
 
+@pytest.mark.slow
 def test_no_motion_touches_the_floor_or_the_arm_itself(drawings: Drawings) -> None:
     show = '<mujoco><compiler discardvisual="false" fusestatic="false"/></mujoco>'
     spec = mujoco.MjSpec.from_string(drawings.urdf.replace("</robot>", f"{show}</robot>"))

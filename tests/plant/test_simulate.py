@@ -9,6 +9,8 @@ from plant.motion import Motion, programme
 from plant.simulate import Recording, simulate
 from plant.thermal import Thermal
 
+pytestmark = pytest.mark.slow
+
 MOVES = [
     {"to": [40, -60, 90, 30, 40, 60], "profile": "trapezoid", "pause": 0.2},
     {"to": [-30, -100, 70, -20, -40, 0], "pause": 0.2},

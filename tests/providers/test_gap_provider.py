@@ -11,6 +11,8 @@ from sqlalchemy import select
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
+from irtwin.gap.document.document import Document
 from irtwin.providers import energy, identification
 from irtwin.providers.gap import adopt, record
 from irtwin.providers.records import ingest, robot_iri, run_iri
@@ -24,27 +26,61 @@ from irtwin.twin.identify import identify
 ROBOT = "arm_2"
 BARE = ("rigid_body", "viscous_friction")
 FULL = (*BARE, "coulomb_friction")
+NOTHING = Curves(follows=(), runs=(), experiment=None)
 
 
-def diagnosis(**changes: Any) -> dict[str, Any]:
+def diagnosis(**changes: Any) -> Document:
+    evidence = {
+        "channel": "torque",
+        "share_of_what_is_closed": 1.0,
+        "closed_where_it_acts": 0.9,
+        "gain_on_groups_left_out": 4.0,
+        "t_between_groups": 7.0,
+        "p_adjusted_for_the_catalogue": 0.001,
+        "gain_of_rivals": {"stribeck_friction": 3.9, "payload": 0.1},
+        "correlation_with_rivals": {"stribeck_friction": 0.99},
+        "runs": ["swing_3"],
+        "window": [1.5, 2.5],
+    }
     cause = {
+        "id": "coulomb_friction@all",
         "effect": "coulomb_friction",
         "joints": ["joint_1", "joint_2"],
         "scope": "missing",
         "confidence": 0.97,
         "parameters": [{"name": "Fc", "joint": "joint_1", "value": 6.0, "unit": "Nm", "interval95": [5.9, 6.1]}],
         "indistinguishable_from": ["stribeck_friction"],
+        "evidence": evidence,
     }
+    location = {"channel": "torque", "joint": "joint_1", "regime": None, "follows": None, "runs": ["swing_3"]}
+    location |= {"share": 0.8, "share_interval95": [0.7, 0.9], "excess": 5.0, "excess_interval95": [4.0, 6.0]}
     said = {
         "verdict": "attributed",
         "robot": ROBOT,
-        "gap": {"torque": {"joint_1": {"rmse": 3.0, "noise_floor": None, "excess": None}}},
-        "locations": [{"channel": "torque", "joint": "joint_1", "share": 0.8, "runs": ["swing_3"]}],
+        "gap": {
+            "energy_error_percent": None,
+            "torque": {"joint_1": {"rmse": 3.0, "noise_floor": None, "excess": None}},
+        },
+        "locations": [location | {"concentration": 1.0, "false_discovery_rate": 0.01}],
         "causes": [cause],
         "not_testable": [{"effect": "payload", "why": "one payload only"}, {"effect": "payload", "why": "too short"}],
-        "shrink": {"held_out_runs": ["swing_3"], "closed_fraction": {"value": 0.9, "interval95": [0.8, 1.0]}},
+        "shrink": shrink(),
+        "next_experiment": None,
     }
-    return said | changes
+    return Document.from_json(said | changes)
+
+
+def shrink(run: str = "swing_3") -> dict[str, Any]:
+    return {
+        "held_out_runs": [run],
+        "noise_floor_from": None,
+        "torque_rmse": None,
+        "power_rmse": None,
+        "energy_error_percent": None,
+        "closed_fraction": {"value": 0.9, "interval95": [0.8, 1.0]},
+        "by_cause": [],
+        "yardstick": {},
+    }
 
 
 @pytest.fixture
@@ -80,19 +116,34 @@ def count(workspace: Workspace, table: Any) -> int:
 
 
 def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
-    first = record(workspace, ROBOT, diagnosis(), {"runs": []}, workspace.better)
-    second = record(workspace, ROBOT, diagnosis(verdict="ambiguous"), {"runs": []}, workspace.better)
+    first = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
+    second = record(workspace, ROBOT, diagnosis(verdict="ambiguous"), NOTHING, workspace.better)
     assert first.diagnosis_id != second.diagnosis_id
     assert {file.name for file in (workspace.folder / "diagnoses").iterdir()} == {
         f"{second.diagnosis_id}{kind}.json" for kind in ("", ".evidence", ".twin")
     }
-    assert workspace.read_document(second.evidence_file, second.evidence_sha256) == b'{"runs": []}'
+    assert (
+        workspace.read_document(second.evidence_file, second.evidence_sha256)
+        == b'{"experiment": null, "follows": [], "runs": []}'
+    )
     assert count(workspace, gap_schema.GapNotTestable) == 2
     assert count(workspace, schema.Twin) == count(workspace, schema.RunEnergy) == 1
 
 
+def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> None:
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
+    with workspace.reading() as session:
+        cause = session.scalars(select(gap_schema.GapCause)).one()
+        run = session.scalars(select(gap_schema.GapCauseRun)).one()
+        weighed = session.scalars(select(gap_schema.GapCauseCompetitor)).all()
+    assert (cause.acts_from_s, cause.acts_until_s, run.run_id) == (1.5, 2.5, f"{ROBOT}.swing_3")
+    assert cause.cause_id == run.cause_id == "coulomb_friction@all"
+    found = {one.effect: (one.gain, one.correlation) for one in weighed}
+    assert found == {"stribeck_friction": (3.9, 0.99), "payload": (0.1, None)}
+
+
 def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
-    found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     twin_id = adopt(workspace, ROBOT)
     with workspace.reading() as session:
         twin = session.scalars(select(schema.Twin)).one()
@@ -111,7 +162,7 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
 
 
 def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Workspace) -> None:
-    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     adopt(workspace, ROBOT)
     with workspace.reading() as session:
         row = session.scalars(select(schema.Twin)).one()
@@ -125,7 +176,7 @@ def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Works
 
 
 def test_a_run_apart_from_its_twin_has_energy_but_no_error(workspace: Workspace) -> None:
-    record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     adopt(workspace, ROBOT)
     for name in ("swing_1", "swing_3"):
         made = energy.provide(workspace, f"{ROBOT}.{name}")
@@ -136,23 +187,24 @@ def test_a_run_apart_from_its_twin_has_energy_but_no_error(workspace: Workspace)
 def test_nothing_to_adopt_is_an_error(workspace: Workspace) -> None:
     with pytest.raises(InputError, match="no diagnosis"):
         adopt(workspace, ROBOT)
-    record(workspace, ROBOT, diagnosis(verdict="unexplained", causes=[]), {})
+    record(workspace, ROBOT, diagnosis(verdict="unexplained", causes=[]), NOTHING)
     with pytest.raises(InputError, match="added nothing to the twin"):
         adopt(workspace, ROBOT)
 
 
 def test_what_the_workspace_lacks_is_named(workspace: Workspace) -> None:
     with pytest.raises(InputError, match="no robot other here"):
-        record(workspace, "other", diagnosis(), {})
+        record(workspace, "other", diagnosis(), NOTHING)
     with pytest.raises(InputError, match='run "swing_9"'):
-        record(workspace, ROBOT, diagnosis(shrink={"held_out_runs": ["swing_9"]}), {})
+        record(workspace, ROBOT, diagnosis(shrink=shrink("swing_9")), NOTHING)
+    size = {"rmse": 1.0, "noise_floor": None, "excess": None}
     with pytest.raises(InputError, match="no joint joint_9"):
-        record(workspace, ROBOT, diagnosis(gap={"torque": {"joint_9": {"rmse": 1.0}}}), {})
+        record(workspace, ROBOT, diagnosis(gap={"energy_error_percent": None, "torque": {"joint_9": size}}), NOTHING)
     assert count(workspace, gap_schema.GapDiagnosis) == 0
 
 
 def test_a_changed_document_is_told(workspace: Workspace) -> None:
-    found = record(workspace, ROBOT, diagnosis(), {}, workspace.better)
+    found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     (workspace.folder / found.twin_file).write_text("{}")
     with pytest.raises(InputError, match="was changed after it was written"):
         adopt(workspace, ROBOT)

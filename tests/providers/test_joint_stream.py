@@ -25,7 +25,7 @@ def line(**changes: Any) -> bytes:
 
 def test_a_full_line() -> None:
     said = line(velocity=[1, 2], effort=[3, 4], temperature=[5, 6], power=7, payload=2.5)
-    assert READER.read(said) == State("R", 5.5, (0.1, 0.2), (1.0, 2.0), (3.0, 4.0), (5.0, 6.0), 7.0, 2.5)
+    assert READER.read(said) == State("R", 5.5, ((0.1, 0.2), (1.0, 2.0), (3.0, 4.0), (5.0, 6.0), (7.0,)), 2.5)
 
 
 @pytest.mark.parametrize("said", ["Prüfstand 3", "Pru\u0308fstand 3", "Pr_fstand_3~1"])
@@ -40,13 +40,13 @@ def test_a_robot_is_said_by_its_name_or_its_identifier(said: str) -> None:
 
 def test_what_is_not_said_is_nan() -> None:
     state = READER.read(line())
-    assert all(map(math.isnan, [*state.velocity, *state.effort, *state.temperature, state.power]))
+    assert all(map(math.isnan, [*state.of("dq"), *state.of("torque"), *state.of("temperature"), *state.of("power")]))
     assert state.payload is None
 
 
 def test_values_follow_the_names() -> None:
     state = READER.read(line(name=["a2", "a1"], velocity=[2, 1]))
-    assert (state.position, state.velocity) == ((0.2, 0.1), (1.0, 2.0))
+    assert (state.of("q"), state.of("dq")) == ((0.2, 0.1), (1.0, 2.0))
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,8 @@ from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
 
+pytestmark = pytest.mark.slow
+
 NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 UNSAID = (math.nan, math.nan)
 NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {
@@ -52,7 +54,7 @@ def state(number: int, robot: str = rows.ROBOT, said: bool = True) -> State:
     """A swing at 100 Hz of two joints, the second at rest."""
     at = 0.01 * number
     speed = (math.cos(at), 0.0) if said else UNSAID
-    return State(robot, NOON + at, (math.sin(at), 0.5), speed, (10.0, -3.0), UNSAID, 400.0 + number)
+    return State(robot, NOON + at, ((math.sin(at), 0.5), speed, (10.0, -3.0), UNSAID, (400.0 + number,)))
 
 
 def quads(graph: KnowledgeGraph) -> set[Quad]:
@@ -95,7 +97,8 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
         assert row["superseded"] == twin.superseded <= 99
         assert graph.query("ASK { ?run irt:run_of id:robot\\/KUKA_KR6_R700 ; irt:Run_Role 'live' }")[0]["answer"]
         for number in range(100, 130):
-            twin.receive(State(rows.ROBOT, NOON + 0.01 * number, (1.0, 0.5), (0.0, 0.0), UNSAID, UNSAID, math.nan))
+            standing = ((1.0, 0.5), (0.0, 0.0), UNSAID, UNSAID, (math.nan,))
+            twin.receive(State(rows.ROBOT, NOON + 0.01 * number, standing))
         wait_for(lambda: graph.query(NOW)[0]["state"] == "standstill")
         assert len(graph.query(NOW)) == 1
 

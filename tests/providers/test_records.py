@@ -15,8 +15,8 @@ from tests import rows
 from irtwin.errors import InputError
 from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, load_run
 from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, Run
-from irtwin.signals.samples import Signals
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run as Row
 
@@ -59,6 +59,7 @@ def test_plain_names_are_their_own_identifiers():
         assert identifier(name) == name
 
 
+@pytest.mark.slow
 @given(st.lists(st.text(), min_size=2, max_size=2, unique_by=lambda name: unicodedata.normalize("NFC", name)))
 @example(["机器人", "人器机"])
 @example(["R 1", "R_1"])

@@ -1,5 +1,6 @@
 import numpy as np
 import pyarrow as pa
+import pytest
 from tests.report.robots import Factory, answers, power_only, six_axis
 from tests.report.test_sampling import unpack
 
@@ -25,6 +26,18 @@ def test_curves_keep_the_extremes_of_the_samples(graph: KnowledgeGraph):
     np.testing.assert_allclose([drawn.min(), drawn.max()], [samples.min(), samples.max()], rtol=1e-3)
 
 
+def test_a_chart_has_the_unit_of_its_joint(graph: KnowledgeGraph):
+    factory = six_axis(graph)
+    given = answers(graph, factory)
+    given["joints"].rows[1]["kind"] = "prismatic"
+    curves = explorer(given, factory.read_series)
+    assert curves
+    run = curves["runs"][0]
+    assert [chart["unit"] for chart in run["torque"]] == ["N m", "N", "N m", "N m", "N m", "N m"]
+    assert (run["power"]["unit"], run["energy"]["unit"]) == ("W", "J")
+
+
+@pytest.mark.slow
 def test_many_runs_share_the_page(graph: KnowledgeGraph):
     factory = six_axis(graph, runs=30)
     curves = explorer(answers(graph, factory), factory.read_series)

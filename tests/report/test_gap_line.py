@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from tests import gap_cases
 
+from irtwin.gap.document.document import Document
 from irtwin.report.gap.headline import line
 
 
@@ -33,12 +34,12 @@ from irtwin.report.gap.headline import line
     ],
 )
 def test_one_line_names_what_lacks_what(verdict, against, said):
-    assert line(gap_cases.diagnosis(verdict), against) == said
+    assert line(gap_cases.document(verdict), against) == said
 
 
 def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
     diagnosis = gap_cases.diagnosis("attributed")
     diagnosis["causes"][1] |= {"scope": "missing", "joints": [], "effect": "base_tilt"}
-    assert line(diagnosis, "simulated") == (
-        "attributed: the simulator lacks stribeck friction on joint_a3; the twin lacks base tilt"
+    assert line(Document.from_json(diagnosis), "simulated") == (
+        "attributed: the twin lacks base tilt; the simulator lacks stribeck friction on joint_a3"
     )

@@ -18,10 +18,10 @@ def answers_of(causes, simulated=False, referenced=True, verdict="attributed", r
     rows = {
         "diagnosis": [{"verdict": verdict, "against_simulator": simulated, "referenced": referenced}],
         "causes": [
-            {"rank": rank, "effect": name, "label": name, "confidence": 0.9, "scope": scope}
-            for rank, (name, scope) in enumerate(causes.items(), start=1)
+            {"cause": cause, "effect": name, "label": name, "confidence": 0.9, "scope": scope}
+            for cause, (name, scope) in enumerate(causes.items(), start=1)
         ],
-        "rivals": [{"rank": rank, "rival": name, "label": name} for rank, name in rivals],
+        "rivals": [{"cause": cause, "rival": name, "rival_label": name} for cause, name in rivals],
     }
     names = ("diagnosis", "causes", "cause_joints", "rivals", "locations", "closed")
     return {name: Answer(Question(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}

@@ -103,6 +103,7 @@ def test_the_tree_draws_what_is_below_and_escapes_what_it_is_given() -> None:
     assert "<B>" not in drawn
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     out = tmp_path / "ontology.html"
     assert CliRunner().invoke(cli, ["docs", "--out", str(out)]).exit_code == 0

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from tests.flange import flange_position
 
 from irtwin.errors import InputError
-from irtwin.robot.kinematics import flange, flange_position, link_placements
+from irtwin.robot.kinematics import flange, link_placements
 from irtwin.robot.urdf import parse_urdf, read_urdf
 
 ARM = """<?xml version="1.0"?>

@@ -12,6 +12,8 @@ from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import IRT, PREFIXES
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = f"SELECT ?robot WHERE {{ ?robot a <{IRT}Industrial_Robot> }} ORDER BY ?robot"
 
 

@@ -18,6 +18,8 @@ from tests.endpoint import Server
 from irtwin.serve import connections
 from irtwin.serve.answer import IN_MEMORY, Answer, Answers
 
+pytestmark = pytest.mark.slow
+
 LARGE = "SELECT * { ?a ?b ?c . VALUES ?n { 1 2 3 4 5 6 7 8 9 10 11 12 } }"  # some MB
 MOST = 256  # connections
 

@@ -18,6 +18,8 @@ import pytest
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 
+pytestmark = pytest.mark.slow
+
 PRODUCT = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
 ALL_PAIRS = "SELECT DISTINCT * { ?a ?b ?c . ?d ?e ?f }"
 REQUEST = {"default_graphs": (), "named_graphs": (), "base": "http://e/sparql", "accept": "text/csv", "at_once": False}

@@ -38,6 +38,7 @@ def test_of_solutions(accept: str, expected: str | None) -> None:
 QUALITY = st.integers(0, 1000).map(lambda thousandths: thousandths / 1000)
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.sampled_from(list(TRIPLES)), QUALITY, min_size=1), st.randoms())
 def test_exact_types_get_the_highest_quality_in_any_order(wanted, random) -> None:
     parts = [f"{media_type};q={quality}" for media_type, quality in wanted.items()]

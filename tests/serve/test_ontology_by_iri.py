@@ -9,6 +9,8 @@ from rdflib.compare import isomorphic
 
 from irtwin.resources import folder
 
+pytestmark = pytest.mark.slow
+
 CLIENT = httpx.Client(timeout=60)
 FORMATS = {
     "text/turtle": "turtle",

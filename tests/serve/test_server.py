@@ -31,11 +31,13 @@ def refused(*arguments: object) -> str:
     return done.stderr
 
 
+@pytest.mark.slow
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
     assert "no graph here; run `irtwin run DATASET`" in refused("--workspace", tmp_path / "none", "--port", 0)
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.slow
 def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
@@ -43,10 +45,12 @@ def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
     assert f"cannot listen on 127.0.0.1, port {port}: Address already in use; --port 0 picks a free one" in message
 
 
+@pytest.mark.slow
 def test_a_host_that_is_not_ours(new_graph: Callable[[], Path]) -> None:
     assert "cannot listen on 203.0.113.1" in refused("--workspace", new_graph().parent, "--host", "203.0.113.1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("content", "message"), [(None, "cannot read the token"), (b" \n", "the token file is empty")])
 def test_a_token_file_that_says_nothing(
     tmp_path: Path, new_graph: Callable[[], Path], content: bytes | None, message: str
@@ -110,6 +114,7 @@ def test_it_listens_on_this_machine_alone(server) -> None:
     assert [(c.laddr.ip, c.laddr.port) for c in listening] == [("127.0.0.1", port)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path], start, number: int) -> None:
     with start(new_graph()) as running:

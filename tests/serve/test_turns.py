@@ -85,6 +85,7 @@ def test_who_leaves_keeps_nothing() -> None:
     scenario(run)
 
 
+@pytest.mark.slow
 def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callable[[], Path]) -> None:
     request = {"default_graphs": (), "named_graphs": (), "base": "http://e/", "accept": "text/csv", "at_once": False}
 
@@ -109,6 +110,7 @@ def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callab
     scenario(run)
 
 
+@pytest.mark.slow
 def test_the_queue_says_that_it_is_full(new_graph: Callable[[], Path]) -> None:
     async def run() -> None:
         pool = Pool(new_graph(), 1, Limits(waiting=0))

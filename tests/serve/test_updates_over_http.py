@@ -15,6 +15,8 @@ from rdflib.plugins.stores.sparqlstore import SPARQLUpdateStore
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
+pytestmark = pytest.mark.slow
+
 VALUES = "SELECT ?o { <http://e/s> <http://e/p> ?o } ORDER BY ?o"
 
 

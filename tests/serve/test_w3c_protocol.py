@@ -14,6 +14,8 @@ import httpx
 import pytest
 from tests.endpoint import CLIENT, TOKEN, Server
 
+pytestmark = pytest.mark.slow
+
 DATA = "http://kasei.us/2009/09/sparql/data/data"
 FORM, QUERY, UPDATE = "application/x-www-form-urlencoded", "application/sparql-query", "application/sparql-update"
 DOCUMENT, RESOURCE = "http://xmlns.com/foaf/0.1/Document", "http://purl.org/dc/terms/BibliographicResource"

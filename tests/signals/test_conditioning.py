@@ -46,6 +46,7 @@ def test_noise_of_encoders_does_not_drown_the_acceleration():
     assert relative(found.ddq[inner], motion.ddq[inner]) < 0.02
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(jitter=st.floats(0, 0.3), seed=st.integers(0, 100))
 def test_jitter_of_sampling_is_evened_out(jitter, seed):

@@ -93,8 +93,8 @@ def test_a_data_set_needs_no_urdf(tmp_path):
         ('convention = "standard"', "", r"\[robot.dh\] convention is missing; use standard or modified"),
         ('"standard"', '"craig"', r'\[robot.dh\] convention = "craig"; use'),
         ('name = "Scara"', 'name = "Scara"\nurdf = "robot.urdf"', "has both urdf and dh"),
-        ("[robot.dh]\n", "[robot.dh]\nconvenion = 1\n", "convenion is no key of a table of joints; did you mean conv"),
-        ("a = 0.325", "r = 0.325", r"\[\[robot.dh.row\]\] 1 r is no key of a table of joints; it may have name, type"),
+        ("[robot.dh]\n", "[robot.dh]\nconvenion = 1\n", "convenion is no key of the log format; did you mean conv"),
+        ("a = 0.325", "r = 0.325", r"\[\[robot.dh.row\]\] 1 r is no key of the log format; it may have name, type"),
         ("a = 0.325", 'a = "0.325"', r"\[\[robot.dh.row\]\] 1 a should be a number"),
         ("a = 0.325", "a = nan", r"\[\[robot.dh.row\]\] 1 a should be a number, not nan"),
         ("a = 0.325", "a = 3250", "1 a = 3250 m is beyond 1e[+]03 m"),
@@ -124,7 +124,10 @@ def test_faults_are_named(tmp_path, old, new, message):
         ("[robot]\nname = 'a'\ndh = 3", r"\[robot.dh\] should be a table"),
         ("[robot]\nname = 'a'\n[robot.dh]\nconvention = 'modified'", r"\[\[robot.dh.row\]\] is missing"),
         ("[robot]\nname = 'a'\n[robot.dh]\nconvention = 'modified'\nrow = [3]", "1 should be a table"),
-        ("[robot]\nname = 'a'\n" + "[[robot.dh.row]]\n" * 101 + "[robot.dh.x]", "no key of a table|not valid TOML"),
+        (
+            "[robot]\nname = 'a'\n" + "[[robot.dh.row]]\n" * 101 + "[robot.dh.x]",
+            "no key of the log format|not valid TOML",
+        ),
         (
             "[robot]\nname = 'a'\ndh.convention = 'standard'\n" + "[[robot.dh.row]]\n" * 101,
             "101 rows; a robot has at most 100|not valid TOML",

@@ -65,9 +65,27 @@ def test_values_that_no_toml_should_have(folder, value, message):
     assert re.search(message, refused(folder))
 
 
-def test_tables_in_tables_without_end(folder):
-    rewrite(folder, "^role.*$", ".".join("a" * 50_000) + " = 1")
+@pytest.mark.parametrize(
+    "line",
+    [
+        ".".join("a" * 50_000) + " = 1",
+        " . ".join(['"a b"', "'c'"] * 25_000) + "=1",
+        "[" + ".".join("a" * 50_000) + "]",
+        "x = {" + ".".join("a" * 50_000) + " = 1}",
+        "x = { y = 1, " + ".".join("a" * 50_000) + " = 1}",
+        ".".join("a" * 40) + " = 1",
+        "x = " + "[" * 40 + "]" * 40,
+    ],
+    ids=range(7),
+)
+def test_tables_in_tables_without_end(folder, line):
+    rewrite(folder, "^role.*$", line)
     assert "nested too deeply" in refused(folder)
+
+
+def test_text_with_many_dots_is_no_table(folder):
+    rewrite(folder, "^role.*$", 'role = "observed"\nnote = "' + ".".join("a" * 1000) + '"')
+    read_data_set(folder)
 
 
 def test_a_folder_whose_name_no_disk_takes(tmp_path):
@@ -164,6 +182,7 @@ def test_decimals_are_numbers(folder):
     np.testing.assert_array_equal(run.signals.q, 1.0)
 
 
+@pytest.mark.slow
 def test_a_small_file_of_many_samples_is_refused_unread(folder):
     (file,) = (folder / "runs").iterdir()
     schema = pa.schema([(name, pa.float64()) for name in ("time", "q_joint_1", "tau_joint_1")])
@@ -183,6 +202,7 @@ def test_columns_that_nobody_asked_for_are_not_read(folder):
     assert len(run.signals.time) == 200
 
 
+@pytest.mark.slow
 def test_damaged_parquet_is_said_to_be(folder):
     (file,) = (folder / "runs").iterdir()
     whole = file.read_bytes()
@@ -200,9 +220,10 @@ def test_damaged_parquet_is_said_to_be(folder):
 
 def test_a_run_in_pieces_is_no_copy_of_itself(tmp_path):
     from irtwin.gap.data.admission import admit
+    from irtwin.gap.thresholds import DEFAULT
     from irtwin.signals.conditioning import condition
 
     whole = as_run(measure(ROBOT, swing(ROBOT, 1, 6.0)))
     whole.signals.time[300:] += 100.0
     data_set = read_data_set(write(tmp_path / "set", ROBOT, [whole]))
-    admit(data_set, {run.name: condition(run, ROBOT, 5.0) for run in data_set.runs})
+    admit(data_set, {run.name: condition(run, ROBOT, 5.0) for run in data_set.runs}, DEFAULT.admission)

@@ -141,7 +141,7 @@ def changed(name: str, row: int, value: float) -> dict[str, np.ndarray]:
         ({k: v for k, v in columns().items() if k != "q_b"}, "column q_b is missing"),
         ({k: v for k, v in columns().items() if k != "time"}, "column time is missing"),
         ({k: v for k, v in columns().items() if k != "tau_b"}, "column tau_b is missing; log tau_ for every"),
-        (columns() | {"q_elbow": np.zeros(50)}, 'column q_elbow: the URDF has no moving joint "elbow"'),
+        (columns() | {"q_elbow": np.zeros(50)}, 'column q_elbow: the robot has no moving joint "elbow"'),
         (changed("tau_a", 7, math.nan), "line 9, column tau_a: is not a finite number"),
         (changed("q_a", 3, math.inf), "line 5, column q_a: is not a finite number"),
         (changed("tau_b", 10, 1e282), "line 12, column tau_b: is beyond 1e\\+06, which no robot reaches"),
@@ -208,6 +208,7 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
     assert np.array_equal(read.time, np.delete(signals["time"], sorted(bad)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -228,6 +229,25 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
         ("2026-03-02T08:00:00", '"monday"', "started should be a TOML date"),
         ("weight = 12.5", 'power_at = "moon"', "use mains or dc_bus"),
         ("[[run]]", "[[walk]]", r"\[\[run\]\] is missing"),
+        (
+            "gear_ratio",
+            "gear_ration",
+            r"\[robot.joint.a\] gear_ration is no key of the log format; did you mean gear_r",
+        ),
+        (
+            "gear_ratio",
+            "colour",
+            r"\[robot.joint.a\] colour is no key .*; it may have gear_ratio, rotor_inertia, torque",
+        ),
+        ("payload_mass", "payload_mas", r"\[\[run\]\] 1 payload_mas is no key .*; did you mean payload_mass\?"),
+        ("payload_mass", "payload", r"\[\[run\]\] 1 payload is no key .*; did you mean payload_mass\?"),
+        ('role = "reference"', 'roles = "reference"', r"\[\[run\]\] 2 roles is no key .*; did you mean role\?"),
+        (
+            "[robot]",
+            '[twin]\neffect = ["rigid_body"]\n[robot]',
+            r"\[twin\] effect is no key .*; did you mean effects\?",
+        ),
+        ("[robot]", "[twins]\n[robot]", "dataset.toml: twins is no key .*; did you mean twin\\?"),
     ],
 )
 def test_faults_of_the_toml_are_named(folder, old, new, message):
@@ -235,6 +255,20 @@ def test_faults_of_the_toml_are_named(folder, old, new, message):
     file.write_text(file.read_text().replace(old, new))
     with pytest.raises(InputError, match=message):
         read_data_set(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("weight =", "wieght =", ["[robot] wieght is kept as a note; did you mean weight?"]),
+        ("weight =", "colour =", []),
+        ("payload_mass =", "shift =", []),
+    ],
+)
+def test_what_the_log_format_does_not_know_is_a_note(folder, old, new, said):
+    file = folder / "dataset.toml"
+    file.write_text(file.read_text().replace(old, new))
+    assert read_data_set(folder).repairs == tuple(f"{file}: {line}" for line in said)
 
 
 def test_a_folder_without_a_data_set(tmp_path):

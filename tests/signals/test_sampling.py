@@ -15,9 +15,9 @@ from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
 from irtwin.gap.predict import predict
+from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import Run, read_data_set
-from irtwin.signals.samples import Signals
 from irtwin.signals.sampling import as_sampled, interval
 from irtwin.twin.identify import identify
 
@@ -98,6 +98,7 @@ def test_the_median_of_bursts_is_not_the_interval():
     assert as_sampled(signals(time), FILE)[1] == []
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.lists(st.floats(1e-6, 1e9), min_size=19, max_size=200))
 def test_no_times_ask_for_many_more_rows_than_there_are_samples(gaps):

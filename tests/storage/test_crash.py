@@ -12,6 +12,8 @@ from tests.storage.test_database import populate, state
 
 from irtwin.storage.database import Workspace
 
+pytestmark = pytest.mark.slow
+
 # Each kills the process at one step of taking in a changed data set.
 KILLED = """
 import os, signal, sys

@@ -10,6 +10,7 @@ from irtwin.errors import InputError
 from irtwin.storage import engine
 
 
+@pytest.mark.slow
 def test_a_password_never_shows() -> None:
     with pytest.raises(InputError) as caught:
         engine.open_engine("postgresql://me:secret@127.0.0.1:1/none?connect_timeout=2")

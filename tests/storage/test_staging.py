@@ -46,6 +46,7 @@ def test_what_is_made_apart_takes_its_place(workspace: Workspace) -> None:
     assert not list(workspace.folder.glob(".staged-*"))
 
 
+@pytest.mark.slow
 def test_what_was_there_is_worked_on_apart(workspace: Workspace) -> None:
     populate(workspace)
     before = state(workspace)
@@ -101,6 +102,7 @@ def test_a_damaged_series_is_set_right_by_its_data_set(workspace: Workspace, dam
     assert workspace.read_series(WORK).equals(rows.samples(1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["apart", "_link", "insert_values"])
 def test_a_kill_leaves_the_earlier_state(tmp_path: Path, point: str) -> None:
     with Workspace(tmp_path) as place:

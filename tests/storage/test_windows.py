@@ -17,6 +17,8 @@ from irtwin.storage import summary, windows
 from irtwin.storage.series import write_series
 from irtwin.storage.windows import SeriesWindows
 
+pytestmark = pytest.mark.slow
+
 Known = tuple[SeriesWindows, np.ndarray]  # a series and its samples of power, (N,)
 
 RNG = np.random.default_rng(3)

@@ -19,7 +19,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Joint
 
 pytestmark = pytest.mark.system
-QUESTIONS = ("why_more_energy", "where_is_the_gap", "what_to_do", "gap_shrinkage", "not_testable")
+QUESTIONS = ("why_more_energy", "where_is_the_gap", "what_to_do", "gap_shrinkage", "not_testable", "next_experiment")
 MAPPINGS = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
 
 
@@ -37,7 +37,7 @@ def fill(workspace: Workspace, verdict: str) -> None:
     ]
     runs = [rows.run(name) for name in gap_cases.RUNS]
     workspace.ingest(rows.robot(), joints, runs, {run.run_id: rows.samples(1) for run in runs})
-    record(workspace, rows.ROBOT, gap_cases.diagnosis(verdict), gap_cases.evidence(verdict), "{}")
+    record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
 
 
 def test_postgresql_answers_as_sqlite_does(tmp_path, new_postgresql_database):

@@ -67,6 +67,7 @@ def test_through_the_whole_chain_from_positions_alone():
     assert 1 < twin.condition_number < 100
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth():
     robot = arm(3)
     true = truth(robot)
@@ -121,6 +122,7 @@ def test_torque_constants_come_from_the_balance_of_power():
     assert fit.r_squared.min() > 0.98  # torque is judged by current times constant
 
 
+@pytest.mark.slow
 def test_torque_can_be_found_through_power_alone():
     robot = arm(3)
     motions = [

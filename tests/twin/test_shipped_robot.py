@@ -28,6 +28,7 @@ def fits(tmp_path_factory):
     return validate(identify(data_set.robot, parts.fit, data_set.effects), parts.held_out)
 
 
+@pytest.mark.slow
 def test_energy_of_runs_held_out_is_closer_than_the_seed_papers(fits):
     assert len(fits) >= 4
     assert max(fit.energy_error for fit in fits) < 6.54  # % (Yan 2018, eq. 15)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from irtwin.robot.description import Joint, Robot
+from irtwin.signals.channels import CHANNELS
 from irtwin.signals.motion import Motion
 
 Known = Mapping[tuple[str, str | None, str], float]
@@ -268,7 +269,7 @@ def size(values: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
 
 def force_unit(joint: Joint) -> str:
     """Return the unit of the joint's effort: "N m", or "N" where it slides."""
-    return "N" if joint.kind == "prismatic" else "N m"
+    return CHANNELS["torque"].unit_of(joint.kind)
 
 
 def inertia_unit(joint: Joint) -> str:

@@ -107,7 +107,7 @@ class Stack:
         shape = (16, len(self.robot.joints))
         q, dq, ddq = rng.uniform(-2, 2, (3, *shape))
         warm = np.full(shape, 50.0)
-        probe = Motion("probe", np.arange(16.0), q, dq, ddq, temperature=warm)
+        probe = Motion(np.arange(16.0), q, dq, ddq, run="probe", temperature=warm)
         predicted = Predicted(rng.uniform(-50, 50, shape))
         found = [
             np.array([[term.joint == name for term in effect.terms(self.robot)] for name in self.robot.joint_names])
@@ -178,16 +178,6 @@ class Stack:
             for effect in self._power
         ]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
-
-    def predicted(self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None = None) -> Predicted:
-        """Return what all the effects predict over the motion's whole run: what a further effect is built on."""
-        whole = motion.whole or motion
-        torque = self.real_torque(whole, torque_values)
-        values = self._expected(self.power_terms) if power_values is None else power_values
-        columns = self.predicted_power_columns(whole, torque_values, values)
-        axes = np.array([_on_the_bus(effect, term) for effect, term in self.power_terms], dtype=bool)
-        power = columns @ values
-        return Predicted(torque, power, columns[:, axes] @ values[axes], self.bodies(whole, torque_values))
 
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""

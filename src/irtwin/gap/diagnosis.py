@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,15 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.gap import document
+from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
+from irtwin.gap.document.cause_ids import cause_ids
+from irtwin.gap.document.curves import Curves
+from irtwin.gap.document.document import Closeable, Document
+from irtwin.gap.document.experiment import Experiment
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
@@ -48,7 +53,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis; `to_json` has the form of `diagnosis.schema.json`; `evidence` holds what a page draws."""
+    """The diagnosis: its `document`, what that stands on, and the `curves` that a page draws."""
 
     description: Robot
     verdict: str
@@ -57,14 +62,14 @@ class Diagnosis:
     locations: tuple[Location, ...]
     untestable: tuple[Untestable, ...]
     runs: tuple[str, ...]
+    curves: Curves
     seed: int = 0
-    experiment: dict[str, Any] | None = None
-    evidence: dict[str, Any] = field(default_factory=dict)
+    experiment: Experiment | None = None
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
     against: str | None = None  # the role of the runs that the observed ones are held against
     thresholds: Thresholds = DEFAULT
-    yardstick: dict[str, Any] = field(default_factory=dict)  # each channel's, what could be closed at all
+    yardstick: dict[str, Closeable] = field(default_factory=dict)  # each channel's, what could be closed at all
 
     @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
@@ -72,25 +77,34 @@ class Diagnosis:
         pairs = [(finding, cause) for finding in self.channels for cause in finding.causes]
         return tuple(sorted(pairs, key=lambda pair: -pair[1].gain))
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the diagnosis in the form of its schema."""
+    @cached_property
+    def document(self) -> Document:
+        """The diagnosis as it is handed out: in JSON, in the graph, on a page."""
         robot, gains = self.description, [cause.gain for _, cause in self.causes]
-        return {
-            "verdict": self.verdict,
-            "robot": robot.name,
-            "gap": document.gap(robot.joint_names, self.channels, self.energies),
-            "locations": [location.to_json() for location in self.locations],
-            "causes": [
-                document.cause(robot, finding, cause, gains, self.verdict, self.thresholds.confidence)
-                for finding, cause in self.causes
-            ],
-            "not_testable": [{"effect": one.effect, "why": one.why} for one in self.untestable],
-            "shrink": {
-                **document.shrink(robot, self.runs, self.channels, self.floor, self.energies, self.seed),
-                "yardstick": self.yardstick,
-            },
-            "next_experiment": self.experiment,
-        }
+        acted_on = [(cause.effect, writing.acted_on(robot, cause)) for _, cause in self.causes]
+        ids = cause_ids(acted_on, robot.joint_names)
+        named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
+        return Document(
+            verdict=self.verdict,
+            robot=robot.name,
+            gap=writing.gap(robot.joint_names, self.channels, self.energies),
+            locations=tuple(map(writing.location, self.locations)),
+            causes=tuple(writing.cause(robot, *one, gains, self.verdict, self.thresholds.confidence) for one in named),
+            not_testable=tuple(map(writing.untestable, self.untestable)),
+            shrink=writing.shrink(
+                robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
+            ),
+            next_experiment=self.experiment,
+        )
+
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """The curves as JSON."""
+        return self.curves.to_json()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the document in the form of its schema, `irtwin.gap.document.document.schema()`."""
+        return self.document.to_json()
 
 
 @one_blas_thread()
@@ -159,8 +173,8 @@ def diagnose(
         untestable=tuple(lacking),
         runs=tuple(sorted(case.observed)),
         seed=seed,
-        experiment=None if proposal is None else proposal.to_json(),
-        evidence={**drawn(left, located), "experiment": None if proposal is None else proposal.curve},
+        experiment=None if proposal is None else proposal.experiment,
+        curves=drawn(left, located, None if proposal is None else proposal.curve),
         twin=closed_twin(case, causes),
         energies=energies,
         against=case.against,

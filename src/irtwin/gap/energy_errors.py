@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from irtwin.gap.document.document import Change
 from irtwin.gap.isolation.finding import Finding
 from irtwin.signals.motion import Motion
 
@@ -26,18 +26,13 @@ class EnergyErrors:
         """Over groups, before and after."""
         return float(self.before.mean()), float(self.after.mean())
 
-    def to_json(self, seed: int) -> dict[str, Any]:
-        """Return the change in the form of the schema."""
+    def change(self, seed: int) -> Change:
+        """Return the change, with its 95 % interval over groups."""
         generator = np.random.default_rng(seed)
         drawn = [generator.choice(self.after, len(self.after)).mean() for _ in range(_RESAMPLED)]
         low, high = np.quantile(drawn, [0.025, 0.975])
         before, after = self.mean
-        return {
-            "before": before,
-            "after": after,
-            "noise_floor": None,
-            "interval95_after": [float(low), float(high)],
-        }
+        return Change(before=before, after=after, noise_floor=None, interval95_after=(float(low), float(high)))
 
 
 def energy_errors(finding: Finding, motions: Sequence[Motion]) -> EnergyErrors:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from irtwin.signals.channels import CHANNELS
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import Run, payload_told
 from irtwin.signals.samples import read_signals
@@ -56,7 +57,7 @@ def _piece(twin: Twin, run: Run, logged: np.ndarray) -> pa.Table:
     time = logged[(logged >= motion.time[0]) & (logged < motion.time[-1] + beyond)]
     columns = {"time": time}
     for joint, values in zip(twin.robot.joint_names, twin.torque(motion).T, strict=True):
-        columns[f"tau_{joint}"] = np.interp(time, motion.time, values)
+        columns[CHANNELS["torque"].column(joint)] = np.interp(time, motion.time, values)
     if any(effect.channel == "power" for effect, _ in twin.stack.power_terms):
-        columns["power"] = np.interp(time, motion.time, twin.power(motion))
+        columns[CHANNELS["power"].prefix] = np.interp(time, motion.time, twin.power(motion))
     return pa.table(columns)

@@ -263,7 +263,7 @@ class Regimes:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class NextExperiment:
     """Which experiment is proposed."""
 
     enough: float = _threshold(5.0, "separation that answers a question", "standard deviations", _JUDGEMENT)
@@ -299,7 +299,7 @@ class Thresholds:
     confidence: Confidence = Confidence()
     places: Places = Places()
     regimes: Regimes = Regimes()
-    experiment: Experiment = Experiment()
+    experiment: NextExperiment = NextExperiment()
 
     def changed(self, name: str, value: float) -> Thresholds:
         """Return them with another value of "group.threshold"; InputError on a name that there is not."""

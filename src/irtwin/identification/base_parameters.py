@@ -47,9 +47,8 @@ def base_parameters(stack: Stack) -> BaseParameters:
     rng = np.random.default_rng(0)
     n = len(robot.joints)
     speeds = rng.uniform(-2, 2, (_STATES, n))
-    states = Motion(
-        "random", np.arange(float(_STATES)), rng.uniform(-3, 3, (_STATES, n)), speeds, rng.uniform(-5, 5, (_STATES, n))
-    )
+    positions, accelerations = rng.uniform(-3, 3, (_STATES, n)), rng.uniform(-5, 5, (_STATES, n))
+    states = Motion(np.arange(float(_STATES)), positions, speeds, accelerations, run="random")
     columns = stack.torque_columns(states).reshape(_STATES * n, len(terms))
     order = sorted(range(len(terms)), key=lambda k: _rank(terms[k], robot.joint_names))
     norms = np.linalg.norm(columns, axis=0)

@@ -19,6 +19,7 @@ from irtwin.identification.fourier_series import FourierSeries, RestSeries, betw
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
+from irtwin.signals.channels import Signals, columns_of
 
 Progress = Callable[[int, float, float], None]
 """Called with the iteration, the best condition number so far and the seconds since the start."""
@@ -60,13 +61,14 @@ class Excitation:
 
     def write_csv(self, path: Path) -> None:
         """Write columns time, q_J, dq_J, ddq_J (s, rad, rad/s, rad/s^2) for each joint J. Raises InputError."""
-        header = ["time", *(f"{kind}_{name}" for kind in ("q", "dq", "ddq") for name in self.joint_names)]
+        time, q, dq, ddq = self.sample()
+        columns = columns_of(Signals(time, q, dq=dq, ddq=ddq), self.joint_names)
         part = path.with_name(path.name + ".part")
         try:
             with part.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(header)
-                writer.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(self.sample()))
+                writer.writerow(columns)
+                writer.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(list(columns.values())))
             part.replace(path)
         except OSError as error:
             raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error

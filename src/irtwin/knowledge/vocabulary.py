@@ -5,12 +5,11 @@ What the terms mean stands in `ontology/`; a test holds every term that the code
 
 from __future__ import annotations
 
-from urllib.parse import quote
-
 ONTOLOGY = "https://w3id.org/irtwin"
 IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
+REASONER = f"{ONTOLOGY}/reasoner/"
 SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
 ID = f"{ONTOLOGY}/id/"
 
@@ -28,6 +27,7 @@ PREFIXES = {
     "irt": IRT,
     "effect": EFFECT,
     "provider": PROVIDER,
+    "reasoner": REASONER,
     "series": SERIES,
     "id": ID,
     "rdf": RDF,
@@ -57,11 +57,6 @@ GRAPH_CHANGED = f"{GRAPH}changed"  # individuals that are to be reasoned over or
 def term(name: str) -> str:
     """Return the IRI of a class or property of the model: `term("Industrial_Robot")`."""
     return IRT + name
-
-
-def individual(kind: str, *parts: str) -> str:
-    """Return the IRI of an individual: `individual("joint", "UR10", "elbow")` ends in `id/joint/UR10/elbow`."""
-    return ID + "/".join(quote(part, safe="") for part in (kind, *parts))
 
 
 def shorten(iri: str) -> str:

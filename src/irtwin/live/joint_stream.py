@@ -5,7 +5,7 @@
 
 `robot` is its name, or its identifier; `time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must,
 the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg,
-counts where a run begins.
+counts where a run begins. The keys of values are those of the table of channels.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO, TypeGuard, cast
 
 from irtwin.errors import InputError
-from irtwin.signals.samples import REACH
+from irtwin.signals.channels import CHANNELS, REQUIRED, Channel
 
 LONGEST_LINE = 1 << 16  # bytes
-_PER_JOINT = ("velocity", "effort", "temperature")
 _HTTP = re.compile(rb"[A-Z]+ \S+ HTTP/\d")  # its first line
+STREAMED = {field: channel for field, channel in CHANNELS.items() if channel.streamed is not None}
+_PLACES = {field: place for place, field in enumerate(STREAMED)}
 # of magnitude; neither NaN nor infinite, nor an integer beyond a float
-_GREATEST = {name: REACH[kind] for name, kind in (("position", "q"), ("velocity", "dq"), ("effort", "tau"))}
-_GREATEST |= {"temperature": REACH["temp"], "power": REACH["power"], "payload": 1e6, "time": 1e300}
+_GREATEST = {str(channel.streamed): channel.greatest for channel in STREAMED.values()} | {"payload": 1e6, "time": 1e300}
 _LATEST = 253402300799.0  # s: the end of the year 9999
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """The joints of a robot at one moment: `time` in s since 1970, NaN for what was not said; payload None likewise.
+    """A robot at one moment: `time` in s since 1970; `values` of each streamed channel, in the order of `STREAMED`.
 
-    position rad, velocity rad/s, effort N m, temperature degC, each (n,); power W; payload kg.
+    A channel has a value for each joint, or one; NaN for what was not said. payload kg, None where it was not said.
     """
 
     robot_id: str
     time: float
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
-    temperature: tuple[float, ...]
-    power: float
+    values: tuple[tuple[float, ...], ...]
     payload: float | None = None
+
+    def of(self, field: str) -> tuple[float, ...]:
+        """Return the values of a channel, by its field of `Signals`."""
+        return self.values[_PLACES[field]]
 
 
 class StateReader:
@@ -85,13 +85,11 @@ class StateReader:
         time = _number(said, "time")
         if not 0.0 <= time <= _LATEST:
             raise InputError("`time` is not a time in s since 1970")
-        velocity, effort, temperature = (_numbers(said, name, order) for name in _PER_JOINT)
-        if "position" not in said:
-            raise InputError("`position` is missing")
-        power = _number(said, "power") if "power" in said else math.nan
+        for field in REQUIRED:
+            if field in STREAMED and STREAMED[field].streamed not in said:
+                raise InputError(f"`{STREAMED[field].streamed}` is missing")
         payload = _number(said, "payload") if "payload" in said else None
-        position = _numbers(said, "position", order)
-        return State(robot, time, position, velocity, effort, temperature, power, payload)
+        return State(robot, time, tuple([_values(said, channel, order) for channel in STREAMED.values()]), payload)
 
     @property
     def _known(self) -> str:
@@ -181,9 +179,12 @@ def _is_number(value: Any, most: float) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and -most <= value <= most
 
 
-def _numbers(said: Mapping[str, Any], name: str, order: Sequence[int]) -> tuple[float, ...]:
+def _values(said: Mapping[str, Any], channel: Channel, order: Sequence[int]) -> tuple[float, ...]:
+    name = str(channel.streamed)
     if name not in said:
-        return (math.nan,) * len(order)
+        return (math.nan,) * (len(order) if channel.per_joint else 1)
+    if not channel.per_joint:
+        return (_number(said, name),)
     values = said[name]
     most = _GREATEST[name]
     if not isinstance(values, list) or len(values) != len(order) or not all(_is_number(it, most) for it in values):

@@ -7,18 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from irtwin.live.joint_stream import State
+from irtwin.live.joint_stream import STREAMED, State
 from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
+from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.storage.journal import Header, Rows
 from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunState
 
-PREFIXES = ("q", "dq", "tau", "temp")  # of the columns for a State's values of each joint, as in a log
 _MADE: dict[str, type[Base]] = {"run_state": RunState, "joint_state": JointState, "live_state": LiveState}
 Values = dict[str, Any]
 Tables = dict[str, list[Values]]  # table -> rows, by column
@@ -38,20 +39,20 @@ class Newest:
 
 def columns(joints: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of a journal."""
-    return ("time", *(f"{prefix}_{joint}" for prefix in PREFIXES for joint in joints), "power")
+    return ("time", *(column for channel in STREAMED.values() for column in channel.columns(joints)))
 
 
 def journal_rows(states: Sequence[State]) -> Rows:
     """Return states as rows of a journal, (N, columns)."""
-    return np.array([(s.time, *s.position, *s.velocity, *s.effort, *s.temperature, s.power) for s in states])
+    return np.array([(state.time, *chain.from_iterable(state.values)) for state in states])
 
 
 def speed_of(state: State, before: State) -> Sequence[float]:
     """Return the speed that a state says, else the one by which its position differs from the state before."""
-    if not math.isnan(state.velocity[0]):
-        return state.velocity
+    if not math.isnan(state.of("dq")[0]):
+        return state.of("dq")
     step = state.time - before.time
-    return [(now - was) / step for now, was in zip(state.position, before.position, strict=True)]
+    return [(now - was) / step for now, was in zip(state.of("q"), before.of("q"), strict=True)]
 
 
 def moving(speed: Sequence[float], fastest: Sequence[float]) -> bool:
@@ -95,16 +96,17 @@ def rows(
 
 def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa.Table]:
     """Return the rows of a run that is over, and its series: a channel that was never said is left out."""
-    joints = [name.removeprefix("q_") for name in header.columns if name.startswith("q_")]
-    by_prefix = dict(zip(PREFIXES, np.split(samples[:, 1:-1], len(PREFIXES), axis=1), strict=True))
-    time, began = samples[:, 0], float(samples[0, 0])
-    speed = _speeds(time, by_prefix)
+    prefix = f"{CHANNELS['q'].prefix}_"
+    joints = [name.removeprefix(prefix) for name in header.columns if name.startswith(prefix)]
+    columns = dict(zip(header.columns, samples.T, strict=True))
+    signals = from_columns(columns, joints)
+    time, began = signals.time, float(signals.time[0])
+    speed = _speeds(signals)
     size = np.nan_to_num(np.abs(speed))
     still = size < np.maximum(STILL_SPEED, STILL_SHARE * size.max(axis=0))
     acceleration = np.diff(speed, axis=0, prepend=np.nan)[-1] / np.diff(time, prepend=np.nan)[-1]
-    torque, temperature = by_prefix["tau"][-1].tolist(), by_prefix["temp"][-1].tolist()
-    last = by_prefix["q"][-1].tolist(), speed[-1].tolist(), acceleration.tolist()
-    at = Newest(float(time[-1]), *last, torque, temperature)
+    last = (signals.q[-1], speed[-1], acceleration, _last(signals, "torque"), _last(signals, "temperature"))
+    at = Newest(float(time[-1]), *(values.tolist() for values in last))
     idle = still.all(axis=1)
     tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
     length = at.time - began
@@ -112,7 +114,7 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
     tables["run"][0] |= {f"payload_com_{axis}_m": 0.0 for axis in "xyz"}
     tables["activity"][0] |= {"ended": _moment(at.time)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
-    table = {"time": time - began, **dict(zip(header.columns[1:], samples.T[1:], strict=True))}
+    table = columns | {"time": time - began}
     return tables, pa.table({name: values for name, values in table.items() if not np.isnan(values).all()})
 
 
@@ -122,10 +124,16 @@ def records(tables: Tables) -> tuple[Run, Activity, list[Base]]:
     return Run(**tables["run"][0]), Activity(**tables["activity"][0]), made
 
 
-def _speeds(time: Rows, by_prefix: dict[str, Rows]) -> Rows:
+def _speeds(signals: Signals) -> Rows:
     """Return the speeds that were said, else those by which positions differ, (N, n); NaN at the first then."""
-    steps = np.diff(by_prefix["q"], axis=0, prepend=np.nan) / np.diff(time, prepend=np.nan)[:, None]
-    return np.where(np.isnan(by_prefix["dq"]), steps, by_prefix["dq"])
+    steps = np.diff(signals.q, axis=0, prepend=np.nan) / np.diff(signals.time, prepend=np.nan)[:, None]
+    return steps if signals.dq is None else np.where(np.isnan(signals.dq), steps, signals.dq)
+
+
+def _last(signals: Signals, field: str) -> Rows:
+    """Return a channel's last values, (n,); NaN where it was never said."""
+    values = getattr(signals, field)
+    return np.full(signals.q.shape[1], np.nan) if values is None else values[-1]
 
 
 def _joint_states(robot_id: str, joints: Sequence[str], at: Newest) -> list[Values]:

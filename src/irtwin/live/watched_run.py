@@ -58,7 +58,7 @@ class WatchedRun:
         """Take the next state, of a later time than the one before."""
         before, speed_before = self.newest, self.speed
         if before is None:
-            self.began, self.speed, self.acceleration = state.time, state.velocity, (math.nan,) * len(self.joints)
+            self.began, self.speed, self.acceleration = state.time, state.of("dq"), (math.nan,) * len(self.joints)
         else:
             step = state.time - before.time
             self.speed = live_run.speed_of(state, before)
@@ -72,7 +72,9 @@ class WatchedRun:
         """Return the rows of the run as it is now."""
         now = self.newest
         assert now is not None
-        at = live_run.Newest(now.time, now.position, self.speed, self.acceleration, now.effort, now.temperature)
+        at = live_run.Newest(
+            now.time, now.of("q"), self.speed, self.acceleration, now.of("torque"), now.of("temperature")
+        )
         current = "moving" if live_run.moving(self.speed, self.fastest) else "standstill"
         return live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
 

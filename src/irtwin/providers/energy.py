@@ -10,9 +10,10 @@ from scipy.integrate import cumulative_trapezoid
 from sqlalchemy import select
 
 from irtwin.identification.validation import APART
+from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import load_robot, load_run, run_iri, twin_iri
-from irtwin.signals.conditioning import condition
+from irtwin.providers.records import run_iri, twin_iri
+from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
@@ -30,8 +31,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         role = session.get_one(schema.TwinRun, (row.twin_id, run_id))
     document = workspace.read_document(row.file, row.sha256).decode()
     twin = from_json(document, inside(workspace.folder, row.file))
-    robot = load_robot(workspace, robot_id)
-    motion = condition(load_run(workspace, robot, run_id), robot, twin.cutoff)
+    motion = robot_motions(workspace, robot_id).motions[run_id]
     ledger = twin.ledger(motion)
     return Made(
         robot_id=robot_id,
@@ -71,16 +71,15 @@ def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
     Columns: time, held_out, q_J, tau_J, tau_J_model, power, power_model, energy, energy_model; those that nothing
     measured are left out. Energies are cumulative, J.
     """
-    columns: dict[str, np.ndarray] = {"time": motion.time, "held_out": judged}
     names = twin.robot.joint_names
-    columns |= {f"q_{name}": motion.q[:, place] for place, name in enumerate(names)}
-    measured, torque = twin.measured_torque(motion), twin.torque(motion)
-    if measured is not None:
-        columns |= {f"tau_{name}": measured[:, place] for place, name in enumerate(names)}
-    columns |= {f"tau_{name}_model": torque[:, place] for place, name in enumerate(names)}
+    measured = Signals(motion.time, motion.q, torque=twin.measured_torque(motion))
+    columns = {"time": motion.time, "held_out": judged, **columns_of(measured, names)}
+    columns |= {
+        f"{CHANNELS['torque'].column(name)}_model": of for name, of in zip(names, twin.torque(motion).T, strict=True)
+    }
     for suffix, power in (("", motion.power), ("_model", twin.power(motion))):
         if power is not None:
-            columns[f"power{suffix}"] = power
+            columns[f"{CHANNELS['power'].prefix}{suffix}"] = power
             columns[f"energy{suffix}"] = cumulative_trapezoid(power, motion.time, initial=0.0)
     return pa.table(columns)
 

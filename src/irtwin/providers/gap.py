@@ -5,66 +5,46 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from typing import Any
 
 from sqlalchemy import select
 
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
+from irtwin.gap.document.document import Document
 from irtwin.identification.validation import split
+from irtwin.providers import gap_rows
+from irtwin.providers.gap_rows import Place
 from irtwin.providers.identification import twin_made
+from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import identifier, load_robot, load_run, robot_iri, run_iri
-from irtwin.signals.conditioning import condition
+from irtwin.providers.records import identifier, robot_iri, run_iri
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.files import inside
-from irtwin.storage.schema import Base
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
 
-Json = Mapping[str, Any]
-
-_UNITS = {"torque_rmse": "N m", "power_rmse": "W", "energy_error_percent": "%"}
-
 
 def record(
-    workspace: Workspace, robot_id: str, diagnosis: Json, evidence: Json, twin: str | None = None
+    workspace: Workspace, robot_id: str, diagnosis: Document, curves: Curves, twin: str | None = None
 ) -> gap_schema.GapDiagnosis:
     """Keep a robot's diagnosis, in place of an earlier one; return its row.
 
-    diagnosis: as the contract's schema says; evidence: the arrays of its curves (JSON); twin: text of the twin with
-    the causes added, which `adopt` makes the robot's. Raises InputError where the workspace lacks the robot, or a
-    run or joint that the diagnosis names.
+    curves: what a page draws of it; twin: text of the twin with the causes added, which `adopt` makes the robot's.
+    Raises InputError where the workspace lacks the robot, or a run or joint that the diagnosis names.
     """
     started = datetime.now(UTC)
     runs = _run_ids(workspace, robot_id)
-    _check_joints(workspace, robot_id, diagnosis)
-    row, documents = _row(robot_id, diagnosis, evidence, twin)
-    rows = [
-        row,
-        *_sizes(row.diagnosis_id, robot_id, diagnosis["gap"]),
-        *_locations(row.diagnosis_id, robot_id, diagnosis["locations"], runs),
-        *_causes(row.diagnosis_id, robot_id, diagnosis["causes"]),
-        *_changes(row.diagnosis_id, diagnosis),
-        *_shrinkage(row.diagnosis_id, diagnosis["shrink"].get("closed_fraction")),
-        *(
-            gap_schema.GapHeldOut(diagnosis_id=row.diagnosis_id, run_id=_run_id(runs, name))
-            for name in dict.fromkeys(diagnosis["shrink"].get("held_out_runs") or [])
-        ),
-        *(
-            gap_schema.GapNotTestable(
-                diagnosis_id=row.diagnosis_id, number=number, effect=item["effect"], why=item["why"]
-            )
-            for number, item in enumerate(diagnosis["not_testable"], start=1)
-        ),
-    ]
-    if diagnosis.get("next_experiment"):
-        described = _text(diagnosis["next_experiment"])
-        rows.append(gap_schema.GapExperiment(diagnosis_id=row.diagnosis_id, description=described))
+    linear = _linear_joints(workspace, robot_id, diagnosis)
+    row, documents = _row(robot_id, diagnosis, curves, twin)
+    at = Place(row.diagnosis_id, robot_id, partial(_run_id, runs), linear)
+    rows = [row, *gap_rows.rows(diagnosis, at)]
     made = Made(robot_id, [run_iri(run_id) for run_id in runs.values()], rows, documents=documents)
     diagnosis_id = row.diagnosis_id
     _keep(workspace, "diagnosis", made, started)
@@ -92,15 +72,10 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
         )
     text = workspace.read_document(found.twin_file, found.twin_sha256).decode()
     twin = from_json(text, inside(workspace.folder, found.twin_file))
-    robot = load_robot(workspace, robot_id)
-    keys = _run_ids(workspace, robot_id)
-    runs = {run_id: load_run(workspace, robot, run_id) for run_id in keys.values()}
-    runs = dict(sorted(runs.items(), key=lambda item: (item[1].started, item[0])))  # as every twin's are split
-    motions = [condition(run, robot, twin.cutoff) for run in runs.values() if run.name in twin.fitted]
-    parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
+    known = robot_motions(workspace, robot_id)
+    parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
-    by_name = {run.name: run_id for run_id, run in runs.items()}
-    made = twin_made(robot_id, identify(robot, parts.fit, twin.effects), by_name, parts)
+    made = twin_made(robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts)
     used = [*made.used, f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")
@@ -137,32 +112,37 @@ def _run_id(runs: Mapping[str, str], name: str) -> str:
     return runs[identifier(name)]
 
 
-def _check_joints(workspace: Workspace, robot_id: str, diagnosis: Json) -> None:
+def _linear_joints(workspace: Workspace, robot_id: str, said: Document) -> frozenset[str]:
+    """Return the robot's prismatic joints; InputError where it lacks a joint that the diagnosis names."""
     with workspace.reading() as session:
-        known = set(session.scalars(select(schema.Joint.name).where(schema.Joint.robot_id == robot_id)))
-    named = {*(diagnosis["gap"].get("torque") or {})}
-    named |= {location["joint"] for location in diagnosis["locations"] if location.get("joint")}
-    named |= {joint for cause in diagnosis["causes"] for joint in cause["joints"]}
-    if named - known:
+        of_robot = select(schema.Joint.name, schema.Joint.kind).where(schema.Joint.robot_id == robot_id)
+        known = {name: kind for name, kind in session.execute(of_robot)}
+    named = {*(said.gap.torque or ())}
+    named |= {location.joint for location in said.locations if location.joint}
+    named |= {joint for cause in said.causes for joint in cause.joints}
+    if named - known.keys():
         raise InputError(
-            f"{robot_id} has no joint {', '.join(sorted(named - known))}; diagnose a data set of this robot"
+            f"{robot_id} has no joint {', '.join(sorted(named - known.keys()))}; diagnose a data set of this robot"
         )
+    return frozenset(name for name, kind in known.items() if kind == "prismatic")
 
 
 def _row(
-    robot_id: str, diagnosis: Json, evidence: Json, twin: str | None
+    robot_id: str, said: Document, curves: Curves, twin: str | None
 ) -> tuple[gap_schema.GapDiagnosis, dict[str, bytes]]:
-    texts = {"": _text(diagnosis), ".evidence": _text(evidence)} | ({} if twin is None else {".twin": twin})
+    texts = {"": _text(said.to_json()), ".evidence": _text(curves.to_json())}
+    if twin is not None:
+        texts[".twin"] = twin
     sums = {kind: hashlib.sha256(text.encode()).hexdigest() for kind, text in texts.items()}
     diagnosis_id = f"{robot_id}.{sums[''][:12]}"
     files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}.json" for kind in texts}
     row = gap_schema.GapDiagnosis(
         diagnosis_id=diagnosis_id,
         robot_id=robot_id,
-        verdict=diagnosis["verdict"],
+        verdict=said.verdict,
         created=datetime.now(UTC),
-        energy_error_percent=diagnosis["gap"].get("energy_error_percent"),
-        noise_floor_from=diagnosis["shrink"].get("noise_floor_from"),
+        energy_error_percent=said.gap.energy_error_percent,
+        noise_floor_from=said.shrink.noise_floor_from,
         file=files[""],
         sha256=sums[""],
         evidence_file=files[".evidence"],
@@ -184,117 +164,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _finite(one) for key, one in value.items()}
     return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
-
-
-def _sizes(diagnosis_id: str, robot_id: str, gap: Json) -> Iterator[Base]:
-    sizes: list[tuple[str, str | None, Json]] = [
-        ("torque", joint, of) for joint, of in (gap.get("torque") or {}).items()
-    ]
-    if (gap.get("power") or {}).get("rmse") is not None:
-        sizes.append(("power", None, gap["power"]))
-    for channel, joint, size in sizes:
-        yield gap_schema.GapSize(
-            diagnosis_id=diagnosis_id,
-            channel=channel,
-            place=joint or "robot",
-            joint=joint,
-            robot_id=robot_id,
-            rmse=size["rmse"],
-            noise_floor=size.get("noise_floor"),
-            excess=size.get("excess"),
-            unit="N m" if channel == "torque" else "W",
-        )
-
-
-def _locations(diagnosis_id: str, robot_id: str, locations: Sequence[Json], runs: Mapping[str, str]) -> Iterator[Base]:
-    for rank, location in enumerate(locations, start=1):
-        yield gap_schema.GapLocation(
-            diagnosis_id=diagnosis_id,
-            rank=rank,
-            robot_id=robot_id,
-            channel=location["channel"],
-            joint=location.get("joint"),
-            regime=location.get("regime"),
-            follows=location.get("follows"),
-            share=location["share"],
-        )
-        for name in dict.fromkeys(location.get("runs") or []):
-            yield gap_schema.GapLocationRun(diagnosis_id=diagnosis_id, rank=rank, run_id=_run_id(runs, name))
-
-
-def _causes(diagnosis_id: str, robot_id: str, causes: Sequence[Json]) -> Iterator[Base]:
-    for rank, cause in enumerate(causes, start=1):
-        yield gap_schema.GapCause(
-            diagnosis_id=diagnosis_id,
-            rank=rank,
-            robot_id=robot_id,
-            effect=cause["effect"],
-            scope=cause["scope"],
-            confidence=cause["confidence"],
-            evidence=_text(cause.get("evidence") or {}),
-        )
-        for joint in dict.fromkeys(cause["joints"]):
-            yield gap_schema.GapCauseJoint(diagnosis_id=diagnosis_id, rank=rank, joint=joint, robot_id=robot_id)
-        for rival in dict.fromkeys(cause["indistinguishable_from"]):
-            yield gap_schema.GapCauseRival(diagnosis_id=diagnosis_id, rank=rank, effect=rival)
-        for number, parameter in enumerate(cause["parameters"], start=1):
-            lower, upper = parameter["interval95"] or (None, None)
-            yield gap_schema.GapCauseParameter(
-                diagnosis_id=diagnosis_id,
-                rank=rank,
-                number=number,
-                robot_id=robot_id,
-                joint=parameter.get("joint"),
-                name=parameter["name"],
-                value=parameter["value"],
-                unit=parameter["unit"],
-                lower=lower,
-                upper=upper,
-            )
-
-
-def _changes(diagnosis_id: str, diagnosis: Json) -> Iterator[Base]:
-    """What all causes change together; and, where it is said, each alone and all without it."""
-
-    def row(measure: str, part: str, rank: int | None, change: Json) -> Base:
-        lower, upper = change.get("interval95_after") or (None, None)
-        return gap_schema.GapChange(
-            diagnosis_id=diagnosis_id,
-            measure=measure,
-            part=part,
-            place=rank or 0,
-            rank=rank,
-            before=change["before"],
-            after=change["after"],
-            noise_floor=change.get("noise_floor"),
-            lower=lower,
-            upper=upper,
-            unit=_UNITS[measure],
-        )
-
-    shrink = diagnosis["shrink"]
-    for measure in _UNITS:
-        if shrink.get(measure):
-            yield row(measure, "together", None, shrink[measure])
-    ranks = [(rank, cause["effect"], cause["scope"]) for rank, cause in enumerate(diagnosis["causes"], start=1)]
-    for item in shrink.get("by_cause") or []:
-        found = next((one for one in ranks if one[1:] == (item["effect"], item["scope"])), None)
-        if found is None:
-            continue
-        ranks.remove(found)  # the same effect may be a cause again, on another joint
-        for part, key in (("alone", "rmse_alone"), ("without", "rmse_when_left_out")):
-            change = {"before": _pooled(item["rmse_before"]), "after": _pooled(item[key])}
-            yield row(f"{item['channel']}_rmse", part, found[0], change)
-
-
-def _pooled(values: Sequence[float]) -> float:
-    """Return the root of the mean square over joints."""
-    return math.sqrt(sum(value**2 for value in values) / len(values))
-
-
-def _shrinkage(diagnosis_id: str, closed: Json | None) -> Iterator[Base]:
-    if closed:
-        lower, upper = closed.get("interval95") or (None, None)
-        yield gap_schema.GapShrinkage(
-            diagnosis_id=diagnosis_id, closed_fraction=closed["value"], lower=lower, upper=upper
-        )

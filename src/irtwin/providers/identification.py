@@ -8,19 +8,16 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 
-from sqlalchemy import select
-
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
+from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import load_robot, load_run, run_iri
-from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.providers.records import run_iri
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
-from irtwin.storage.schema import LIVE
 from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
@@ -32,20 +29,12 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
 
     A simulator's runs stay apart where the robot's own are there: they say what the simulator does.
     """
-    robot = load_robot(workspace, robot_id)
+    known = robot_motions(workspace, robot_id)
     with workspace.reading() as session:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
-        in_order = select(schema.Run.run_id).order_by(schema.Run.start_time, schema.Run.run_id)
-        taken_in = (schema.Run.robot_id == robot_id, schema.Run.role != LIVE)
-        run_ids = session.scalars(in_order.where(*taken_in)).all()
-    runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
-    own = [run for run in runs.values() if run.role != "simulated"] or list(runs.values())
-    cutoff = choose_cutoff(own)
-    motions = [condition(run, robot, cutoff) for run in own]
-    parts = split(motions, {run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None})
-    twin = identify(robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
-    keys = {run.name: run_id for run_id, run in runs.items()}
-    return twin_made(robot_id, twin, keys, parts)
+    parts = split(known.own, known.repeats)
+    twin = identify(known.robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
+    return twin_made(robot_id, twin, known.keys, parts)
 
 
 def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> Made:

@@ -8,7 +8,6 @@ import json
 import math
 import re
 import unicodedata
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,15 +20,13 @@ from irtwin.errors import InputError
 from irtwin.robot import description
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals import log
-from irtwin.signals.samples import Signals
+from irtwin.signals.channels import columns_of, from_columns
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.schema import Joint, Robot, Run
 
 _INDIVIDUALS = "https://w3id.org/irtwin/id/"
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
 _READABLE = 40  # characters of a name that is not plain
-# signal of a run -> prefix of its columns in the log format
-_PER_JOINT = {"q": "q", "dq": "dq", "ddq": "ddq", "torque": "tau", "current": "i", "temperature": "temp"}
 
 
 def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
@@ -41,7 +38,8 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
     if len(taken) < len(runs):
         raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
     series = {
-        row.run_id: signals_table(run.signals, data_set.robot) for row, run in zip(runs, data_set.runs, strict=True)
+        row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
+        for row, run in zip(runs, data_set.runs, strict=True)
     }
     joints = [_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)]
     return workspace.ingest(_robot_row(robot_id, data_set), joints, runs, series)
@@ -157,38 +155,12 @@ def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log
         repeat_of=None if row.repeat_of is None else row.repeat_of.removeprefix(f"{row.robot_id}."),
         started=row.start_time,
         notes={},
-        signals=table_signals(workspace.read_series(run_id), robot),
+        signals=from_columns(_columns(workspace.read_series(run_id)), robot.joint_names),
     )
 
 
-def signals_table(signals: Signals, robot: description.Robot) -> pa.Table:
-    """Return signals as a table in the log format's columns."""
-    columns: dict[str, np.ndarray] = {"time": signals.time}
-    for name, prefix in _PER_JOINT.items():
-        values = getattr(signals, name)
-        if values is not None:
-            columns |= {f"{prefix}_{joint}": values[:, place] for place, joint in enumerate(robot.joint_names)}
-    if signals.power is not None:
-        columns["power"] = signals.power
-    return pa.table(columns)
-
-
-def table_signals(table: pa.Table, robot: description.Robot) -> Signals:
-    """Return the signals of a table in the log format's columns: the inverse of `signals_table`."""
-
-    def column(name: str) -> np.ndarray | None:
-        return np.array(table.column(name)) if name in table.column_names else None
-
-    def stack(prefix: str) -> np.ndarray | None:
-        columns = [column(f"{prefix}_{joint}") for joint in robot.joint_names]
-        return None if columns[0] is None else np.column_stack(columns)  # type: ignore[arg-type]
-
-    read: Callable[[str], np.ndarray | None] = stack
-    signals = {name: read(prefix) for name, prefix in _PER_JOINT.items() if name != "q"}
-    q, time = stack("q"), column("time")
-    assert q is not None
-    assert time is not None
-    return Signals(time=time, q=q, power=column("power"), **signals)
+def _columns(table: pa.Table) -> dict[str, np.ndarray]:
+    return {name: np.array(table.column(name)) for name in table.column_names}
 
 
 def _robot_row(robot_id: str, data_set: log.DataSet) -> Robot:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import load_robot, load_run, run_iri
-from irtwin.signals.conditioning import condition
+from irtwin.providers.records import run_iri
 from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import JointState, Run, RunState
@@ -19,9 +19,8 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's RunState and the JointState of each joint at its last sample."""
     with workspace.reading() as session:
         robot_id = session.get_one(Run, run_id).robot_id
-    robot = load_robot(workspace, robot_id)
-    run = load_run(workspace, robot, run_id)
-    motion = condition(run, robot)
+    known = robot_motions(workspace, robot_id)
+    motion = known.motions[run_id]
     still = standstill(motion)
     state = RunState(
         run_id=run_id,
@@ -39,7 +38,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
             joint_torque_nm=None if motion.torque is None else float(motion.torque[-1, place]),
             joint_temperature_degc=None if motion.temperature is None else float(motion.temperature[-1, place]),
         )
-        for place, joint in enumerate(robot.joints)
+        for place, joint in enumerate(known.robot.joints)
     ]
     return Made(robot_id, [run_iri(run_id)], [state, *joints])
 

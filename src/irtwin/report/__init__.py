@@ -1,1 +1,1 @@
-"""Pages that open offline, every number of which answers a question put to the graph."""
+"""Pages that open offline. Every number answers a question put to the graph; curves lie in files that it names."""

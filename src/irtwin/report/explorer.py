@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from irtwin.report.energy.sampling import Samples, extremes, pack
 from irtwin.report.questions import Answers, Row
+from irtwin.signals.channels import CHANNELS
 
 ReadSeries = Callable[[str, str], pa.Table]  # path in the workspace, checksum
 
@@ -18,7 +19,7 @@ _POINTS = 2_000  # a curve, more than a screen is wide
 _FEWEST = 300
 _BUDGET = 160_000  # points of all charts of all runs: about 1.3 MB of page
 
-_TORQUE = "tau_"
+_TORQUE, _POWER = CHANNELS["torque"], CHANNELS["power"]
 _MODEL = "_model"
 _HELD_OUT = "held_out"
 
@@ -46,11 +47,11 @@ class Columns:
     @property
     def joints(self) -> tuple[str, ...]:
         """Joints whose torque was modelled, in the order of the columns."""
-        names = self.samples
+        before = _TORQUE.column("")
         return tuple(
-            name.removeprefix(_TORQUE).removesuffix(_MODEL)
-            for name in names
-            if name.startswith(_TORQUE) and name.endswith(_MODEL)
+            name.removeprefix(before).removesuffix(_MODEL)
+            for name in self.samples
+            if name.startswith(before) and name.endswith(_MODEL)
         )
 
 
@@ -68,8 +69,8 @@ def opening_run(answers: Answers) -> Row | None:
 def explorer(answers: Answers, read_series: ReadSeries) -> dict[str, Any] | None:
     """Return the packed curves of every modelled run, None where there is none.
 
-    The charts of a run are its joint torques (N m), power (W) and energy used so far (J), each measured
-    (where it was) and modelled, over the time (s) since the run began.
+    The charts of a run are its joint torques, power and energy used so far, with their units, each measured (where it
+    was) and modelled, over the time (s) since the run began.
     """
     rows = answers["modelled_series"].rows
     if not rows:
@@ -78,30 +79,31 @@ def explorer(answers: Answers, read_series: ReadSeries) -> dict[str, Any] | None
     charts = sum(len(columns.joints) + 2 for _, columns in runs)
     points = int(np.clip(_BUDGET // charts, _FEWEST, _POINTS))
     opens = opening_run(answers)
+    kinds = {row["joint"]: row["kind"] for row in answers["joints"].rows}
     return {
-        "runs": [_run(row, columns, points) for row, columns in runs],
+        "runs": [_run(row, columns, points, kinds) for row, columns in runs],
         "opens": next(index for index, row in enumerate(rows) if row is opens),
         "points": points,
     }
 
 
-def _run(row: Row, columns: Columns, points: int) -> dict[str, Any]:
+def _run(row: Row, columns: Columns, points: int, kinds: Mapping[str, str | None]) -> dict[str, Any]:
     torques = [
-        _chart(columns, f"{_TORQUE}{joint}", joint, points)
+        _chart(columns, _TORQUE.column(joint), joint, _TORQUE.unit_of(kinds.get(joint) or ""), points)
         for joint in columns.joints
-        if columns.get(f"{_TORQUE}{joint}") is not None
+        if columns.get(_TORQUE.column(joint)) is not None
     ]
     return {
         "name": row["run_name"],
         "part": row["part"],
         "held_out": _held_out(row, columns),
         "torque": torques,
-        "power": _chart(columns, "power", "power", points),
-        "energy": _chart(columns, "energy", "energy used so far", points),
+        "power": _chart(columns, _POWER.prefix, "power", _POWER.unit, points),
+        "energy": _chart(columns, "energy", "energy used so far", "J", points),
     }
 
 
-def _chart(columns: Columns, name: str, title: str, points: int) -> dict[str, Any] | None:
+def _chart(columns: Columns, name: str, title: str, unit: str, points: int) -> dict[str, Any] | None:
     modelled, measured = columns.get(f"{name}{_MODEL}"), columns.get(name)
     if modelled is None:
         return None
@@ -110,6 +112,7 @@ def _chart(columns: Columns, name: str, title: str, points: int) -> dict[str, An
     kept = extremes(signals, points)
     return {
         "title": title,
+        "unit": unit,
         "time": pack(time[kept]),
         "measured": None if measured is None else pack(measured[kept]),
         "modelled": pack(modelled[kept]),

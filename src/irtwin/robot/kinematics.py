@@ -45,10 +45,5 @@ def placements(robot: Robot, q: np.ndarray, link: str | None = None) -> np.ndarr
     return result
 
 
-def flange_position(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Return the flange's position in the base frame, (N, 3) m, along the joint positions `q`: (N, n) rad."""
-    return placements(robot, q)[:, :3, 3]
-
-
 def _frames(robot: Robot) -> list[tuple[Link, int]]:
     return [(link, robot.model.getFrameId(link.name, pin.FrameType.BODY)) for link in robot.links]

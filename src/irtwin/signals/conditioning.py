@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
+from irtwin.signals.channels import REQUIRED
 from irtwin.signals.filter import low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -41,30 +43,24 @@ def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
     time = _even_time(run)
     rate = 1 / (time[1] - time[0])
 
-    def clean(values: np.ndarray | None, order: int = 1) -> np.ndarray | None:
-        if values is None:
-            return None
-        even = make_interp_spline(signals.time, values, k=order)(time)
-        return low_pass(even, rate, cutoff)
+    def clean(values: np.ndarray, order: int = 1) -> np.ndarray:
+        return low_pass(make_interp_spline(signals.time, values, k=order)(time), rate, cutoff)
 
+    measured: dict[str, Any] = {name: clean(it) for name, it in signals.logged().items() if name not in REQUIRED}
     q = clean(signals.q, order=3)
-    assert q is not None
-    dq = _agreeing(clean(signals.dq), differentiate(q, rate))
-    ddq = _agreeing(clean(signals.ddq), differentiate(dq, rate))
+    dq = _agreeing(measured.pop("dq", None), differentiate(q, rate))
+    ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate))
     return Motion(
+        time,
+        q,
+        dq,
+        ddq,
         run=run.name,
-        time=time,
-        q=q,
-        dq=dq,
-        ddq=ddq,
-        torque=clean(signals.torque),
-        current=clean(signals.current),
-        temperature=clean(signals.temperature),
-        power=clean(signals.power),
         standing=_standing(make_interp_spline(signals.time, signals.q, k=1)(time), rate),
         payload_mass=run.payload_mass,
         payload_com=run.payload_com,
         cutoff=cutoff,
+        **measured,
     )
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -44,7 +42,7 @@ def robot_of_table(name: str, robot: Table) -> Robot:
     if not isinstance(values, dict):
         raise InputError(f"{robot.file}: [robot.dh] should be a table, with convention and [[robot.dh.row]]")
     table = Table(robot.file, "[robot.dh]", values)
-    _check_keys(table, DH_KEYS)
+    table.check_keys(DH_KEYS)
     convention = table.text("convention")
     if convention not in CONVENTIONS:
         said = "is missing" if convention is None else f'= "{convention}"'
@@ -66,7 +64,7 @@ def _row(robot: Table, number: int, values: Any) -> Row:
     if not isinstance(values, dict):
         raise InputError(f"{robot.file}: [[robot.dh.row]] {number} should be a table, not {shown(values)}")
     table = Table(robot.file, f"[[robot.dh.row]] {number}", values)
-    _check_keys(table, ROW_KEYS)
+    table.check_keys(ROW_KEYS)
     kind = table.text("type", "revolute") or ""
     if kind not in _TYPES:
         raise InputError(f'{table.file}: {table.name} type = "{kind}"; use {", ".join(_TYPES)}')
@@ -136,11 +134,3 @@ def _numbers(table: Table, key: str, count: int, meaning: str) -> Any:
         raise InputError(f"{table.file}: {table.name} {key} should be {count} numbers ({meaning}), not {shown(value)}")
     parts = (Table(table.file, f"{table.name} {key}", {"part": part}).number("part") for part in value)
     return tuple(0.0 if part is None else part for part in parts)
-
-
-def _check_keys(table: Table, known: Sequence[str]) -> None:
-    for key in table.values:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, 1)
-            hint = f"did you mean {near[0]}?" if near else f"it may have {', '.join(known)}"
-            raise InputError(f"{table.file}: {table.name} {shown(key)[1:-1]} is no key of a table of joints; {hint}")

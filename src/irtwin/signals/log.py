@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -12,14 +12,23 @@ from typing import Any
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
+from irtwin.signals.channels import Signals
 from irtwin.signals.dh_table import robot_of_table
-from irtwin.signals.samples import Signals, read_signals
+from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
 
 ROLES = ("observed", "reference", "simulated")
-_SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
+SHEET_KEYS = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _POWER_AT = ("mains", "dc_bus")
+# what the tables of dataset.toml may hold, besides notes
+DATA_SET_KEYS = ("robot", "run", "twin")
+ROBOT_KEYS = (
+    "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
+    "arm_movement_type", "simulated", "joint",
+)  # fmt: skip
+RUN_KEYS = ("file", "role", "payload_mass", "payload_com", "repeat_of", "started")
+TWIN_KEYS = ("effects",)
 _EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
 
 
@@ -69,11 +78,17 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     table = Table(file, "[robot]", take(document, "robot", dict, file, "[robot]"))
     robot = _robot(folder, table)
     repairs = [f"{file}: {_held(robot)}"] if robot.held else []
+    repairs += [
+        f"{file}: [robot] {key} is kept as a note; did you mean {near}?" for key, near in table.near_misses(ROBOT_KEYS)
+    ]
     runs = list(_runs(folder, file, document, robot, repair, repairs))
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
+    Table(file, "", document).check_keys(DATA_SET_KEYS)
     twin = document.get("twin", {})
+    if isinstance(twin, dict):
+        Table(file, "[twin]", twin).check_keys(TWIN_KEYS)
     effects = twin.get("effects") if isinstance(twin, dict) else None
     if effects is not None and not (isinstance(effects, list) and all(isinstance(e, str) for e in effects)):
         raise InputError(f"{file}: [twin] effects should be a list of effect ids")
@@ -88,6 +103,11 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
         repairs=tuple(repairs),
     )
+
+
+def own_runs(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs that a robot's twin is of: a simulator's stay apart where the robot's own are there."""
+    return [run for run in runs if run.role != "simulated"] or list(runs)
 
 
 def _held(robot: Robot) -> str:
@@ -142,7 +162,8 @@ def _robot(folder: Path, table: Table) -> Robot:
         if not isinstance(values, dict):
             raise InputError(f"{table.file}: [robot.joint.{joint.name}] should be a table")
         sheet = Table(table.file, f"[robot.joint.{joint.name}]", values)
-        given: dict[str, Any] = {key: sheet.number(key, least=0.0) for key in _SHEET}
+        sheet.check_keys(SHEET_KEYS)
+        given: dict[str, Any] = {key: sheet.number(key, least=0.0) for key in SHEET_KEYS}
         joints.append(replace(joint, **given))
     return replace(
         robot,
@@ -159,6 +180,7 @@ def _runs(
 ) -> Iterator[Run]:
     for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
         table = Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
+        table.check_notes(RUN_KEYS)
         path = table.path("file", folder)
         role = table.text("role", "observed") or ""
         if role not in ROLES:

@@ -7,34 +7,28 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from irtwin.signals.channels import Signals
+
 
 @dataclass(frozen=True)
-class Motion:
-    """What a robot of n joints did over N even samples. Absent measurements are None.
+class Motion(Signals):
+    """What a robot of n joints did over N even samples: the channels of `Signals`, speeds and accelerations known.
 
-    time: (N,) s; q, dq, ddq: (N, n) rad, rad/s, rad/s^2; torque: (N, n) N m on the joint side;
-    current: (N, n) A; temperature: (N, n) degC; power: (N,) W; payload_com: (3,) m in the flange frame;
-    standing: (N, n) whether a joint stood still, as seen before any filter.
+    standing: (N, n) whether a joint stood still, as seen before any filter; payload_com: (3,) m in the flange frame.
     `cutoff` is that of the zero-phase filter that the signals went through, Hz; None for a planned motion.
     A part knows the `whole` that it was cut from, and its first sample there: what depends on the past is computed
     over the whole.
     """
 
-    run: str
-    time: np.ndarray
-    q: np.ndarray
-    dq: np.ndarray
-    ddq: np.ndarray
-    torque: np.ndarray | None = None
-    current: np.ndarray | None = None
-    temperature: np.ndarray | None = None
-    power: np.ndarray | None = None
-    standing: np.ndarray | None = None
-    payload_mass: float = 0.0  # kg
-    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    cutoff: float | None = None
-    whole: Motion | None = field(default=None, repr=False, compare=False)
-    start: int = field(default=0, compare=False)
+    dq: np.ndarray = field()
+    ddq: np.ndarray = field()
+    run: str = field(kw_only=True)
+    standing: np.ndarray | None = field(default=None, kw_only=True)
+    payload_mass: float = field(default=0.0, kw_only=True)  # kg
+    payload_com: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), kw_only=True)
+    cutoff: float | None = field(default=None, kw_only=True)
+    whole: Motion | None = field(default=None, repr=False, compare=False, kw_only=True)
+    start: int = field(default=0, compare=False, kw_only=True)
 
     @property
     def rate(self) -> float:
@@ -48,21 +42,4 @@ class Motion:
 
     def part(self, start: int, stop: int) -> Motion:
         """Return samples start..stop (exclusive) as a motion of the same run."""
-
-        def cut(signal: np.ndarray | None) -> np.ndarray | None:
-            return None if signal is None else signal[start:stop]
-
-        return replace(
-            self,
-            time=self.time[start:stop],
-            q=self.q[start:stop],
-            dq=self.dq[start:stop],
-            ddq=self.ddq[start:stop],
-            torque=cut(self.torque),
-            current=cut(self.current),
-            temperature=cut(self.temperature),
-            power=cut(self.power),
-            standing=cut(self.standing),
-            whole=self.whole or self,
-            start=self.start + start,
-        )
+        return replace(self.rows(slice(start, stop)), whole=self.whole or self, start=self.start + start)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from irtwin.errors import InputError
-from irtwin.signals.samples import FEWEST, Signals
+from irtwin.signals.channels import Signals
+from irtwin.signals.samples import FEWEST
 
 HOLE = 25.0  # intervals without a sample: nobody knows what the robot did meanwhile
 _MOST_PIECES = 100  # of one run; more, and it is not sampled but sprinkled

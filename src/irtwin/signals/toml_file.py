@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +17,9 @@ from irtwin.input_file import read_input
 _LARGEST = 20_000_000  # bytes
 _GREATEST = 1e300  # of a number
 _DEEPEST = 32  # tables in tables
+_KEY = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_DOTTED = re.compile(rf"(?:^|[\[{{,])[ \t]*{_KEY}(?:[ \t]*\.[ \t]*{_KEY}){{{_DEEPEST},}}[ \t]*[=\]]", re.MULTILINE)
+_NEAR, _VERY_NEAR = 0.7, 0.8  # share of letters in common of a key and its misspelling (`difflib`)
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,28 @@ class Table:
             bound = "" if least == -math.inf else f" of at least {least:g}"
             raise InputError(f"{self.file}: {self.name} {key} should be a number{bound}, not {shown(value)}")
         return float(value)
+
+    def check_keys(self, known: Sequence[str]) -> None:
+        """Raise InputError on a key that is none of these, naming the nearest."""
+        for key in self.values:
+            if key not in known:
+                raise self._misspelt(key, difflib.get_close_matches(key, known, 1, _NEAR) or known)
+
+    def check_notes(self, known: Sequence[str]) -> None:
+        """Raise InputError on a key that is nearly one of these; any other is a note."""
+        for key, near in self.near_misses(known, _NEAR):
+            raise self._misspelt(key, [near])
+
+    def near_misses(self, known: Sequence[str], share: float = _VERY_NEAR) -> list[tuple[str, str]]:
+        """Return the keys that are nearly one of these, and not said otherwise, each with that one."""
+        others = [key for key in known if key not in self.values]
+        found = ((key, difflib.get_close_matches(key, others, 1, share)) for key in self.values if key not in known)
+        return [(key, near[0]) for key, near in found if near]
+
+    def _misspelt(self, key: str, known: Sequence[str]) -> InputError:
+        hint = f"did you mean {known[0]}?" if len(known) == 1 else f"it may have {', '.join(known)}"
+        named = f"{self.name} {shown(key)[1:-1]}".lstrip()
+        return InputError(f"{self.file}: {named} is no key of the log format; {hint}")
 
     def path(self, key: str, folder: Path) -> Path:
         """Return the file that a key names. Raises InputError where it is none, or not in the folder."""
@@ -76,7 +104,10 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
     content = read_input(file, _LARGEST)
     try:
-        document = tomllib.loads(content.decode())
+        text = content.decode()
+        if _DOTTED.search(text):  # the parser's memory grows with the square of a key's parts
+            raise InputError(f"{file}: not valid TOML: nested too deeply")
+        document = tomllib.loads(text)
     except ValueError as error:  # an integer of thousands of digits is no TOMLDecodeError
         raise InputError(f"{file}: not valid TOML: {error}") from error
     except RecursionError as error:

@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
+from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage.files import inside
 from irtwin.storage.gap_schema import GapDiagnosis
 from irtwin.storage.rows import drop_activities, drop_data_set, drop_robot, facts, insert_rows, values, with_dependents

@@ -1,6 +1,7 @@
 """The tables of a diagnosis: where the gap between twin and robot lies, what causes it, how far it shrinks.
 
-Joints, runs and effects are named as in the contract's JSON; ranks count from 1, the first being the foremost.
+Joints, runs, effects and causes are named as in the diagnosis' document; ranks count from 1, the first being the
+foremost. The tables of the next experiment are in `experiment_schema`.
 """
 
 from __future__ import annotations
@@ -63,6 +64,13 @@ class GapLocation(Base):
     regime: Mapped[str | None]
     follows: Mapped[str | None]  # the variable that the residual goes with
     share: Mapped[float]  # of the gap, 0 to 1
+    share_lower: Mapped[float]
+    share_upper: Mapped[float]
+    excess: Mapped[float]  # mean square over that of the floor, less 1
+    excess_lower: Mapped[float]
+    excess_upper: Mapped[float]
+    concentration: Mapped[float]  # share of its joint's excess over its share of the samples
+    false_discovery_rate: Mapped[float]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -83,12 +91,24 @@ class GapCause(Base):
     __tablename__ = "gap_cause"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    rank: Mapped[int] = mapped_column(primary_key=True)
+    cause_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
+    rank: Mapped[int]
     robot_id: Mapped[str]
     effect: Mapped[str]
     scope: Mapped[str]  # "missing" or "changed"
     confidence: Mapped[float]
-    evidence: Mapped[str]  # JSON
+    channel: Mapped[str]  # "torque" or "power"
+    share_of_closed: Mapped[float | None]  # of what the causes of its channel close together; may be below 0
+    closed_where_it_acts: Mapped[float]  # share of the gap there, 0 to 1, that all causes close
+    gain_on_groups_left_out: Mapped[float]  # of weighted squares, a sample
+    t_between_groups: Mapped[float]
+    p_adjusted: Mapped[float]  # for the whole catalogue
+    power_on_explained_torque_says: Mapped[str | None]  # of a cause of power: "electrical" or "meter"
+    power_says: Mapped[str | None]  # of a cause of torque: "mechanical", "sensor" or "undecided"
+    gain_in_power: Mapped[float | None]  # if it is mechanical
+    t_in_power: Mapped[float | None]
+    acts_from_s: Mapped[float | None]  # of the run's clock, where it acts for a while only
+    acts_until_s: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -98,7 +118,7 @@ class GapCauseJoint(Base):
     __tablename__ = "gap_cause_joint"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    rank: Mapped[int] = mapped_column(primary_key=True)
+    cause_id: Mapped[str] = mapped_column(primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
@@ -110,8 +130,32 @@ class GapCauseRival(Base):
     __tablename__ = "gap_cause_rival"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    rank: Mapped[int] = mapped_column(primary_key=True)
+    cause_id: Mapped[str] = mapped_column(primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCauseCompetitor(Base):
+    """An effect that was weighed against a cause, whether it explains the data as well or not."""
+
+    __tablename__ = "gap_cause_competitor"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    cause_id: Mapped[str] = mapped_column(primary_key=True)
+    effect: Mapped[str] = mapped_column(primary_key=True)
+    gain: Mapped[float | None]  # on groups left out, as the cause's
+    correlation: Mapped[float | None]  # with the cause, 0 to 1
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCauseRun(Base):
+    """A run in which a cause acts; none where it acts in all of them."""
+
+    __tablename__ = "gap_cause_run"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    cause_id: Mapped[str] = mapped_column(primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -121,7 +165,7 @@ class GapCauseParameter(Base):
     __tablename__ = "gap_cause_parameter"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    rank: Mapped[int] = mapped_column(primary_key=True)
+    cause_id: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
     joint: Mapped[str | None]
@@ -141,8 +185,8 @@ class GapChange(Base):
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     measure: Mapped[str] = mapped_column(primary_key=True)  # "torque_rmse", "power_rmse" or "energy_error_percent"
     part: Mapped[str] = mapped_column(primary_key=True)  # "together", "alone" or "without"
-    place: Mapped[int] = mapped_column(primary_key=True)  # the cause's rank, 0 for all of them
-    rank: Mapped[int | None]
+    place: Mapped[str] = mapped_column(primary_key=True)  # the cause's id, "all" for all of them
+    cause_id: Mapped[str | None]
     before: Mapped[float]
     after: Mapped[float]
     noise_floor: Mapped[float | None]
@@ -161,6 +205,21 @@ class GapShrinkage(Base):
     closed_fraction: Mapped[float]
     lower: Mapped[float | None]
     upper: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapCloseable(Base):
+    """How much of a channel's gap could be closed at all, as shares 0 to 1; none where there is no gap."""
+
+    __tablename__ = "gap_closeable"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    channel: Mapped[str] = mapped_column(primary_key=True)
+    of_what: Mapped[str]  # in words: what the shares are of
+    closed: Mapped[float | None]  # by the causes, refitted to all runs
+    closeable: Mapped[float | None]  # by the causes or a flexible regression, the better of the two
+    by_regression: Mapped[float | None]  # by a flexible regression alone
+    nameless: Mapped[float | None]  # by a flexible regression of what the causes leave
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -183,14 +242,4 @@ class GapNotTestable(Base):
     number: Mapped[int] = mapped_column(primary_key=True)
     effect: Mapped[str]
     why: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
-
-
-class GapExperiment(Base):
-    """What to measure next, so that rivals come apart."""
-
-    __tablename__ = "gap_experiment"
-
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    description: Mapped[str]  # JSON
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

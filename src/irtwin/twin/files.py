@@ -38,13 +38,6 @@ _BASE_PARAMETER: _Columns = {
 }
 
 
-def save(twin: Twin, path: Path) -> None:
-    """Write a twin, whole or not at all."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(to_json(twin), encoding="utf-8")
-    partial.replace(path)
-
-
 def load(path: Path) -> Twin:
     """Read a twin. Raises InputError, naming file and key, where the file is none."""
     try:

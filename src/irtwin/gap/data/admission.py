@@ -8,8 +8,11 @@ import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.gap.thresholds import Admission
+from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
+
+_TORQUE, _CURRENT = CHANNELS["torque"], CHANNELS["current"]
 
 
 def admit(data_set: DataSet, motions: Mapping[str, Motion], limits: Admission) -> None:
@@ -68,12 +71,12 @@ def _check_dead(runs: Sequence[Run], joints: Sequence[str], moving: Mapping[str,
     """
     powers = [run.signals.power for run in runs if run.signals.power is not None]
     if powers and all(np.ptp(power) == 0 for power in powers):
-        raise _dead(runs[0], "column power")
+        raise _dead(runs[0], f"column {CHANNELS['power'].prefix}")
     for joint, name in enumerate(joints):
         moved = [run for run in runs if run.signals.torque is not None and moving[run.name][joint]]
         torques = [run.signals.torque[:, joint] for run in moved if run.signals.torque is not None]
         if torques and all(np.ptp(torque) == 0 for torque in torques):
-            raise _dead(moved[0], f"the torque of {name}, by column tau_{name} or i_{name},")
+            raise _dead(moved[0], f"the torque of {name}, by column {_TORQUE.column(name)} or {_CURRENT.column(name)},")
 
 
 def _dead(run: Run, channel: str) -> InputError:

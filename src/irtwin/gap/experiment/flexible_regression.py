@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
+from irtwin.gap.document.document import Closeable
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.signals.filter import decimation, low_pass
 from irtwin.signals.motion import Motion
@@ -43,7 +44,7 @@ class FlexibleRegression:
     floor: np.ndarray | None
     least_gap: float
 
-    def shares(self) -> dict[str, Any]:
+    def shares(self) -> Closeable:
         """Return which part of the gap above the floor could be closed, in all equations and in each.
 
         `closed`: by the causes, refitted to all runs; `by_regression`: by a regression of what the plain twin leaves;
@@ -62,14 +63,13 @@ class FlexibleRegression:
         parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
         total = float(np.maximum(gap, 0.0).sum())
         total = total if total > self.least_gap * len(gap) else 0.0
+        gaps = np.where(gap > self.least_gap, gap, 0.0)
         shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
-        for name, part in parts.items():
-            shares[f"{name}_by_equation"] = [
-                _share(float(p), float(g) if g > self.least_gap else 0.0) for p, g in zip(part, gap, strict=True)
-            ]
-        return shares | {
-            "of": "the mean square, as no floor is known" if self.floor is None else "the gap above the floor"
-        }
+        shares |= {f"{name}_by_equation": tuple(map(_share, part, gaps)) for name, part in parts.items()}
+        return Closeable(
+            **shares,
+            of="the mean square, as no floor is known" if self.floor is None else "the gap above the floor",
+        )
 
 
 def flexible_regression(channel: PlannedEquations, motions: Sequence[Motion], seed: int) -> FlexibleRegression | None:

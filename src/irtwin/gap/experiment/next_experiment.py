@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
+from irtwin.gap.document.curves import PlannedMotion
+from irtwin.gap.document.experiment import Considered, Experiment, Question
 from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
 from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
-from irtwin.gap.thresholds import Experiment, Thresholds
+from irtwin.gap.thresholds import NextExperiment, Thresholds
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -67,16 +68,13 @@ class Weight:
     def _visible(self) -> float:
         return self.thresholds.detectability.least_visible
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name."""
+    @property
+    def question(self) -> Question:
+        """The question with its numbers, as a diagnosis says it."""
         kind = "not_imitated" if len(self.effects) > 1 else "visibility"
-        return {
-            "effects": list(self.effects),
-            "separation_now": _rounded(self.now),
-            "expected_separation": _rounded(self.expected),
-            f"{kind}_now": _rounded(self.share_now),
-            f"expected_{kind}": _rounded(self.share),
-        }
+        shares = {f"{kind}_now": _rounded(self.share_now), f"expected_{kind}": _rounded(self.share)}
+        now, expected = _rounded(self.now), _rounded(self.expected)
+        return Question(effects=self.effects, separation_now=now, expected_separation=expected, **shares)
 
 
 @dataclass(frozen=True)
@@ -97,28 +95,29 @@ class Proposal:
     note: str | None
     enough: float
 
-    def to_json(self) -> dict[str, Any]:
-        """Return `next_experiment` of the contract: texts, numbers and the programme to run."""
+    @property
+    def experiment(self) -> Experiment:
+        """What a diagnosis says of it: texts, numbers and the programme to run."""
         chosen = self.programme
-        return {
-            "purpose": self.purpose,
-            "effects": list(self.effects),
-            "joints": list(self.joints),
-            "motions": [*([chosen.text] if chosen else []), *self.by_hand],
-            "expected_separation": min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
-            "separation_now": min((_rounded(w.now) for w in self.weights), default=None),
-            "separation_that_is_enough": self.enough,
-            "questions": [weight.to_json() for weight in self.weights],
-            "programme": chosen.to_json() if chosen else None,
-            "considered": [
-                {"kind": one.kind, "minutes": round(one.cost / 60, 1), "expected_separation": _rounded(worth)}
+        return Experiment(
+            purpose=self.purpose,
+            effects=self.effects,
+            joints=self.joints,
+            motions=(*([chosen.text] if chosen else []), *self.by_hand),
+            expected_separation=min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
+            separation_now=min((_rounded(w.now) for w in self.weights), default=None),
+            separation_that_is_enough=self.enough,
+            questions=tuple(weight.question for weight in self.weights),
+            programme=chosen.said if chosen else None,
+            considered=tuple(
+                Considered(kind=one.kind, minutes=round(one.cost / 60, 1), expected_separation=_rounded(worth))
                 for one, worth in self.considered
-            ],
-            "note": self.note,
-        }
+            ),
+            note=self.note,
+        )
 
     @property
-    def curve(self) -> dict[str, Any] | None:
+    def curve(self) -> PlannedMotion | None:
         """What a page draws of the programme: time (s) and each joint's position, thinned."""
         if self.programme is None:
             return None
@@ -129,12 +128,12 @@ class Proposal:
             time.append(motion.time[::every] + start)
             q.append(motion.q[::every])
             start = float(time[-1][-1]) + every / motion.rate
-        return {
-            "time": np.concatenate(time).round(3).tolist(),
-            "joints": list(self.programme.joints),
-            "units": [self.robot.joints[joint].unit for joint in moved],
-            "q": np.concatenate(q).T[moved].round(5).tolist(),
-        }
+        return PlannedMotion(
+            time=tuple(np.concatenate(time).round(3).tolist()),
+            joints=self.programme.joints,
+            units=tuple(self.robot.joints[joint].unit for joint in moved),
+            q=tuple(map(tuple, np.concatenate(q).T[moved].round(5).tolist())),
+        )
 
 
 @dataclass(frozen=True)
@@ -211,7 +210,7 @@ def next_experiment(
     channels: Sequence[PlannedEquations],
     lacking: Sequence[Effect],
     seen: Sequence[Motion],
-    limits: Experiment,
+    limits: NextExperiment,
 ) -> Proposal | None:
     """Design what tells the causes' rivals apart; where there are none, what shows the effects `lacking`.
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
+from irtwin.gap.document import experiment
+from irtwin.gap.document.experiment import Settings
 from irtwin.identification.excitation import excite
 from irtwin.identification.motion_limits import JointLimits, Workspace
 from irtwin.robot.description import Robot
@@ -44,7 +45,7 @@ class Programme:
     """One experiment: the motions that it takes (planned: q, dq, ddq over time), and how to run it.
 
     `without`: effects that are taken off the robot in every one of its motions (the tool, the hose package);
-    `set_up`: s beside the motions themselves; `settings`: what to enter at the controller, as JSON.
+    `set_up`: s beside the motions themselves; `settings`: what to enter at the controller.
     """
 
     kind: str
@@ -53,7 +54,7 @@ class Programme:
     motions: tuple[Motion, ...]
     set_up: float = 0.0
     without: tuple[str, ...] = ()
-    settings: dict[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=Settings)
 
     @property
     def seconds(self) -> float:
@@ -65,17 +66,18 @@ class Programme:
         """How long all of it takes, s."""
         return self.seconds + self.set_up
 
-    def to_json(self) -> dict[str, Any]:
-        """Return what a user needs to run it."""
-        return {
-            "kind": self.kind,
-            "joints": list(self.joints),
-            "seconds": round(self.seconds, 1),
-            "set_up_seconds": self.set_up,
-            "payload_mass": [motion.payload_mass for motion in self.motions],
-            "taken_off": list(self.without),
-            **self.settings,
-        }
+    @property
+    def said(self) -> experiment.Programme:
+        """What a user needs to run it."""
+        return experiment.Programme(
+            kind=self.kind,
+            joints=self.joints,
+            seconds=round(self.seconds, 1),
+            set_up_seconds=self.set_up,
+            payload_mass=tuple(motion.payload_mass for motion in self.motions),
+            taken_off=self.without,
+            **vars(self.settings),
+        )
 
 
 def programmes(
@@ -178,12 +180,12 @@ class _Yard:
         for start, stop, speed, acceleration in moves:
             parts += [_move(start, stop, speed, acceleration, self.rate), (stop + rest, rest, rest)]
         q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return Motion("planned", np.arange(len(q)) / self.rate, q, dq, ddq, cutoff=self.cutoff)
+        return Motion(np.arange(len(q)) / self.rate, q, dq, ddq, run="planned", cutoff=self.cutoff)
 
-    def by_joint(self, values: np.ndarray) -> dict[str, list[float]]:
+    def by_joint(self, values: np.ndarray) -> dict[str, tuple[float, ...]]:
         """Return (M, n) values of the joints that move, by name, to four digits."""
         return {
-            name: [float(f"{value:.4g}") for value in np.atleast_2d(values)[:, self.robot.index(name)]]
+            name: tuple(float(f"{value:.4g}") for value in np.atleast_2d(values)[:, self.robot.index(name)])
             for name in self.joints
         }
 
@@ -259,7 +261,7 @@ def _ladder(yard: _Yard) -> Programme:
         f"{speeds[0][yard.moved].min():.2g} to {speeds[-1][yard.moved].max():.2g} {yard.unit}/s",
         yard.joints,
         (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
-        settings={"pose": _pose(yard), "speeds": yard.by_joint(speeds), "amplitudes": yard.by_joint(half)},
+        settings=Settings(pose=_pose(yard), speeds=yard.by_joint(speeds), amplitudes=yard.by_joint(half)),
     )
 
 
@@ -275,7 +277,7 @@ def _sweep(yard: _Yard) -> Programme:
                 [yard.pose, ends[0], ends[1], ends[0], yard.pose], [yard.speed / 2, speed, speed, yard.speed / 2]
             ),
         ),
-        settings={"pose": _pose(yard), "speeds": yard.by_joint(speed), "amplitudes": yard.by_joint(yard.reach)},
+        settings=Settings(pose=_pose(yard), speeds=yard.by_joint(speed), amplitudes=yard.by_joint(yard.reach)),
     )
 
 
@@ -291,7 +293,7 @@ def _reversals(yard: _Yard) -> Programme:
         "a second each way",
         yard.joints,
         (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
-        settings={"pose": _pose(yard), "amplitudes": {name: list(_SMALL) for name in yard.joints}},
+        settings=Settings(pose=_pose(yard), amplitudes=dict.fromkeys(yard.joints, _SMALL)),
     )
 
 
@@ -307,11 +309,11 @@ def _steps(yard: _Yard) -> Programme:
         "acceleration",
         yard.joints,
         (yard.shaken([*stops, yard.pose], [yard.speed] * 25, [*sharp, yard.acceleration], 0.1),),
-        settings={
-            "pose": _pose(yard),
-            "amplitudes": yard.by_joint(way),
-            "accelerations": yard.by_joint(np.outer(_STEPS, yard.acceleration)),
-        },
+        settings=Settings(
+            pose=_pose(yard),
+            amplitudes=yard.by_joint(way),
+            accelerations=yard.by_joint(np.outer(_STEPS, yard.acceleration)),
+        ),
     )
 
 
@@ -323,7 +325,7 @@ def _poses(yard: _Yard) -> Programme:
         f"{yard.named}: holding {_POSES} poses for {_HOLD:g} s each",
         yard.joints,
         (yard.motion(stops, [yard.speed / 2] * _POSES, _HOLD),),
-        settings={"poses": yard.by_joint(np.array(stops)), "hold_seconds": _HOLD},
+        settings=Settings(poses=yard.by_joint(np.array(stops)), hold_seconds=_HOLD),
     )
 
 
@@ -333,13 +335,13 @@ def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
     except InputError:
         return None
     time, q, dq, ddq = found.sample(yard.rate)
-    motion = Motion("planned", time, q, dq, ddq, cutoff=yard.cutoff)
+    motion = Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff)
     return Programme(
         "exciting_motion",
         f"an exciting motion of all joints, {_EXCITING:g} s",
         robot.joint_names,
         (motion,),
-        settings={"command": f"irtwin excite {robot.name}.urdf --seconds {_EXCITING:g} --out motion.csv"},
+        settings=Settings(command=f"irtwin excite {robot.name}.urdf --seconds {_EXCITING:g} --out motion.csv"),
     )
 
 
@@ -351,7 +353,7 @@ def _loaded(exciting: Programme, mass: float) -> Programme:
         text=f"{exciting.text}, without and with a weighed payload of {mass:g} kg",
         motions=(plain, replace(plain, run="planned, loaded", payload_mass=mass, payload_com=_CENTRE)),
         set_up=_SET_UP,
-        settings={**exciting.settings, "payload_com": list(_CENTRE)},
+        settings=replace(exciting.settings, payload_com=_CENTRE),
     )
 
 
@@ -367,7 +369,7 @@ def _warmed(exciting: Programme) -> Programme:
             replace(plain, run="planned, warm", temperature=np.full(shape, _WARM)),
         ),
         set_up=_WARM_UP,
-        settings={**exciting.settings, "temperatures": [_COLD, _WARM]},
+        settings=replace(exciting.settings, temperatures=(_COLD, _WARM)),
     )
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from irtwin.gap.data.case import Case
+from irtwin.gap.document.curves import Followed
 from irtwin.gap.isolation.explained import Explained
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.localisation.excess_map import Map, joint_maps, level_of, robot_maps
@@ -19,6 +19,7 @@ from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
 from irtwin.gap.thresholds import Places
+from irtwin.signals.motion import Motion
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
     power = finding.name == "power"
     reference, limits = against_reference(finding), case.thresholds.places
 
-    def traces(runs: Sequence[Any], values: Values) -> list[Trace]:
+    def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
         return (power_traces if power else torque_traces)(explained.stack, runs, values, torque)
 
     before = traces(case.seen, fitted_values(finding, reference=reference))
@@ -94,7 +95,7 @@ def places(left: Sequence[ChannelResidual], seed: int) -> list[Location]:
     return [place for _, own in sorted(found, key=order) for place in own]
 
 
-def cause_curves(left: Sequence[ChannelResidual]) -> list[dict[str, Any]]:
+def cause_curves(left: Sequence[ChannelResidual]) -> list[Followed]:
     """Return each cause's curve, on the residual that all the others leave."""
     lines = []
     for one in left:
@@ -107,25 +108,21 @@ def cause_curves(left: Sequence[ChannelResidual]) -> list[dict[str, Any]]:
             for k, joint in enumerate(one.finding.places):
                 best = followed(alone, k, joint) if joint is None or not cause.joints or joint in cause.joints else None
                 if best:
-                    lines.append(_line(one, joint) | curve(partial, k, joint, best[0], cause.effect, added))
+                    lines.append(curve(one.finding.name, partial, k, joint, best[0], cause.effect, added))
     return lines
 
 
-def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[Location], most: int) -> list[dict[str, Any]]:
+def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[Location], most: int) -> list[Followed]:
     """Return the residual against what it follows, at the foremost places on which no cause acts."""
-    lines: list[dict[str, Any]] = []
+    lines: list[Followed] = []
     for one in left:
         named = {joint for cause in one.finding.causes for joint in cause.joints or one.finding.places}
         own = [place.joint for place in located if place.channel == one.finding.name and place.joint not in named]
         for joint in list(dict.fromkeys(own))[:most]:
             k = one.finding.places.index(joint)
             if best := followed(one.before, k, joint):
-                lines.append(_line(one, joint) | curve(one.before, k, joint, best[0]))
+                lines.append(curve(one.finding.name, one.before, k, joint, best[0]))
     return lines
-
-
-def _line(left: ChannelResidual, joint: str | None) -> dict[str, Any]:
-    return {"channel": left.finding.name, "joint": joint}
 
 
 def _of(trace: Trace, added: np.ndarray) -> Trace:

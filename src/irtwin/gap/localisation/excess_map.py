@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from irtwin.gap.document.curves import ExcessMap
 from irtwin.gap.localisation.regimes import (
     JOINT_PARTS,
     JOINT_REGIMES,
@@ -79,10 +79,10 @@ def level_of(floor: np.ndarray | None, seen: Map, reference: Map | None, fewest:
     return np.where(enough, np.fmax(level, reference.means), level)
 
 
-def heat_map(joints: Sequence[str | None], seen: Map, level: np.ndarray) -> dict[str, Any]:
+def heat_map(joints: Sequence[str], seen: Map, level: np.ndarray) -> ExcessMap:
     """Return the mean excess of each joint and regime, as a page draws it."""
     excess = np.nan_to_num(seen.means / level - 1)
-    return {"joints": list(joints), "regimes": list(seen.regimes.names), "excess": excess.tolist()}
+    return ExcessMap(joints=tuple(joints), regimes=tuple(seen.regimes.names), excess=tuple(map(tuple, excess.tolist())))
 
 
 def _least(seen: Map, fewest: int) -> np.ndarray:

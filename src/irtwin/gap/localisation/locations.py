@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.stats import false_discovery_control, t
@@ -55,22 +54,6 @@ class Location:
     concentration: float
     q: float
     rank: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the location in the form of the schema, with what is sure of it besides."""
-        return {
-            "channel": self.channel,
-            "joint": self.joint,
-            "regime": self.regime,
-            "follows": self.follows,
-            "runs": list(self.runs),
-            "share": self.share,
-            "share_interval95": list(self.share_interval),
-            "excess": self.excess,
-            "excess_interval95": list(self.excess_interval),
-            "concentration": self.concentration,
-            "false_discovery_rate": self.q,
-        }
 
 
 def locate(

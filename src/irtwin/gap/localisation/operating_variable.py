@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from irtwin.gap.document.curves import Followed
 from irtwin.gap.regression.residuals import Trace
+from irtwin.signals.channels import CHANNELS
 
 _BINS = 12
 _UNITS = {
-    "angle": "rad",
-    "speed": "rad/s",
-    "acceleration": "rad/s^2",
-    "torque": "N m",
-    "temperature": "degC",
-    "time": "s",
-    "mechanical_power": "W",
+    "angle": CHANNELS["q"].unit,
+    "speed": CHANNELS["dq"].unit,
+    "acceleration": CHANNELS["ddq"].unit,
+    "torque": CHANNELS["torque"].unit,
+    "temperature": CHANNELS["temperature"].unit,
+    "time": CHANNELS["time"].unit,
+    "mechanical_power": CHANNELS["power"].unit,
     "torque_squared": "N^2 m^2",
 }
 
@@ -64,13 +65,14 @@ def variables(traces: Sequence[Trace], joint: int | None) -> dict[str, np.ndarra
 
 
 def curve(
+    channel: str,
     traces: Sequence[Trace],
     place: int,
     joint: str | None,
     name: str,
     effect: str | None = None,
     added: Sequence[np.ndarray] | None = None,
-) -> dict[str, Any]:
+) -> Followed:
     """Return a place's residual against a variable, in bins of equal numbers of samples; low and high are quartiles.
 
     added: (N, g) of each trace, what an effect adds: the curve fitted to the residual.
@@ -81,16 +83,18 @@ def curve(
     bin_of = _places(values[kept], 2 * _BINS)
     bins = [inside for k in range(2 * _BINS) if (inside := bin_of == k).any()]
     fitted = None if added is None else _joined([part[:, place] for part in added])[kept]
-    return {
-        "effect": effect,
-        "variable": name,
-        "unit": _UNITS[name],
-        "x": [float(np.median(values[kept][inside])) for inside in bins],
-        "residual": [float(np.mean(residual[kept][inside])) for inside in bins],
-        "low": [float(np.quantile(residual[kept][inside], 0.25)) for inside in bins],
-        "high": [float(np.quantile(residual[kept][inside], 0.75)) for inside in bins],
-        "fitted": None if fitted is None else [float(np.mean(fitted[inside])) for inside in bins],
-    }
+    return Followed(
+        channel=channel,
+        joint=joint,
+        effect=effect,
+        variable=name,
+        unit=_UNITS[name],
+        x=tuple(float(np.median(values[kept][inside])) for inside in bins),
+        residual=tuple(float(np.mean(residual[kept][inside])) for inside in bins),
+        low=tuple(float(np.quantile(residual[kept][inside], 0.25)) for inside in bins),
+        high=tuple(float(np.quantile(residual[kept][inside], 0.75)) for inside in bins),
+        fitted=None if fitted is None else tuple(float(np.mean(fitted[inside])) for inside in bins),
+    )
 
 
 def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:

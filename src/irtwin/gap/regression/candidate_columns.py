@@ -120,7 +120,7 @@ def candidate_pattern(robot: Robot, effects: Sequence[Effect], columns: Sequence
     shape = (16, len(robot.joints))
     q, dq, ddq = rng.uniform(-2, 2, (3, *shape))
     temperature = rng.uniform(20, 60, shape)
-    probe = Motion("probe", np.arange(16.0), q, dq, ddq, temperature=temperature)
+    probe = Motion(np.arange(16.0), q, dq, ddq, run="probe", temperature=temperature)
     predicted = Predicted(rng.uniform(-50, 50, shape))
     parts = [free_columns(effect, robot, probe, predicted) for effect in effects]
     pattern = np.any(np.concatenate([np.zeros((*shape, 0)), *parts], axis=2) != 0, axis=0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -58,18 +57,16 @@ def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
     )
 
 
-def acting(variants: Sequence[Variant]) -> dict[str, Any]:
-    """Return the runs and the stretch of the clock, s, in which a cause acts, for those that act in some only."""
+def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, float] | None] | None:
+    """Return the runs in which a cause acts, and the stretch of the clock, s; None for one that acts in all."""
     effects = [variant.effect for variant in variants if variant.effect.runs is not None]
     if not effects:
-        return {}
+        return None
     runs = sorted({run for effect in effects for run in effect.runs or ()})
-    return {
-        "runs": runs,
-        "window": next(([e.shape["start"], e.shape["stop"]] for e in effects if is_transient(e)), None),
-    }
+    window = next(((e.shape["start"], e.shape["stop"]) for e in effects if is_transient(e)), None)
+    return tuple(runs), window
 
 
 def _every(motion: Motion, step: int) -> Motion:
     cut = slice(None, None, step)
-    return Motion(motion.run, motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut])
+    return Motion(motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut], run=motion.run)

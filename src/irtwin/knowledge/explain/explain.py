@@ -10,18 +10,20 @@ from typing import TypeGuard, cast
 from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Triple
 
 from irtwin.errors import InputError
+from irtwin.knowledge.engines import HERMIT
 from irtwin.knowledge.explain import provenance
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.explain.mapping import mapping_of
 from irtwin.knowledge.explain.rules import premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
-from irtwin.knowledge.reasoning import around, not_closed
+from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.shacl.rules import ShaclRule, graph_of, shipped_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
+    GRAPH_OWL_RL,
     GRAPH_SOURCE,
     GRAPH_SWRL,
     ID,
@@ -135,7 +137,16 @@ class Explainer:
                 return Explanation(
                     _show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, said))
                 )
+        if self._is_of_hermit(statement):
+            return Explanation(_show(statement), "OWL 2 DL, by HermiT: no rule of OWL 2 RL concludes it")
         return Explanation(_show(statement), "OWL 2 RL: so it is with everything")
+
+    def _is_of_hermit(self, statement: Statement) -> bool:
+        subject, predicate, object = statement
+        if isinstance(subject, Literal) or not isinstance(predicate, NamedNode):
+            return False
+        kept_in = self._graph.graphs_with(Triple(subject, predicate, object))
+        return GRAPH_OWL_RL in kept_in and engine_of(self._graph) == HERMIT
 
     def _closures_for(self, statement: Statement) -> Iterator[Closure]:
         """Yield closures that may hold a statement: of the graph around the first one's terms, then of all of it."""

@@ -36,15 +36,6 @@ class Derivation:
     premises: tuple[Statement, ...]
 
 
-def closure(triples: Iterable[Triple]) -> set[Triple]:
-    """Return what OWL 2 RL infers and is worth keeping in a graph; Contradiction names the first one.
-
-    Left out is what holds of everything (x sameAs x, C subClassOf owl:Thing), what is inferred of anonymous class
-    expressions and of datatypes, and one more way to write a literal that stands there already.
-    """
-    return Closure(triples).worth_keeping()
-
-
 class Closure:
     """Triples and all that OWL 2 RL infers from them. Contradiction names the first rule that finds one."""
 
@@ -81,7 +72,11 @@ class Closure:
                 yield from (triple for triple in self._terms.triples(fact) if triple not in self._triples)
 
     def worth_keeping(self) -> set[Triple]:
-        """Return what follows, without what `closure` leaves out."""
+        """Return what follows and is worth keeping in a graph.
+
+        Left out is what holds of everything (x sameAs x, C subClassOf owl:Thing), what is inferred of anonymous class
+        expressions and of datatypes, and one more way to write a literal that stands there already.
+        """
         terms, helpers = self._terms, self._helpers()
         hidden = {number for number, forms in enumerate(terms.forms) if forms and _is_hidden(forms[0])}
         kept: set[Triple] = set()
@@ -250,6 +245,11 @@ class Closure:
 def _truisms() -> frozenset[Fact]:
     """Return what follows from nothing."""
     return frozenset(Closure([])._round)
+
+
+def says_something(triple: Triple) -> bool:
+    """Whether a conclusion is worth keeping in a graph, as `Closure.worth_keeping` has it."""
+    return triple.subject != triple.object and not _is_hidden(triple.subject) and not _is_hidden(triple.object)
 
 
 def _is_hidden(term: Node) -> bool:

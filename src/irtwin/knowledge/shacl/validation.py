@@ -27,8 +27,6 @@ from irtwin.knowledge.vocabulary import (
 )
 from irtwin.resources import folder
 
-_NOT_CHECKED = (GRAPH_VALIDATION, GRAPH_REASONED, GRAPH_CHANGED)
-
 _OF_ONTOLOGY = f"""
 CONSTRUCT {{ ?s ?p ?o }}
 WHERE {{

@@ -37,8 +37,6 @@ from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_UPDATE, ID, PREFIX
 from irtwin.resources import folder
 
 if TYPE_CHECKING:
-    import rdflib  # half a second to import, for those who ask for it
-
     from irtwin.storage.database import Workspace
 
 MOST_ROWS = 1_000_000
@@ -296,18 +294,6 @@ class KnowledgeGraph:
         if self._workspace is None or isinstance(self._store, SparqlServer):
             return {}
         return series_functions(self._store, self._workspace, faults)
-
-    def as_rdflib(self) -> rdflib.Graph:
-        """Return the union of all named graphs as rdflib sees it, to read."""
-        import rdflib
-        from oxrdflib import OxigraphStore
-        from rdflib.plugins.stores.sparqlstore import SPARQLStore
-
-        if isinstance(self._store, SparqlServer):
-            return rdflib.Graph(
-                SPARQLStore(self._store.query_url, context_aware=False, method="POST", headers=self._store.headers)
-            )
-        return rdflib.Graph(OxigraphStore(store=self._store), identifier=rdflib.graph.DATASET_DEFAULT_GRAPH_ID)
 
 
 def read_turtle(file: Path) -> Iterator[Triple]:

@@ -16,6 +16,7 @@ from plotly.offline import get_plotlyjs
 
 from irtwin import resources
 from irtwin.errors import InputError
+from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.report import wording
 from irtwin.report.energy import tables, verdict
 from irtwin.report.energy.figures import figures
@@ -89,6 +90,7 @@ def _page(
         run_fits=tables.run_fits(answers["torque_fit"].rows),
         fits=tables.fits(answers["torque_fit_per_joint"].rows),
         conclusions=tables.conclusions(answers["conclusions"].rows, explain),
+        java=HOW_TO_GET.replace("`", ""),
         drawn=drawn,
         curves=curves,
         data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),

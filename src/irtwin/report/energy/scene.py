@@ -6,6 +6,7 @@ import numpy as np
 
 from irtwin.report.explorer import Columns
 from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS
 from irtwin.virtual.scene import scene_html
 
 
@@ -15,5 +16,5 @@ def draw_scene(robot: Robot, series: Columns) -> str:
     Its time runs from the start of the run, as in the page's charts.
     """
     time = series["time"] - series["time"][0]
-    q = np.column_stack([series[f"q_{name}"] for name in robot.joint_names])
+    q = np.column_stack([series[name] for name in CHANNELS["q"].columns(robot.joint_names)])
     return scene_html(robot, time, q, series["energy_model"], series["power_model"])

@@ -1,4 +1,4 @@
-"""Figures of the gap report: curves and maps come from the diagnosis' evidence, which the graph names."""
+"""Figures of the gap report: curves and maps come from the evidence file of the diagnosis, which the graph names."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from irtwin.gap.document.curves import Curves, ExcessMap, Followed, PlannedMotion, RunError
 from irtwin.report import wording
 from irtwin.report.energy.figures import MEASURED, PALETTE, Figure, plain
-from irtwin.report.gap import document as gap_document
+from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers
-
-Evidence = Mapping[str, Any]
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
 _CAUSES = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#004C78", "#7FC8A9")
@@ -26,17 +25,20 @@ _JOINTS_DRAWN = 7
 _CURVES = 3  # of one effect
 
 
-def figures(answers: Answers, evidence: Evidence, document: Evidence) -> dict[str, Figure]:
-    """Return every figure that there is evidence for, by name; `document`: the diagnosis itself."""
-    drawn = {"heat_map": heat_map(evidence.get("heat_map") or {})}
-    for place, curve in enumerate(evidence.get("follows") or []):
+def figures(answers: Answers, curves: Curves) -> dict[str, Figure]:
+    """Return every figure that there is something to draw for, by name."""
+    drawn: dict[str, Figure | None] = {}
+    if curves.heat_map is not None:
+        drawn["heat_map"] = heat_map(curves.heat_map)
+    for place, curve in enumerate(curves.follows):
         drawn[f"follows_{place}"] = follows(curve, effect_names(answers))
     for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
         if name == "runs_power" or joint is not None:
-            drawn[name] = runs(evidence.get("runs") or [], joint)
+            drawn[name] = runs(curves.runs, joint)
     drawn["by_cause"] = by_cause(answers)
-    drawn["budget"] = budget(answers, document)
-    drawn["experiment"] = experiment(evidence.get("experiment") or {})
+    drawn["budget"] = budget(answers)
+    if curves.experiment is not None:
+        drawn["experiment"] = experiment(curves.experiment)
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
@@ -46,19 +48,17 @@ def foremost_joint(answers: Answers) -> str | None:
     return next(joints, None)
 
 
-def heat_map(given: Evidence) -> Figure | None:
-    """Draw the excess of each joint in each regime."""
-    if not given.get("joints") or not given.get("regimes"):
-        return None
-    values = given["excess"]
+def heat_map(given: ExcessMap) -> Figure | None:
+    """Draw the excess of each joint in each regime, None where it is known of none."""
+    values = given.excess
     known = [value for row in values for value in row if value is not None]
     if not known:
         return None
-    regimes = [plain(name.replace("_", " ")) for name in given["regimes"]]
+    regimes = [plain(name.replace("_", " ")) for name in given.regimes]
     top = math.log10(1 + max(_LEAST_TOP, *known))
     ticks = [tick for tick in (_TICKS if top < _WIDE else _DECADES) if math.log10(1 + tick) <= top]
     cells = {
-        "type": "heatmap", "x": regimes, "y": [plain(name) for name in given["joints"]], "zmin": 0, "zmax": top,
+        "type": "heatmap", "x": regimes, "y": [plain(name) for name in given.joints], "zmin": 0, "zmax": top,
         "z": [[None if value is None else math.log10(1 + max(value, 0.0)) for value in row] for row in values],
         "customdata": values, "colorscale": _SHADES, "xgap": 2, "ygap": 2, "hoverongaps": False,
         "text": [[_cell(value) for value in row] for row in values], "texttemplate": "%{text}",
@@ -75,46 +75,43 @@ def heat_map(given: Evidence) -> Figure | None:
     return {"data": [cells], "layout": {**axes, "hovermode": "closest", "margin": {"l": 80, "r": 12, "t": 95, "b": 12}}}
 
 
-def foremost_curves(curves: Sequence[Evidence], answers: Answers) -> list[Evidence]:
+def foremost_curves(curves: Sequence[Followed], answers: Answers) -> list[Followed]:
     """Return the curves of each effect at the joints where most of the gap lies; an arm has too many to show all."""
     order = list(dict.fromkeys(row["joint"] for row in answers["locations"].rows))
-    ranks = {joint: place for place, joint in enumerate(order)}
+    first = {joint: place for place, joint in enumerate(order)}
     of_effect: dict[str | None, list[int]] = {}
     for place, curve in enumerate(curves):
-        of_effect.setdefault(curve.get("effect"), []).append(place)
+        of_effect.setdefault(curve.effect, []).append(place)
     kept = [
         place
         for places in of_effect.values()
-        for place in sorted(places, key=lambda k: ranks.get(curves[k].get("joint"), len(ranks)))[:_CURVES]
+        for place in sorted(places, key=lambda k: first.get(curves[k].joint, len(first)))[:_CURVES]
     ]
     return [curves[place] for place in sorted(kept)]
 
 
 def effect_names(answers: Answers) -> dict[str, str]:
     """Return what the ontology calls the effects that the diagnosis names, by their ids."""
-    named = [
-        (row[key], row["label"])
-        for question, key in (("causes", "effect"), ("rivals", "rival"), ("not_testable", "effect"))
-        for row in answers[question].rows
-    ]
+    questions = ("causes", "not_testable")
+    named = [(row["effect"], row["label"]) for question in questions for row in answers[question].rows]
+    named += [(row["rival"], row["rival_label"]) for row in answers["rivals"].rows]
     return {wording.local_name(effect): label for effect, label in named if label}
 
 
-def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
+def follows(curve: Followed, names: Mapping[str, str]) -> Figure:
     """Draw the residual against the variable that it follows, and the effect's curve on it."""
-    unit = "W" if curve.get("channel") == "power" else "N m"
-    x, data = list(curve["x"]), []
-    if curve.get("low") and curve.get("high"):
-        edge = {
-            "type": "scatter",
-            "mode": "lines",
-            "x": x,
-            "line": {"width": 0},
-            "hoverinfo": "skip",
-            "showlegend": False,
-        }
-        band = {"fill": "tonexty", "fillcolor": f"rgba(95,109,122,{_BANDED})", "name": "spread", "showlegend": True}
-        data += [{**edge, "y": list(curve["low"])}, {**edge, "y": list(curve["high"]), **band}]
+    unit = "W" if curve.channel == "power" else "N m"
+    x = list(curve.x)
+    edge = {
+        "type": "scatter",
+        "mode": "lines",
+        "x": x,
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "showlegend": False,
+    }
+    band = {"fill": "tonexty", "fillcolor": f"rgba(95,109,122,{_BANDED})", "name": "spread", "showlegend": True}
+    data = [{**edge, "y": list(curve.low)}, {**edge, "y": list(curve.high), **band}]
     left = f"%{{y:.3~g}} {unit}<extra></extra>"
     data.append(
         {
@@ -122,13 +119,13 @@ def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
             "mode": "markers",
             "name": "residual",
             "x": x,
-            "y": list(curve["residual"]),
+            "y": list(curve.residual),
             "marker": {"color": MEASURED, "size": 5},
             "hovertemplate": f"residual {left}",
         }
     )
-    if curve.get("fitted"):
-        effect = curve.get("effect") or "fitted_curve"
+    if curve.fitted is not None:
+        effect = curve.effect or "fitted_curve"
         name = plain(names.get(effect, effect.replace("_", " ")))
         line = {"color": PALETTE[5], "width": 2.5}
         data.append(
@@ -137,36 +134,39 @@ def follows(curve: Evidence, names: Mapping[str, str]) -> Figure:
                 "mode": "lines",
                 "name": name,
                 "x": x,
-                "y": list(curve["fitted"]),
+                "y": list(curve.fitted),
                 "line": line,
                 "hovertemplate": f"{name} {left}",
             }
         )
-    variable = curve["variable"].replace("_", " ")
-    unit_of_x = wording.unit_symbol(curve.get("unit"))
+    variable = curve.variable.replace("_", " ")
+    unit_of_x = wording.unit_symbol(curve.unit)
     title = f"{variable}, {unit_of_x}" if unit_of_x else variable
     xaxis = {"type": "linear", "title": {"text": plain(title)}, "zeroline": True}
     return {"data": data, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"residual, {unit}"}}}}
 
 
-def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
+def runs(given: Sequence[RunError], joint: str | None) -> Figure | None:
     """Draw the RMSE of each held-out run before and after, with its noise floor; power where `joint` is None.
 
     None where nothing changed.
     """
-    rows = [row for row in given if row.get("joint") == joint]
-    if all(row.get("before") == row.get("after") for row in rows):
+    rows = [row for row in given if row.joint == joint]
+    if all(row.before == row.after for row in rows):
         return None
     unit = "W" if joint is None else "N m"
-    names = _numbered([plain(row["run"]) for row in rows])
+    names = _numbered([plain(row.run) for row in rows])
     data: list[dict[str, Any]] = [
         {
-            "type": "bar", "name": name, "x": names, "y": [row.get(key) for row in rows], "marker": {"color": colour},
+            "type": "bar", "name": name, "x": names, "y": values, "marker": {"color": colour},
             "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
         }
-        for name, key, colour in (("before", "before", BEFORE), ("with the causes added", "after", AFTER))
+        for name, values, colour in (
+            ("before", [row.before for row in rows], BEFORE),
+            ("with the causes added", [row.after for row in rows], AFTER),
+        )
     ]  # fmt: skip
-    if any(row.get("floor") is not None for row in rows):
+    if any(row.floor is not None for row in rows):
         marker = {"symbol": "line-ew", "size": 34, "line": {"color": FLOOR, "width": 2}}
         data.append(
             {
@@ -174,7 +174,7 @@ def runs(given: Sequence[Evidence], joint: str | None) -> Figure | None:
                 "mode": "markers",
                 "name": "noise floor",
                 "x": names,
-                "y": [row.get("floor") for row in rows],
+                "y": [row.floor for row in rows],
                 "marker": marker,
                 "hovertemplate": f"noise floor %{{y:.3~g}} {unit}<extra></extra>",
             }
@@ -190,16 +190,16 @@ def by_cause(answers: Answers) -> Figure | None:
     """
     of_any = answers["changes_by_cause"].rows
     rows = [row for row in of_any if row["measure"] == of_any[0]["measure"]]
-    if len({row["rank"] for row in rows}) < 2:
+    if len({row["cause"] for row in rows}) < 2:
         return None
     unit = rows[0]["unit"]
-    place_of = {row["rank"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
-    rows = sorted(rows, key=lambda row: place_of[row["rank"]])
+    place_of = {row["cause"]: place for place, row in enumerate(answers["causes"].rows, start=1)}
+    rows = sorted(rows, key=lambda row: place_of[row["cause"]])
     data = []
     for name, part, colour in (("cause alone", "alone", AFTER), ("all causes but this one", "without", PALETTE[4])):
         of_part = [row for row in rows if row["part"] == part]
         bars = {
-            "type": "bar", "name": name, "x": [plain(f"{place_of[row['rank']]}. {row['label']}") for row in of_part],
+            "type": "bar", "name": name, "x": [plain(f"{place_of[row['cause']]}. {row['label']}") for row in of_part],
             "y": [row["after"] for row in of_part], "marker": {"color": colour},
             "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
         }  # fmt: skip
@@ -215,12 +215,12 @@ def by_cause(answers: Answers) -> Figure | None:
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
 
 
-def budget(answers: Answers, document: Evidence) -> Figure | None:
+def budget(answers: Answers) -> Figure | None:
     """Draw where each channel's gap goes: closed by each cause, closeable without a name, and what is left."""
-    given = gap_document.budgets(document)
+    given = {row["channel"]: row for row in answers["closeable"].rows}
     if not given:
         return None
-    names, parts = list(given), gap_document.shares(document)
+    names, parts = list(given), {row["cause"]: row for row in answers["closed_by_cause"].rows}
     data = []
 
     def bar(name: str, of_channel: Mapping[str, float], colour: str) -> None:
@@ -232,20 +232,10 @@ def budget(answers: Answers, document: Evidence) -> Figure | None:
             }
         )  # fmt: skip
 
-    channel_of = {
-        rank: (cause.get("evidence") or {}).get("channel", "torque")
-        for rank, cause in enumerate(document["causes"], start=1)
-    }
     for place, row in enumerate(answers["causes"].rows):
-        channel, share = channel_of[row["rank"]], max(parts.get(row["rank"], 0.0), 0.0)
-        if channel in given and share:
-            whole = sum(max(parts.get(rank, 0.0), 0.0) for rank, of in channel_of.items() if of == channel)
-            name = str(row["label"] or wording.local_name(row["effect"]).replace("_", " "))
-            bar(
-                f"{place + 1}. {name}",
-                {channel: given[channel]["closed"] * share / whole},
-                _CAUSES[place % len(_CAUSES)],
-            )
+        if closed := parts.get(row["cause"]):
+            of_channel = {closed["channel"]: closed["part"]}
+            bar(f"{place + 1}. {effect_name(row)}", of_channel, _CAUSES[place % len(_CAUSES)])
     bar("could be closed, cause unknown", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
     bar("not closed", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
     xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
@@ -256,18 +246,15 @@ def budget(answers: Answers, document: Evidence) -> Figure | None:
     return {"data": data, "layout": {**layout, "hovermode": "closest", "bargap": 0.35, "legend": legend}}
 
 
-def experiment(curve: Evidence) -> Figure | None:
+def experiment(curve: PlannedMotion) -> Figure:
     """Draw the positions that the proposed experiment commands."""
-    if not curve.get("q"):
-        return None
-    units = curve.get("units") or ["rad"] * len(curve["joints"])
     lines = [
         {
-            "type": "scatter", "mode": "lines", "name": plain(joint), "x": curve["time"], "y": q,
+            "type": "scatter", "mode": "lines", "name": plain(joint), "x": curve.time, "y": q,
             "line": {"width": 1.5, "color": PALETTE[place % len(PALETTE)]},
             "hovertemplate": f"{plain(joint)} %{{y:.3~g}} {unit}<extra></extra>",
         }
-        for place, (joint, unit, q) in enumerate(zip(curve["joints"], units, curve["q"], strict=True))
+        for place, (joint, unit, q) in enumerate(zip(curve.joints, curve.units, curve.q, strict=True))
         if place < _JOINTS_DRAWN
     ]  # fmt: skip
     xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
@@ -275,7 +262,7 @@ def experiment(curve: Evidence) -> Figure | None:
         "data": lines,
         "layout": {
             "xaxis": xaxis,
-            "yaxis": {"title": {"text": f"position, {' or '.join(sorted(set(units), reverse=True))}"}},
+            "yaxis": {"title": {"text": f"position, {' or '.join(sorted(set(curve.units), reverse=True))}"}},
         },
     }
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from plotly.offline import get_plotlyjs
 
 from irtwin import resources
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
+from irtwin.gap.document.document import Document
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl import rules as shacl_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -21,9 +24,10 @@ from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
 from irtwin.report import wording
 from irtwin.report.energy.page import content_policy, embedded_json, environment
-from irtwin.report.gap import document as gap_document
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
+from irtwin.report.gap.experiment import experiment
+from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_questions
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
@@ -31,16 +35,13 @@ from irtwin.storage.files import write
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 
-
-_ELSEWHERE = ("share of what is closed",)  # evidence that has its own place on the page
-_FEW = 3  # of many rivals the foremost are shown; the file of the diagnosis has them all
+_FEW = 3  # of many rivals the foremost are shown; the graph has them all
 
 
 def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path) -> None:
     """Write the gap report of a robot (its IRI) to `out`.
 
-    Numbers come from the questions in `reports/gap`; shares, intervals and the experiment from the diagnosis' file and
-    curves from its evidence, both of which the graph names.
+    Numbers and sentences come from the questions in `reports/gap`, curves from the evidence file that the graph names.
     Raises InputError where the graph has no diagnosis of the robot.
     """
     found = ask(graph, {"diagnosis": _questions()["diagnosis"]}, {"robot": robot})["diagnosis"].first
@@ -48,17 +49,16 @@ def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path)
         raise InputError(f"{robot}: no diagnosis in the graph; run `irtwin diagnose` with this workspace first")
     bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
     answers = ask(graph, _questions(), bindings)
-    evidence = json.loads(read_document(found["evidence_file"], found["evidence_checksum"]))
-    document = json.loads(read_document(found["file"], found["checksum"]))
-    write(out, _page(gap_document.ranked(answers, document), bindings, evidence, document).encode())
+    curves = Curves.from_json(json.loads(read_document(found["evidence_file"], found["evidence_checksum"])))
+    write(out, _page(answers, bindings, curves).encode())
 
 
-def render_alone(data_set: DataSet, diagnosis: Mapping[str, Any], evidence: Mapping[str, Any], out: Path) -> None:
+def render_alone(data_set: DataSet, diagnosis: Document, curves: Curves, out: Path) -> None:
     """Write the gap report of a diagnosis that no workspace keeps."""
     robot_id = identifier(data_set.robot.name)
     with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as workspace:
         ingest(workspace, data_set)
-        record(workspace, robot_id, diagnosis, evidence)
+        record(workspace, robot_id, diagnosis, curves)
         graph = KnowledgeGraph()
         graph.load_ontology()
         mappings = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
@@ -71,13 +71,10 @@ def _questions() -> dict[str, Question]:
     return read_questions(resources.folder("reports") / "gap")
 
 
-def _page(
-    answers: Answers, bindings: Mapping[str, str], evidence: Mapping[str, Any], document: Mapping[str, Any]
-) -> str:
+def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
     folder = resources.folder("reports")
-    follows = gap_figures.foremost_curves(evidence.get("follows") or [], answers)
-    drawn = gap_figures.figures(answers, {**evidence, "follows": follows}, document)
-    parts = gap_document.shares(document)
+    follows = gap_figures.foremost_curves(curves.follows, answers)
+    drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
     scripts = {
         "plotly": get_plotlyjs(),
         "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
@@ -87,14 +84,12 @@ def _page(
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
         verdict=gap_verdict.sentence(answers),
-        causes=[_cause(row, answers) | {"share": parts.get(row["rank"])} for row in answers["causes"].rows],
-        places=gap_document.locations(answers["locations"].rows, document),
-        budgets=gap_document.budgets(document),
+        causes=[_cause(row, answers) for row in answers["causes"].rows],
         foremost=gap_figures.foremost_joint(answers),
         follows=follows,
-        hidden_curves=len(evidence.get("follows") or []) - len(follows),
+        hidden_curves=len(curves.follows) - len(follows),
         effect_names=gap_figures.effect_names(answers),
-        experiment=gap_document.experiment(document, gap_figures.effect_names(answers)),
+        experiment=experiment(answers),
         drawn=drawn,
         data=embedded_json({"figures": drawn, "explorer": None}),
         style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
@@ -104,31 +99,37 @@ def _page(
 
 
 def _cause(row: Row, answers: Answers) -> dict[str, Any]:
-    rank = row["rank"]
+    cause = row["cause"]
     return {
         **row,
-        "name": gap_verdict.effect_name(row),
-        "joints": gap_verdict.joints_of(rank, answers),
-        "rivals": gap_verdict.rivals_of(rank, answers),
-        "parameters": [one for one in answers["cause_parameters"].rows if one["rank"] == rank],
-        "evidence": [pair for pair in _pairs(row["evidence"]) if pair[0] not in _ELSEWHERE],
+        "name": effect_name(row),
+        "joints": gap_verdict.joints_of(cause, answers),
+        "rivals": gap_verdict.rivals_of(cause, answers),
+        "parameters": _of(cause, answers, "cause_parameters"),
+        "evidence": [
+            ("channel", row["channel"]),
+            *((one["name"], _said(one["value"], one["unit"])) for one in _of(cause, answers, "evidence")),
+            *_competitors(_of(cause, answers, "competitors")),
+            ("runs", ", ".join(one["run_name"] for one in _of(cause, answers, "cause_runs"))),
+        ],
     }
 
 
-def _pairs(text: str) -> list[tuple[str, str]]:
-    """Return a JSON object as names and texts."""
-    given: dict[str, Any] = json.loads(text)
-    return [(name.replace("_", " "), _said(value)) for name, value in given.items() if value is not None]
+def _of(cause: str, answers: Answers, question: str) -> list[Row]:
+    return [row for row in answers[question].rows if row["cause"] == cause]
 
 
-def _said(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return wording.number(value)
-    if isinstance(value, list):
-        return ", ".join(_said(one) for one in value)
-    if isinstance(value, dict):
-        foremost = sorted(value.items(), key=lambda pair: -pair[1] if isinstance(pair[1], float) else 0.0)[:_FEW]
-        return "; ".join(f"{name.replace('_', ' ')} {_said(one)}" for name, one in foremost)
-    return str(value).replace("_", " ") if isinstance(value, str) and " " not in value else str(value)
+def _competitors(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Return the effects that come nearest to a cause, by what they gain and by how they correlate with it."""
+    said = []
+    for name, variable in (("gain of rivals", "gain"), ("correlation with rivals", "correlation")):
+        known = sorted((row for row in rows if row[variable] is not None), key=lambda row: -row[variable])
+        foremost = [f"{effect_name(row)} {wording.number(row[variable])}" for row in known[:_FEW]]
+        said.append((name, "; ".join(foremost)))
+    return said
+
+
+def _said(value: float | str, unit: str | None) -> str:
+    if isinstance(value, str):
+        return value
+    return wording.quantity(value, wording.unit_symbol(unit)).rstrip()

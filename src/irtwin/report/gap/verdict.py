@@ -37,35 +37,32 @@ def _changed(named: str, diagnosis: Row) -> str:
     return f"the simulator lacks {named}"
 
 
-def effect_name(row: Row) -> str:
-    """Return an effect as the ontology calls it, or by its id."""
-    return str(row["label"] or wording.local_name(row["effect"]).replace("_", " "))
+def effect_name(row: Row, variable: str = "effect") -> str:
+    """Return what the ontology calls a row's effect, `label`, or its id; of another variable, `variable_label`."""
+    label = row["label" if variable == "effect" else f"{variable}_label"]
+    return str(label or wording.local_name(row[variable]).replace("_", " "))
 
 
-def joints_of(rank: int, answers: Answers) -> list[str]:
-    """Return the joints of a cause, none for the whole robot."""
-    return [row["joint"] for row in answers["cause_joints"].rows if row["rank"] == rank]
+def joints_of(cause: str, answers: Answers) -> list[str]:
+    """Return the joints of a cause (its IRI), none for the whole robot."""
+    return [row["joint"] for row in answers["cause_joints"].rows if row["cause"] == cause]
 
 
-def rivals_of(rank: int, answers: Answers) -> list[str]:
-    """Return the effects that explain the data as well as a cause does."""
-    return [
-        str(row["label"] or wording.local_name(row["rival"]).replace("_", " "))
-        for row in answers["rivals"].rows
-        if row["rank"] == rank
-    ]
+def rivals_of(cause: str, answers: Answers) -> list[str]:
+    """Return the effects that explain the data as well as a cause (its IRI) does."""
+    return [effect_name(row, "rival") for row in answers["rivals"].rows if row["cause"] == cause]
 
 
 def _cause(row: Row, answers: Answers) -> str:
-    joints = joints_of(row["rank"], answers)
+    joints = joints_of(row["cause"], answers)
     place = f" on {wording.listed(joints)}" if joints else ""
     return f"{effect_name(row)}{place} (confidence {wording.share(row['confidence'])})"
 
 
 def _class_of(row: Row, answers: Answers) -> list[str]:
-    joints = joints_of(row["rank"], answers)
+    joints = joints_of(row["cause"], answers)
     place = f" on {wording.listed(joints)}" if joints else ""
-    return [f"{name}{place}" for name in (effect_name(row), *rivals_of(row["rank"], answers))]
+    return [f"{name}{place}" for name in (effect_name(row), *rivals_of(row["cause"], answers))]
 
 
 def _classes(answers: Answers) -> str:

@@ -1,0 +1,1 @@
+"""What a diagnosis says, as typed parts, and their JSON."""

@@ -1,0 +1,81 @@
+"""What a page draws of a diagnosis: curves and maps, too long for rows. Numbers are None where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from irtwin.gap.document import form
+from irtwin.gap.document.document import Channel
+
+Numbers = tuple[float | None, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExcessMap:
+    """The excess over the noise floor of each joint (a row of `excess`) in each regime (a column)."""
+
+    joints: tuple[str, ...]
+    regimes: tuple[str, ...]
+    excess: tuple[Numbers, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """A residual (N m or W) against the `variable` that it follows, in bins.
+
+    `x` in the variable's `unit`; `residual`: the mean of a bin, `low` and `high` its quartiles; `fitted`: what the
+    effect adds there, None where no effect explains it.
+    """
+
+    channel: Channel
+    joint: str | None
+    effect: str | None
+    variable: str
+    unit: str
+    x: Numbers
+    residual: Numbers
+    low: Numbers
+    high: Numbers
+    fitted: Numbers | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunError:
+    """RMSE (N m of a joint, W of the robot) of a run that was left out of the fit, without and with the causes."""
+
+    run: str
+    joint: str | None
+    before: float | None
+    after: float | None
+    floor: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedMotion:
+    """The motion of the next experiment: `time` in s; positions `q` of each joint over it, in the joint's unit."""
+
+    time: Numbers
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    q: tuple[Numbers, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curves:
+    """All that is drawn; no map where no torque was measured."""
+
+    follows: tuple[Followed, ...]
+    runs: tuple[RunError, ...]
+    heat_map: ExcessMap | None = None
+    experiment: PlannedMotion | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the curves as JSON."""
+        written: dict[str, Any] = form.to_json(self)
+        return written
+
+    @classmethod
+    def from_json(cls, given: object) -> Curves:
+        """Return the curves that JSON says. Raises InputError, with the place, where it has another form."""
+        return form.from_json(cls, given, "curves")

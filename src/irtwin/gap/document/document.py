@@ -1,0 +1,242 @@
+"""The document of a diagnosis: what JSON, database, graph and page all say.
+
+Torque is in N m (N of a prismatic joint), power in W. A "channel" is torque or power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from irtwin.errors import InputError
+from irtwin.gap.document import form
+from irtwin.gap.document.experiment import Experiment
+from irtwin.gap.document.form import Between, OneOf, goes_with
+
+Share = Annotated[float, Between(0, 1)]
+Interval = tuple[float, float]  # 95 %
+Channel = Annotated[str, OneOf("torque", "power")]
+Verdict = Annotated[str, OneOf("no_gap", "attributed", "ambiguous", "unexplained")]
+Scope = Annotated[str, OneOf("missing", "changed")]
+FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Size:
+    """How large the gap of a channel is: `rmse` and `noise_floor` in its unit; `excess`: mean square / floor² - 1."""
+
+    rmse: float
+    noise_floor: float | None
+    excess: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gap:
+    """The gap before anything is added: torque by joint, power, and the error of the twin's energy, %."""
+
+    energy_error_percent: float | None
+    torque: Mapping[str, Size] | None = None
+    power: Size | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Location:
+    """A place of the gap; joint and regime None: the whole robot, any motion.
+
+    `follows`: the variable that the residual goes with; `share` of the channel's excess; `excess` as of a Size;
+    `concentration`: its share of its joint's excess over its share of the samples; intervals are over runs.
+    """
+
+    channel: Channel
+    joint: str | None
+    regime: str | None
+    follows: str | None
+    runs: tuple[str, ...] | None
+    share: Share
+    share_interval95: Interval
+    excess: float
+    excess_interval95: Interval
+    concentration: float
+    false_discovery_rate: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A parameter of a cause, in its `unit`; joint None: of the whole robot."""
+
+    name: str
+    joint: str | None
+    value: float
+    unit: str
+    interval95: Interval | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Why a cause is held responsible. Shares and correlations are 0 to 1, the other numbers have no unit.
+
+    Gains are of weighted squares, a sample, on groups of runs left out; `t` is a gain's mean over its standard error,
+    between groups; `p` is adjusted for the whole catalogue. Rivals are all effects that compete, by id.
+    `power_says`: whether power takes what a cause adds to torque ("mechanical"), only the sensor shows it ("sensor"),
+    or neither is sure ("undecided"); `power_on_explained_torque_says`: of a cause of power, "electrical" or "meter".
+    `runs` and `window` (s of the clock): where it acts in some runs, or for a while, only.
+    """
+
+    channel: Channel
+    share_of_what_is_closed: float | None
+    closed_where_it_acts: float
+    gain_on_groups_left_out: float
+    t_between_groups: float
+    p_adjusted_for_the_catalogue: float
+    gain_of_rivals: Mapping[str, float]
+    correlation_with_rivals: Mapping[str, float]
+    power_on_explained_torque_says: str | None = None
+    power_says: str | None = None
+    gain_in_power_if_mechanical: float | None = None
+    t_in_power_between_groups: float | None = None
+    runs: tuple[str, ...] | None = None
+    window: Interval | None = field(default=None, metadata=goes_with("runs"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """An effect held responsible for part of the gap; `joints` none: it acts on the whole robot.
+
+    `id` names it within the document; `confidence`: the share of causes given with this number that are right.
+    """
+
+    id: str
+    effect: str
+    joints: tuple[str, ...]
+    scope: Scope
+    confidence: Share
+    parameters: tuple[Parameter, ...]
+    indistinguishable_from: tuple[str, ...]
+    evidence: Evidence
+
+
+@dataclass(frozen=True, kw_only=True)
+class Untestable:
+    """An effect that the data cannot show, and why."""
+
+    effect: str
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """A measure of the gap on runs outside the fit, before and after the causes are added, in the measure's unit."""
+
+    before: float
+    after: float
+    noise_floor: float | None
+    interval95_after: Interval | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedFraction:
+    """The share of the gap above the floor that closes, at most 1; below 0 where the causes make it worse."""
+
+    value: float
+    interval95: Interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class CauseChange:
+    """What one cause closes: RMSE of each equation of its channel, in the channel's unit.
+
+    `cause`: its id; `share` of what the causes of its channel close together.
+    """
+
+    cause: str
+    effect: str
+    joints: tuple[str, ...]
+    scope: Scope
+    channel: Channel
+    share: float | None
+    rmse_before: tuple[float, ...]
+    rmse_alone: tuple[float, ...]
+    rmse_when_left_out: tuple[float, ...]
+    rmse_with_all: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Closeable:
+    """How much of a channel's gap could be closed at all, as shares 0 to 1 `of` something; None where there is no gap.
+
+    `closed`: by the causes, refitted to all runs; `by_regression`: by a flexible regression on the motion alone;
+    `nameless`: by one of what the causes leave; `closeable`: by the better of the two. Then each equation's.
+    """
+
+    closed: float | None
+    closeable: float | None
+    by_regression: float | None
+    nameless: float | None
+    closed_by_equation: tuple[float | None, ...]
+    closeable_by_equation: tuple[float | None, ...]
+    by_regression_by_equation: tuple[float | None, ...]
+    nameless_by_equation: tuple[float | None, ...]
+    of: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shrink:
+    """How far the gap shrinks on runs outside the fit: torque in N m, power in W, energy in %."""
+
+    held_out_runs: tuple[str, ...]
+    noise_floor_from: FloorSource | None
+    torque_rmse: Change | None
+    power_rmse: Change | None
+    energy_error_percent: Change | None
+    closed_fraction: ClosedFraction | None
+    by_cause: tuple[CauseChange, ...]
+    yardstick: Mapping[str, Closeable]  # by channel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Document:
+    """A diagnosis as it is handed out. Raises InputError where the ids of its causes do not fit together."""
+
+    verdict: Verdict
+    robot: str
+    gap: Gap
+    locations: tuple[Location, ...]
+    causes: tuple[Cause, ...]
+    not_testable: tuple[Untestable, ...]
+    shrink: Shrink
+    next_experiment: Experiment | None
+
+    def __post_init__(self) -> None:
+        ids = {cause.id for cause in self.causes}
+        if len(ids) < len(self.causes):
+            raise InputError("diagnosis.causes: two have one id; give each an id of its own")
+        if unknown := {one.cause for one in self.shrink.by_cause} - ids:
+            raise InputError(f"diagnosis.shrink.by_cause: no cause has the id {min(unknown)}; use those of the causes")
+
+    @property
+    def largest_first(self) -> tuple[Cause, ...]:
+        """The causes by the share that they close, channel by channel, that of the foremost cause first."""
+        channels = list(dict.fromkeys(cause.evidence.channel for cause in self.causes))
+        return tuple(
+            sorted(
+                self.causes,
+                key=lambda one: (channels.index(one.evidence.channel), -(one.evidence.share_of_what_is_closed or 0.0)),
+            )
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the document as JSON, in the form of `schema()`."""
+        written: dict[str, Any] = form.to_json(self)
+        return written
+
+    @classmethod
+    def from_json(cls, given: object) -> Document:
+        """Return the document that JSON says. Raises InputError, with the place, where it has another form."""
+        return form.from_json(cls, given, "diagnosis")
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a diagnosis: that of `diagnosis.schema.json`, with all that is said beside it."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Diagnosis of a sim-to-real gap"}
+    return head | form.schema(Document)

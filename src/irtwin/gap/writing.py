@@ -1,0 +1,229 @@
+"""Writing the document of a diagnosis: its parts, from what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from irtwin.effects.effect import Quantity, Term
+from irtwin.gap.data.noise_floor import Floor
+from irtwin.gap.document import document
+from irtwin.gap.document.document import Closeable
+from irtwin.gap.energy_errors import EnergyErrors
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.detectability import Untestable
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.verdict import UNEXPLAINED
+from irtwin.gap.localisation.locations import Location
+from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
+from irtwin.gap.regression.normal_equations import noise_before
+from irtwin.gap.screening.screen import acting
+from irtwin.gap.thresholds import Confidence
+from irtwin.identification.estimators import Estimate
+from irtwin.robot.description import Robot
+
+
+def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> document.Gap:
+    """Return the gap before anything is added."""
+    sizes = {finding.name: _sizes(finding) for finding in findings}
+    return document.Gap(
+        energy_error_percent=energies.mean[0] if energies else None,
+        torque=dict(zip(joints, sizes["torque"], strict=True)) if "torque" in sizes else None,
+        power=sizes["power"][0] if "power" in sizes else None,
+    )
+
+
+def _sizes(finding: Finding) -> list[document.Size]:
+    judged = finding.held_out.rows.sum(axis=0)
+    return [
+        document.Size(
+            rmse=float(rmse),
+            noise_floor=None if finding.floor is None else float(finding.floor[k]),
+            excess=None if finding.excess is None or not judged[k] else float(finding.excess[k]),
+        )
+        for k, rmse in enumerate(finding.rmse)
+    ]
+
+
+def location(one: Location) -> document.Location:
+    """Return a place of the gap, with what is sure of it."""
+    return document.Location(
+        channel=one.channel,
+        joint=one.joint,
+        regime=one.regime,
+        follows=one.follows,
+        runs=one.runs,
+        share=one.share,
+        share_interval95=one.share_interval,
+        excess=one.excess,
+        excess_interval95=one.excess_interval,
+        concentration=one.concentration,
+        false_discovery_rate=one.q,
+    )
+
+
+def cause(
+    robot: Robot, finding: Finding, one: Cause, name: str, gains: Sequence[float], verdict: str, weights: Confidence
+) -> document.Cause:
+    """Return a cause, `name` its id, with its parameters and evidence; `gains` are those of all causes."""
+    closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
+    return document.Cause(
+        id=name,
+        effect=one.effect,
+        joints=acted_on(robot, one),
+        scope=one.scope,
+        confidence=confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained),
+        parameters=parameters(robot, finding, one),
+        indistinguishable_from=one.rivals,
+        evidence=_evidence(finding, one, closed),
+    )
+
+
+def _evidence(finding: Finding, one: Cause, closed: float) -> document.Evidence:
+    runs, window = acting(one.variants) or (None, None)
+    return document.Evidence(
+        channel=finding.name,
+        share_of_what_is_closed=finding.share(one),
+        closed_where_it_acts=closed,
+        gain_on_groups_left_out=one.gain,
+        t_between_groups=one.t,
+        p_adjusted_for_the_catalogue=one.p,
+        gain_of_rivals=one.rival_gains,
+        correlation_with_rivals=one.rival_correlations,
+        **_balance(finding, one),
+        runs=runs,
+        window=window,
+    )
+
+
+def _balance(finding: Finding, one: Cause) -> dict[str, Any]:
+    """Return what torque and power together say of a cause."""
+    if finding.name == "power":
+        electrical = all(variant.effect.channel == "power" for variant in one.variants)
+        return {"power_on_explained_torque_says": "electrical" if electrical else "meter"}
+    said = finding.balance(one)
+    if said is None:
+        return {}
+    return {
+        "power_says": said.kind or "undecided",
+        "gain_in_power_if_mechanical": said.gain,
+        "t_in_power_between_groups": said.t,
+    }
+
+
+def acted_on(robot: Robot, one: Cause) -> tuple[str, ...]:
+    """Return the joints that a cause acts on; none for an effect of the whole robot."""
+    named = [(variant.effect, term.joint) for variant in one.variants for term in variant.terms if term.link is None]
+    touched = [effect.touched(robot, joint) for effect, joint in named if joint is not None]
+    return tuple(dict.fromkeys(joint for joints in touched for joint in joints))
+
+
+def parameters(robot: Robot, finding: Finding, one: Cause) -> tuple[document.Parameter, ...]:
+    """Return a cause's parameters as the catalogue states them, with 95 % intervals."""
+    found, used = finding.estimate, finding.used
+    known = {
+        (effect.id, term.joint, term.name): float(found.values[k])
+        for k, (effect, term) in enumerate(finding.system.terms)
+        if term.link is None
+    }
+    stated: list[document.Parameter] = []
+    for variant in one.variants:
+        places = [used.index(k) for k in variant.columns]
+        joint = variant.terms[0].joint if variant.terms[0].link is None and len(variant.terms) else None
+        effect = variant.effect
+        if joint is not None and len(one.joints) > 0:
+            effect = effect.on(joint)
+        if len(effect.terms(robot)) == len(places):
+            covariance = found.covariance[np.ix_(places, places)]
+            quantities = effect.parameters(robot, found.values[places], covariance, known)
+            stated += [_quantity(each) for each in quantities if np.isfinite(each.value)]
+        else:
+            stated += [_coefficient(variant.terms[k], found, place) for k, place in enumerate(places)]
+    if one.of_bodies:  # most of a body's numbers do not show: those that do
+        stated = [each for each in stated if each.interval95 and each.interval95[0] * each.interval95[1] > 0]
+    return tuple(stated)
+
+
+def untestable(one: Untestable) -> document.Untestable:
+    """Return an effect that the data cannot show."""
+    return document.Untestable(effect=one.effect, why=one.why)
+
+
+def shrink(
+    robot: Robot,
+    runs: Sequence[str],
+    findings: Sequence[Finding],
+    floor: Floor,
+    energies: EnergyErrors | None,
+    named: Sequence[tuple[Finding, Cause, str]],
+    yardstick: Mapping[str, Closeable],
+    seed: int,
+) -> document.Shrink:
+    """Return how far the gap shrinks on runs that took no part in the fit; `named`: every cause with its id."""
+    changes = {finding.name: _change(finding, seed) for finding in findings}
+    with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.causes]
+    closed = closed_fraction(with_floor, seed) if with_floor else None
+    return document.Shrink(
+        held_out_runs=tuple(runs),
+        noise_floor_from=floor.source,
+        torque_rmse=changes.get("torque"),
+        power_rmse=changes.get("power"),
+        energy_error_percent=energies.change(seed) if energies else None,
+        closed_fraction=closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1])),
+        by_cause=tuple(
+            _by_cause(robot, finding, each, next(name for _, one, name in named if one is each))
+            for finding in findings
+            for each in finding.causes
+        ),
+        yardstick=yardstick,
+    )
+
+
+def _change(finding: Finding, seed: int) -> document.Change:
+    judged = finding.held_out
+    rows = judged.rows.sum()
+    low, high = pooled_interval(judged.after, judged.rows, seed)
+    return document.Change(
+        before=float(np.sqrt(judged.before.sum() / rows)),
+        after=float(np.sqrt(judged.after.sum() / rows)),
+        noise_floor=None if finding.floor is None else float(np.sqrt(np.mean(finding.floor**2))),
+        interval95_after=(low, high),
+    )
+
+
+def _by_cause(robot: Robot, finding: Finding, one: Cause, name: str) -> document.CauseChange:
+    """Return what a cause closes alone, and what is lost without it."""
+    system, noise = finding.system, noise_before(finding.system)
+    alone = held_out(system, noise, noise, one.columns)
+    others = [k for other in finding.causes if other is not one for k in other.columns]
+    without = held_out(system, noise, finding.attribution.noise, others)
+    return document.CauseChange(
+        cause=name,
+        effect=one.effect,
+        joints=acted_on(robot, one),
+        scope=one.scope,
+        channel=finding.name,
+        share=finding.share(one),
+        rmse_before=_numbers(alone.rmse(alone.before)),
+        rmse_alone=_numbers(alone.rmse(alone.after)),
+        rmse_when_left_out=_numbers(without.rmse(without.after)),
+        rmse_with_all=_numbers(finding.held_out.rmse(finding.held_out.after)),
+    )
+
+
+def _numbers(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _quantity(one: Quantity) -> document.Parameter:
+    ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
+    return document.Parameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)
+
+
+def _coefficient(term: Term, found: Estimate, place: int) -> document.Parameter:
+    value, half = float(found.values[place]), 1.96 * float(np.sqrt(max(found.covariance[place, place], 0.0)))
+    ends = (value - half, value + half)
+    return document.Parameter(name=term.name, joint=term.joint, value=value, unit=term.unit, interval95=ends)

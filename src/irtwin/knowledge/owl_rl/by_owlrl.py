@@ -1,0 +1,83 @@
+"""The closure as the package owlrl draws it: another author's reading of the same rules, to check ours by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import owlrl
+import rdflib
+from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge.owl_rl.closure import Contradiction, says_something
+from irtwin.knowledge.owl_rl.terms import Node
+
+MOST_TRIPLES = 300_000
+SECONDS_PER_TRIPLE = 1e-3  # measured from 4,000 to 80,000 triples: docs/findings/reasoning.md
+
+_ERRORS = rdflib.Namespace("http://www.daml.org/2002/03/agents/agent-ont#")
+_ILL_TYPED = "Lexical value of the literal"  # owlrl says so of every zero that is a double
+
+
+def check_size(triples: int) -> None:
+    """Raise InputError where owlrl would take too long."""
+    if triples > MOST_TRIPLES:
+        raise InputError(
+            f"owlrl would take {triples * SECONDS_PER_TRIPLE / 60:.0f} minutes or more for {triples:,} triples; "
+            f"{MOST_TRIPLES:,} are the most: leave out --engine"
+        )
+
+
+def inferred(triples: Iterable[Triple]) -> set[Triple]:
+    """Return every triple that follows and was not given; Contradiction says what owlrl found wrong first."""
+    given = set(triples)
+    return {triple for triple in _closed(given) if triple not in given}
+
+
+def worth_keeping(triples: Iterable[Triple]) -> set[Triple]:
+    """Return what follows and is worth keeping in a graph, as `Closure.worth_keeping` has it."""
+    return {triple for triple in inferred(triples) - _truisms() if says_something(triple)}
+
+
+@cache
+def _truisms() -> frozenset[Triple]:
+    """Return what follows from nothing."""
+    return frozenset(_closed([]))
+
+
+def _closed(triples: Iterable[Triple]) -> set[Triple]:
+    graph = rdflib.Graph()
+    for triple in triples:
+        graph.add((_to_rdflib(triple.subject), _to_rdflib(triple.predicate), _to_rdflib(triple.object)))
+    owlrl.DeductiveClosure(owlrl.OWLRL_Semantics).expand(graph)
+    for error in graph.objects(None, _ERRORS.error):
+        if not str(error).startswith(_ILL_TYPED):
+            raise Contradiction(f"statements contradict each other, owlrl finds: {error}")
+    said = (statement for statement in graph if not {*statement} & {_ERRORS.error, _ERRORS.ErrorMessage})
+    return {
+        Triple(*map(_from_rdflib, statement))
+        for statement in said
+        if isinstance(statement[1], rdflib.URIRef) and not isinstance(statement[0], rdflib.Literal)
+    }
+
+
+def _to_rdflib(term: Node) -> Any:
+    if isinstance(term, NamedNode):
+        return rdflib.URIRef(term.value)
+    if isinstance(term, BlankNode):
+        return rdflib.BNode(term.value)
+    assert isinstance(term, Literal)
+    if term.language:
+        return rdflib.Literal(term.value, lang=term.language)
+    return rdflib.Literal(term.value, datatype=rdflib.URIRef(term.datatype.value), normalize=False)
+
+
+def _from_rdflib(term: Any) -> Any:
+    if isinstance(term, rdflib.URIRef):
+        return NamedNode(str(term))
+    if isinstance(term, rdflib.BNode):
+        return BlankNode(str(term))
+    datatype = None if term.datatype is None else NamedNode(str(term.datatype))
+    return Literal(str(term), language=term.language) if term.language else Literal(str(term), datatype=datatype)

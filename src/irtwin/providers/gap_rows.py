@@ -1,0 +1,267 @@
+"""The rows of a diagnosis, from its document: one function for each table or two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from irtwin.gap.document.document import Cause, Change, Document
+from irtwin.gap.document.experiment import Experiment, Programme
+from irtwin.storage import experiment_schema, gap_schema
+from irtwin.storage.schema import Base
+
+ALL = "all"  # stands for every cause where a row's key needs one
+
+
+@dataclass(frozen=True)
+class Place:
+    """What the rows of a diagnosis belong to; `run_id` gives a run's, by its name in the document.
+
+    `linear`: the joints whose positions are in m, not rad.
+    """
+
+    diagnosis_id: str
+    robot_id: str
+    run_id: Callable[[str], str]
+    linear: frozenset[str]
+
+
+def rows(said: Document, at: Place) -> Iterator[Base]:
+    """Yield all rows of a diagnosis but its own."""
+    yield from _sizes(said, at)
+    yield from _locations(said, at)
+    for rank, cause in enumerate(said.causes, start=1):
+        yield from _cause(cause, rank, at)
+    yield from _changes(said, at)
+    yield from _closing(said, at)
+    for name in dict.fromkeys(said.shrink.held_out_runs):
+        yield gap_schema.GapHeldOut(diagnosis_id=at.diagnosis_id, run_id=at.run_id(name))
+    for number, one in enumerate(said.not_testable, start=1):
+        yield gap_schema.GapNotTestable(diagnosis_id=at.diagnosis_id, number=number, effect=one.effect, why=one.why)
+    if said.next_experiment is not None:
+        yield from _experiment(said.next_experiment, at)
+
+
+def _sizes(said: Document, at: Place) -> Iterator[Base]:
+    sizes = [("torque", joint, size) for joint, size in (said.gap.torque or {}).items()]
+    power = [("power", None, said.gap.power)] if said.gap.power is not None else []
+    for channel, joint, size in [*sizes, *power]:
+        yield gap_schema.GapSize(
+            diagnosis_id=at.diagnosis_id,
+            channel=channel,
+            place=joint or "robot",
+            joint=joint,
+            robot_id=at.robot_id,
+            rmse=size.rmse,
+            noise_floor=size.noise_floor,
+            excess=size.excess,
+            unit="N m" if channel == "torque" else "W",
+        )
+
+
+def _locations(said: Document, at: Place) -> Iterator[Base]:
+    for rank, one in enumerate(said.locations, start=1):
+        yield gap_schema.GapLocation(
+            diagnosis_id=at.diagnosis_id,
+            rank=rank,
+            robot_id=at.robot_id,
+            channel=one.channel,
+            joint=one.joint,
+            regime=one.regime,
+            follows=one.follows,
+            share=one.share,
+            share_lower=one.share_interval95[0],
+            share_upper=one.share_interval95[1],
+            excess=one.excess,
+            excess_lower=one.excess_interval95[0],
+            excess_upper=one.excess_interval95[1],
+            concentration=one.concentration,
+            false_discovery_rate=one.false_discovery_rate,
+        )
+        for name in dict.fromkeys(one.runs or ()):
+            yield gap_schema.GapLocationRun(diagnosis_id=at.diagnosis_id, rank=rank, run_id=at.run_id(name))
+
+
+def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:
+    why, key = said.evidence, {"diagnosis_id": at.diagnosis_id, "cause_id": said.id}
+    start, stop = why.window or (None, None)
+    yield gap_schema.GapCause(
+        **key,
+        rank=rank,
+        robot_id=at.robot_id,
+        effect=said.effect,
+        scope=said.scope,
+        confidence=said.confidence,
+        channel=why.channel,
+        share_of_closed=why.share_of_what_is_closed,
+        closed_where_it_acts=why.closed_where_it_acts,
+        gain_on_groups_left_out=why.gain_on_groups_left_out,
+        t_between_groups=why.t_between_groups,
+        p_adjusted=why.p_adjusted_for_the_catalogue,
+        power_on_explained_torque_says=why.power_on_explained_torque_says,
+        power_says=why.power_says,
+        gain_in_power=why.gain_in_power_if_mechanical,
+        t_in_power=why.t_in_power_between_groups,
+        acts_from_s=start,
+        acts_until_s=stop,
+    )
+    for joint in dict.fromkeys(said.joints):
+        yield gap_schema.GapCauseJoint(**key, joint=joint, robot_id=at.robot_id)
+    for rival in dict.fromkeys(said.indistinguishable_from):
+        yield gap_schema.GapCauseRival(**key, effect=rival)
+    gains, correlations = why.gain_of_rivals, why.correlation_with_rivals
+    for effect in dict.fromkeys([*gains, *correlations]):
+        yield gap_schema.GapCauseCompetitor(
+            **key, effect=effect, gain=gains.get(effect), correlation=correlations.get(effect)
+        )
+    for name in dict.fromkeys(why.runs or ()):
+        yield gap_schema.GapCauseRun(**key, run_id=at.run_id(name))
+    for number, one in enumerate(said.parameters, start=1):
+        lower, upper = one.interval95 or (None, None)
+        yield gap_schema.GapCauseParameter(
+            **key,
+            number=number,
+            robot_id=at.robot_id,
+            joint=one.joint,
+            name=one.name,
+            value=one.value,
+            unit=one.unit,
+            lower=lower,
+            upper=upper,
+        )
+
+
+def _changes(said: Document, at: Place) -> Iterator[Base]:
+    """What all causes change together; and each alone, and all without it."""
+    shrink = said.shrink
+    measures = {
+        "torque_rmse": (shrink.torque_rmse, "N m"),
+        "power_rmse": (shrink.power_rmse, "W"),
+        "energy_error_percent": (shrink.energy_error_percent, "%"),
+    }
+    for measure, (change, unit) in measures.items():
+        if change is not None:
+            yield _change(measure, "together", None, change, unit, at)
+    for one in shrink.by_cause:
+        measure = f"{one.channel}_rmse"
+        for part, left in (("alone", one.rmse_alone), ("without", one.rmse_when_left_out)):
+            before, after = _pooled(one.rmse_before), _pooled(left)
+            change = Change(before=before, after=after, noise_floor=None, interval95_after=None)
+            yield _change(measure, part, one.cause, change, measures[measure][1], at)
+
+
+def _change(measure: str, part: str, cause: str | None, change: Change, unit: str, at: Place) -> Base:
+    lower, upper = change.interval95_after or (None, None)
+    return gap_schema.GapChange(
+        diagnosis_id=at.diagnosis_id,
+        measure=measure,
+        part=part,
+        place=cause or ALL,
+        cause_id=cause,
+        before=change.before,
+        after=change.after,
+        noise_floor=change.noise_floor,
+        lower=lower,
+        upper=upper,
+        unit=unit,
+    )
+
+
+def _pooled(values: Sequence[float]) -> float:
+    """Return the root of the mean square over joints."""
+    return math.sqrt(sum(value**2 for value in values) / len(values))
+
+
+def _closing(said: Document, at: Place) -> Iterator[Base]:
+    closed = said.shrink.closed_fraction
+    if closed is not None:
+        lower, upper = closed.interval95
+        yield gap_schema.GapShrinkage(
+            diagnosis_id=at.diagnosis_id, closed_fraction=closed.value, lower=lower, upper=upper
+        )
+    for channel, one in said.shrink.yardstick.items():
+        yield gap_schema.GapCloseable(
+            diagnosis_id=at.diagnosis_id,
+            channel=channel,
+            of_what=one.of,
+            closed=one.closed,
+            closeable=one.closeable,
+            by_regression=one.by_regression,
+            nameless=one.nameless,
+        )
+
+
+def _experiment(said: Experiment, at: Place) -> Iterator[Base]:
+    key, programme = {"diagnosis_id": at.diagnosis_id}, said.programme
+    yield experiment_schema.GapExperiment(
+        **key,
+        purpose=said.purpose,
+        note=said.note,
+        separation_now=said.separation_now,
+        expected_separation=said.expected_separation,
+        enough=said.separation_that_is_enough,
+        kind=programme and programme.kind,
+        motion_s=programme and programme.seconds,
+        set_up_s=programme and programme.set_up_seconds,
+        hold_s=programme and programme.hold_seconds,
+        command=programme and programme.command,
+    )
+    for effect in dict.fromkeys(said.effects):
+        yield experiment_schema.GapExperimentEffect(**key, effect=effect)
+    for number, text in enumerate(said.motions, start=1):
+        yield experiment_schema.GapExperimentInstruction(**key, number=number, text=text)
+    for number, asked in enumerate(said.questions, start=1):
+        effect, *rivals = asked.effects
+        yield experiment_schema.GapExperimentQuestion(
+            **key,
+            number=number,
+            effect=effect,
+            rival=next(iter(rivals), None),
+            separation_now=asked.separation_now,
+            expected_separation=asked.expected_separation,
+            not_imitated_now=asked.not_imitated_now,
+            expected_not_imitated=asked.expected_not_imitated,
+            visibility_now=asked.visibility_now,
+            expected_visibility=asked.expected_visibility,
+        )
+    for number, one in enumerate(said.considered, start=1):
+        yield experiment_schema.GapExperimentConsidered(
+            **key,
+            number=number,
+            kind=one.kind,
+            chosen=programme is not None and one.kind == programme.kind,
+            whole_s=60.0 * one.minutes,
+            expected_separation=one.expected_separation,
+        )
+    if programme is not None:
+        yield from _programme(programme, at)
+
+
+def _programme(said: Programme, at: Place) -> Iterator[Base]:
+    for joint in dict.fromkeys(said.joints):
+        yield experiment_schema.GapExperimentJoint(diagnosis_id=at.diagnosis_id, joint=joint, robot_id=at.robot_id)
+    temperatures = said.temperatures or (None,) * len(said.payload_mass)
+    for number, (mass, temperature) in enumerate(zip(said.payload_mass, temperatures, strict=True), start=1):
+        yield experiment_schema.GapExperimentRun(
+            diagnosis_id=at.diagnosis_id, number=number, payload_mass_kg=mass, temperature_degc=temperature
+        )
+    yield from _settings("pose", {joint: (value,) for joint, value in (said.pose or {}).items()}, "", at)
+    yield from _settings("speed", said.speeds, "/s", at)
+    yield from _settings("amplitude", said.amplitudes, "", at)
+    yield from _settings("acceleration", said.accelerations, "/s^2", at)
+    yield from _settings("held_pose", said.poses, "", at)
+
+
+def _settings(kind: str, given: Mapping[str, Sequence[float]] | None, per: str, at: Place) -> Iterator[Base]:
+    for joint, values in (given or {}).items():
+        for number, value in enumerate(values, start=1):
+            yield experiment_schema.GapExperimentSetting(
+                diagnosis_id=at.diagnosis_id,
+                kind=kind,
+                joint=joint,
+                number=number,
+                robot_id=at.robot_id,
+                value=value,
+                unit=f"{'m' if joint in at.linear else 'rad'}{per}",
+            )

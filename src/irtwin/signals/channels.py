@@ -1,0 +1,119 @@
+"""The channels of a run, each said in one line: its columns in a log, unit, range, and the field that holds it.
+
+A new channel is a line of `Signals`. It is then read from every source, checked, conditioned, stored and given back;
+`docs/LOG_FORMAT.md` lists it, and a line of the live stream may say it where it has a key there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Annotated, Any, Self, get_type_hints
+
+import numpy as np
+import numpy.typing as npt
+
+Samples = npt.NDArray[np.float64]
+Logged = Samples | None
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What a log calls a channel, and what its values may be.
+
+    Its columns are PREFIX_JOINT, one a joint; PREFIX alone where it is the whole robot's, and not `per_joint`.
+    `unit`, of a joint that slides `sliding`; `greatest`: the largest magnitude that any robot reaches; `label`: what it
+    is. `streamed`: its key in a live stream, None where a stream has none. `strict`: PREFIX_NAME is a mistake where no
+    joint has that name; else it is some other column.
+    """
+
+    prefix: str
+    unit: str
+    greatest: float
+    label: str
+    per_joint: bool = True
+    sliding: str | None = None
+    streamed: str | None = None
+    strict: bool = False
+
+    def column(self, joint: str) -> str:
+        """Return the name of its column for a joint; of the whole robot's, whatever the joint."""
+        return f"{self.prefix}_{joint}" if self.per_joint else self.prefix
+
+    def columns(self, joints: Iterable[str]) -> tuple[str, ...]:
+        """Return the names of its columns for a robot of these joints."""
+        return tuple(map(self.column, joints)) if self.per_joint else (self.prefix,)
+
+    def unit_of(self, kind: str) -> str:
+        """Return its unit at a joint of a kind: "prismatic" ones slide."""
+        return self.sliding if self.sliding and kind == "prismatic" else self.unit
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One run's samples, N rows of a robot of n joints, in SI units; None where nothing was logged.
+
+    (N, n) where the channel has a value for each joint, else (N,). `torque` is on the joint side, `power`,
+    `meter_voltage` and `meter_current` are the whole robot's, where its power is measured.
+    """
+
+    time: Annotated[Samples, Channel("time", "s", 1e11, "time of the sample", per_joint=False)]
+    q: Annotated[Samples, Channel("q", "rad", 1e4, "position", sliding="m", streamed="position", strict=True)]
+    _: KW_ONLY
+    dq: Annotated[Logged, Channel("dq", "rad/s", 1e4, "speed", sliding="m/s", streamed="velocity", strict=True)] = None
+    ddq: Annotated[Logged, Channel("ddq", "rad/s^2", 1e6, "acceleration", sliding="m/s^2", strict=True)] = None
+    torque: Annotated[Logged, Channel("tau", "N m", 1e6, "torque", sliding="N", streamed="effort", strict=True)] = None
+    current: Annotated[Logged, Channel("i", "A", 1e5, "motor current")] = None
+    temperature: Annotated[Logged, Channel("temp", "degC", 1e3, "temperature", streamed="temperature")] = None
+    power: Annotated[Logged, Channel("power", "W", 1e7, "electrical power", per_joint=False, streamed="power")] = None
+    meter_voltage: Annotated[Logged, Channel("voltage", "V", 1e5, "supply voltage", per_joint=False)] = None
+    meter_current: Annotated[Logged, Channel("current", "A", 1e5, "supply current", per_joint=False)] = None
+
+    def logged(self) -> dict[str, Samples]:
+        """Return what was logged, by field, in the order of the table."""
+        return {field: values for field in CHANNELS if (values := getattr(self, field)) is not None}
+
+    def rows(self, chosen: slice | np.ndarray) -> Self:
+        """Return some of the samples."""
+        some: dict[str, Any] = {name: it[chosen] for name, it in vars(self).items() if isinstance(it, np.ndarray)}
+        return replace(self, **some)
+
+
+def _channels() -> dict[str, Channel]:
+    hints = get_type_hints(Signals, include_extras=True)
+    return {field: hint.__metadata__[0] for field, hint in hints.items() if hasattr(hint, "__metadata__")}
+
+
+CHANNELS: Mapping[str, Channel] = _channels()  # by field of Signals
+REQUIRED = ("time", "q")  # fields without which a run is none
+
+
+def by_column(joints: Iterable[str]) -> dict[str, Channel]:
+    """Return the channel of each column that a log of these joints may have."""
+    names = tuple(joints)
+    return {column: channel for channel in CHANNELS.values() for column in channel.columns(names)}
+
+
+def columns_of(signals: Signals, joints: Iterable[str]) -> dict[str, Samples]:
+    """Return signals as columns of a log, each (N,)."""
+    names = tuple(joints)
+    columns: dict[str, Samples] = {}
+    for field, values in signals.logged().items():
+        parts = values.T if CHANNELS[field].per_joint else values[None]
+        columns |= dict(zip(CHANNELS[field].columns(names), parts, strict=True))
+    return columns
+
+
+def from_columns(columns: Mapping[str, Samples], joints: Iterable[str]) -> Signals:
+    """Return the signals of a log's columns, each (N,): the inverse of `columns_of`.
+
+    KeyError, with its name, where a column is absent of a channel that has others, or of time or the positions.
+    """
+    names = tuple(joints)
+    found: dict[str, Samples] = {}
+    for field, channel in CHANNELS.items():
+        own = channel.columns(names)
+        if field in REQUIRED or any(name in columns for name in own):
+            parts = [columns[name] for name in own]
+            found[field] = np.column_stack(parts) if channel.per_joint else parts[0]
+    return Signals(**found)

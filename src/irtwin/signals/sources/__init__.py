@@ -1,0 +1,1 @@
+"""Where the samples of a run come from: one file a format."""

@@ -1,0 +1,98 @@
+"""Runs as text: a line of column names, then a line for each sample."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import pyarrow as pa
+import pyarrow.csv
+
+from irtwin.errors import InputError
+from irtwin.input_file import read_input
+from irtwin.signals.sources.source import MOST_COLUMNS, Source, first_line
+
+_LARGEST = 1_000_000_000  # bytes; held in memory while it is read
+
+
+class _Parsed(NamedTuple):
+    """A file's samples; `wrong`: lines of more or fewer values than the first, and what they have; how many lines."""
+
+    table: pa.Table
+    columns: list[str]
+    wrong: list[tuple[int, str]]
+    lines: int
+
+
+class CsvSource(Source):
+    """Values separated by commas, in UTF-8."""
+
+    suffixes: ClassVar[tuple[str, ...]] = (".csv",)
+    counted: ClassVar[str] = "line"
+    first: ClassVar[int] = 2
+
+    def columns(self) -> Sequence[str]:
+        """Return the names in the first line."""
+        return self._parsed.columns
+
+    def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
+        """Return some of the columns; `repair` drops lines of more or fewer values than the first."""
+        table, _, wrong, lines = self._parsed
+        if wrong and not repair:
+            line, what = wrong[0]
+            last = ", the last one: the file was cut off" if line == lines else ""
+            raise InputError(
+                f"{self.path}, line {line}{last}: {what}; correct it, or use --repair to drop such samples"
+            )
+        self.check_size(table.num_rows, len(columns))
+        shown = ", ".join(str(line) for line, _ in wrong[:10]) + (" ..." if len(wrong) > 10 else "")
+        said = f"{self.path}: {len(wrong)} samples dropped, wrong number of values: line {shown}"
+        return table.select(columns), [said] if wrong else []
+
+    @cached_property
+    def _parsed(self) -> _Parsed:
+        text = self._text()
+        wrong: list[tuple[int, str]] = []
+
+        def note(row: pa.csv.InvalidRow) -> str:
+            wrong.append((row.number, f"{row.actual_columns} values instead of {row.expected_columns}"))
+            return "skip"
+
+        try:
+            table = pa.csv.read_csv(
+                io.BytesIO(text),
+                read_options=pa.csv.ReadOptions(use_threads=False),
+                parse_options=pa.csv.ParseOptions(invalid_row_handler=note, ignore_empty_lines=False),
+                convert_options=pa.csv.ConvertOptions(strings_can_be_null=True),
+            )
+            return _Parsed(table, list(table.column_names), wrong, text.count(b"\n") + 1)
+        except (pa.ArrowException, UnicodeDecodeError) as error:
+            too_long = "straddling" in str(error)  # Arrow's word for a line longer than the block it reads at once
+            reason = "a line is longer than 1 MB" if too_long else first_line(error)
+            raise InputError(f"{self.path}: not readable as CSV ({reason}); separate columns by commas") from error
+
+    def _text(self) -> bytes:
+        text = read_input(self.path, _LARGEST).rstrip()
+        if not text:
+            raise InputError(f"{self.path}: is empty; a run has one line of column names and one line per sample")
+        if b"\n" not in text:
+            raise InputError(f"{self.path}: has no sample below its first line; an empty run cannot be used")
+        self._check_characters(text)
+        columns = text.count(b",", 0, text.index(b"\n")) + 1
+        if columns > MOST_COLUMNS:
+            raise InputError(f"{self.path}, line 1: {columns} columns; a run has at most {MOST_COLUMNS}")
+        return text
+
+    def _check_characters(self, text: bytes) -> None:
+        """Raise where it is not UTF-8: Arrow stumbles over such a line of the wrong length, and says so to nobody."""
+        if text.isascii():
+            return
+        for number, line in enumerate(io.BytesIO(text), start=1):
+            try:
+                line.decode()
+            except UnicodeDecodeError as error:
+                raise InputError(
+                    f"{self.path}, line {number}: not UTF-8 text (byte {error.start + 1}); save the run as UTF-8"
+                ) from error

@@ -1,0 +1,64 @@
+"""What a log format has to do so that runs can be read from it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import pyarrow as pa
+
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+
+MOST_COLUMNS = 10_000
+MOST_VALUES = 100_000_000  # of the columns that are read: 0.8 GB
+
+
+class Source(ABC):
+    """A file with a run's samples. A format is a subclass, and the end of its files' names.
+
+    `columns` are those of `docs/LOG_FORMAT.md`, by which the joints of `robot` are named, and others that nobody asks
+    for. A format of several streams, each with a clock of its own, brings them onto one `time` in `read`.
+    What is checked of the samples is the same for all formats, and not done here.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]]  # in small letters, as ".csv"
+    counted: ClassVar[str] = "row"  # what a message calls a sample's place in the file
+    first: ClassVar[int] = 0  # place of the first sample
+
+    def __init__(self, path: Path, robot: Robot) -> None:
+        self.path = path
+        self.robot = robot
+
+    @abstractmethod
+    def columns(self) -> Sequence[str]:
+        """Return the names of the file's columns. Raises InputError where it cannot be read."""
+
+    @abstractmethod
+    def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
+        """Return some of the columns, and with `repair` a line for each kind of sample that was dropped.
+
+        A column is of numbers, or of text that may be numbers. Raises InputError where the file cannot be read, or is
+        beyond `check_size`.
+        """
+
+    def place(self, sample: int) -> str:
+        """Return what a message calls a sample, counted from 0."""
+        return f"{self.counted} {sample + self.first}"
+
+    def check_size(self, rows: int, columns: int) -> None:
+        """Raise InputError where there is no sample, or there are more values than the memory is to hold."""
+        if rows == 0:
+            raise InputError(f"{self.path}: has no sample; an empty run cannot be used")
+        if rows * columns > MOST_VALUES:
+            raise InputError(
+                f"{self.path}: {rows} samples of {columns} columns; a run may have {MOST_VALUES:,} values: "
+                "cut it into several"
+            )
+
+
+def first_line(error: Exception) -> str:
+    """Return what a library said of a fault, short enough for a message."""
+    return str(error).strip().partition("\n")[0][:200]

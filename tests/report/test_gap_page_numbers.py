@@ -1,0 +1,159 @@
+"""Every number of a gap page is the document's, and each cause's are its own."""
+
+from __future__ import annotations
+
+import html
+import itertools
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests import gap_cases
+from tests.gap_pages import figures_of, page_of
+
+from irtwin.gap.document.document import Document
+from irtwin.report import wording
+
+NUMBER = re.compile(r"−?\d[\d\u202f]*(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
+CELLS = re.compile(
+    r'<(td class="number"|small|dd|b|span class="badge[^"]*"|p class="hint")>(.*?)</(?:td|dd|b|span|p|small)>'
+)
+WORDS = {
+    "95",  # % of an interval
+    "100",  # standard deviations: "over 100"
+    "3", "1", "2",  # in names of joints and runs
+    "4",
+    "6",
+}  # fmt: skip
+
+
+def told_apart(value: Any, count: Iterator[int]) -> Any:
+    """Return a diagnosis in which no two numbers are alike."""
+    if isinstance(value, dict):
+        return {key: told_apart(one, count) for key, one in value.items()}
+    if isinstance(value, list):
+        return [told_apart(one, count) for one in value]
+    return value * (1 - 0.0037 * next(count)) if isinstance(value, float) else value
+
+
+def numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from numbers(one)
+    elif isinstance(value, float):
+        yield value
+
+
+def written(value: float) -> set[str]:
+    """Return the ways in which a page may write a number."""
+    ways = [
+        wording.number(value),
+        wording.number(value, 2),
+        wording.given(value),
+        wording.share(value),
+        wording.percent(value),
+        wording.duration(value),
+        f"{value:.2g}",
+    ]
+    return {found for way in ways for found in NUMBER.findall(way.replace("\N{NO-BREAK SPACE}", " "))}
+
+
+def shown(page: str) -> list[str]:
+    """Return the numbers of a page's tables, facts, badges and hints."""
+    page = page[page.index('id="summary"') : page.index('id="provenance"')]
+    page = re.sub(r'<details class="questions">.*?</details>', "", page, flags=re.DOTALL)
+    cells = [re.sub("<[^>]*>", " ", found[1]) for found in CELLS.findall(page)]
+    texts = [html.unescape(cell).replace("\N{NO-BREAK SPACE}", " ") for cell in cells]
+    return [found for text in texts for found in NUMBER.findall(re.sub(r"\w+_\w+", "", text))]
+
+
+@pytest.mark.parametrize("verdict", gap_cases.VERDICTS)
+def test_every_number_shown_is_one_of_the_document(tmp_path: Path, verdict: str) -> None:
+    said = told_apart(gap_cases.diagnosis(verdict), itertools.count())
+    of_document = set().union(*map(written, numbers(said)))
+    of_minutes = {f"{one['minutes']:.2g}" for one in (said["next_experiment"] or {}).get("considered", [])}
+    seen = shown(page_of(tmp_path, said))
+    assert len(seen) >= 20
+    assert set(seen) - of_document - of_minutes - WORDS == set()
+
+
+def test_every_number_that_matters_is_shown(tmp_path: Path) -> None:
+    said = told_apart(gap_cases.diagnosis("ambiguous"), itertools.count())
+    document = Document.from_json(said)
+    seen = set(shown(page_of(tmp_path, said)))
+    experiment, shrink = document.next_experiment, document.shrink
+    assert experiment is not None and experiment.programme is not None and shrink.closed_fraction is not None
+    shares = [shrink.closed_fraction.value, *shrink.closed_fraction.interval95]
+    plain: list[float] = [experiment.questions[0].separation_now, experiment.separation_that_is_enough]
+    for cause in document.causes:
+        why = cause.evidence
+        shares += [cause.confidence, why.share_of_what_is_closed or 0.0]
+        plain += [why.gain_on_groups_left_out, why.t_between_groups, why.p_adjusted_for_the_catalogue]
+        plain += [why.closed_where_it_acts, *why.gain_of_rivals.values(), *why.correlation_with_rivals.values()]
+        plain += [number for one in cause.parameters for number in (one.value, *(one.interval95 or ()))]
+    for place in document.locations:
+        shares += [place.share, *place.share_interval95]
+        plain += [place.excess, *place.excess_interval95]
+    for size in (document.gap.torque or {}).values():
+        plain += [size.rmse, size.noise_floor or 0.0]
+    for change in (shrink.torque_rmse, shrink.power_rmse, shrink.energy_error_percent):
+        assert change is not None
+        plain += [change.before, change.after, *(change.interval95_after or ())]
+    settings = [*(experiment.programme.speeds or {}).values(), *(experiment.programme.amplitudes or {}).values()]
+    plain += [number for values in settings for number in values]
+    assert [share for share in shares if not written(share) & seen] == []
+    assert [number for number in plain if not written(number) & seen] == []
+
+
+def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return a cause of one joint, and what it closes."""
+    said = gap_cases.diagnosis("attributed")
+    cause, change = said["causes"][0], said["shrink"]["by_cause"][1]
+    name = f"stribeck_friction@{joint}"
+    cause |= {"id": name, "joints": [joint], "confidence": confidence}
+    cause["parameters"] = [{"name": "Fs", "joint": joint, "value": 10 * share, "unit": "N m", "interval95": None}]
+    cause["evidence"] |= {"share_of_what_is_closed": share, "t_between_groups": 100 * share}
+    change |= {
+        "cause": name,
+        "joints": [joint],
+        "share": share,
+        "rmse_alone": [share],
+        "rmse_when_left_out": [9 * share],
+    }
+    return cause, change | {"rmse_before": [1.4]}
+
+
+def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
+    said = gap_cases.diagnosis("attributed")
+    pairs = [friction_of("joint_a2", 0.35, 0.61), friction_of("joint_a5", 0.65, 0.72)]
+    said["causes"] = [cause for cause, _ in pairs]
+    said["shrink"]["by_cause"] = [change for _, change in reversed(pairs)]  # in another order than the causes
+    page = page_of(tmp_path, said)
+    page = html.unescape(page).replace("\N{NO-BREAK SPACE}", " ")
+    parts = page.split('id="which"')[1].split("<h3>")[1:]
+    assert [part.split("</h3>")[0] for part in parts[:2]] == [
+        "1. Stribeck friction on joint_a5",
+        "2. Stribeck friction on joint_a2",
+    ]
+    for part, confidence, share, value in ((parts[0], "72 %", "65 %", "6.50"), (parts[1], "61 %", "35 %", "3.50")):
+        assert f"confidence {confidence}" in part
+        assert f"{share} of the closed gap" in part
+        assert f'<td class="number">{value}</td>' in part
+        assert f"<dd>{10 * float(value):.1f}</dd>" in part
+    drawn = figures_of(tmp_path / "p.html")
+    alone, without = drawn["by_cause"]["data"]
+    assert alone["x"] == ["1. Stribeck friction", "2. Stribeck friction"]
+    assert alone["y"] == pytest.approx([0.65, 0.35]) and without["y"] == pytest.approx([5.85, 3.15])
+    assert [bar["x"][0] for bar in drawn["budget"]["data"][:2]] == pytest.approx([90 * 0.65, 90 * 0.35])
+
+
+def test_what_is_drawn_of_shares_adds_up(tmp_path: Path) -> None:
+    said = told_apart(gap_cases.diagnosis("attributed"), itertools.count())
+    page_of(tmp_path, said)
+    bars = figures_of(tmp_path / "p.html")["budget"]["data"]
+    assert math.fsum(bar["x"][0] for bar in bars) == pytest.approx(100)
+    closed = said["shrink"]["yardstick"]["torque"]["closed"]
+    assert math.fsum(bar["x"][0] for bar in bars[:2]) == pytest.approx(100 * closed)

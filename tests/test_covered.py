@@ -1,0 +1,82 @@
+"""Each module has a test file of its name in the room of its name, or a line in COVERED_BY.toml that says where."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parent
+SOURCE = TESTS.parent / "src"
+COVERED_BY = tomllib.loads((TESTS / "COVERED_BY.toml").read_text(encoding="utf-8"))
+
+
+def has_code(file: Path) -> bool:
+    return any(not isinstance(part, ast.Expr) for part in ast.parse(file.read_text(encoding="utf-8")).body)
+
+
+MODULES = {
+    ".".join(file.relative_to(SOURCE / "irtwin").with_suffix("").parts): file
+    for file in sorted((SOURCE / "irtwin").rglob("*.py"))
+    if has_code(file)
+}
+
+PROVIDERS = [entry.module.removeprefix("irtwin.") for entry in entry_points(group="irtwin.providers")]
+
+
+def own_test(name: str) -> Path:
+    """Where the test file of a module's name would be: in the folder of its outermost room."""
+    *rooms, last = name.split(".")
+    return TESTS.joinpath(*rooms[:1], f"test_{last}.py")
+
+
+@cache
+def imported(file: Path) -> frozenset[str]:
+    """Return the modules of irtwin that a file imports anywhere, those of helpers too, and what a command runs."""
+    text = file.read_text(encoding="utf-8")
+    found = {"cli", "__main__"} if '"-m", "irtwin"' in text else set()
+    for part in ast.walk(ast.parse(text)):
+        names = []
+        if isinstance(part, ast.ImportFrom) and part.module:
+            names = [part.module, *(f"{part.module}.{one.name}" for one in part.names)]
+        elif isinstance(part, ast.Import):
+            names = [one.name for one in part.names]
+        for name in names:
+            place = TESTS.parent.joinpath(*name.split(".")).with_suffix(".py")
+            if name.split(".")[0] == "irtwin":
+                found |= {name.removeprefix("irtwin."), f"{name}.__init__".removeprefix("irtwin.")}
+            elif name.startswith("tests.") and place.is_file():
+                found |= imported(place)
+    return frozenset(found & MODULES.keys())
+
+
+def reached(file: Path) -> set[str]:
+    """Return the modules that a test file imports, and those that these import."""
+    fixtures = [place / "conftest.py" for place in (TESTS, file.parent) if (place / "conftest.py").is_file()]
+    todo = [name for one in (file, *fixtures) for name in imported(one)]
+    found: set[str] = set()
+    while todo:
+        name = todo.pop()
+        if name not in found:
+            found.add(name)
+            todo += [*imported(MODULES[name]), *(PROVIDERS if name == "providers.planner" else ())]
+    return found
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_module_has_its_test(name: str) -> None:
+    if own_test(name).is_file():
+        assert name not in COVERED_BY, f"{own_test(name)} is there: take the line out of COVERED_BY.toml"
+        return
+    assert name in COVERED_BY, f"write {own_test(name)}, or say in COVERED_BY.toml which test holds it"
+    file = TESTS / f"{COVERED_BY[name]}.py"
+    assert file.is_file()
+    assert name in reached(file), f"{file} does not come to it"
+
+
+def test_no_line_is_of_a_module_that_is_gone() -> None:
+    assert COVERED_BY.keys() - MODULES.keys() == set()
