@@ -24,7 +24,7 @@ _SHOWN = 16  # solutions: a pose within reach of a six-axis arm has no more, unl
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
 _source = click.argument("source", type=click.Path(path_type=Path))
-_link = click.option("--link", metavar="NAME", help="A link other than the flange, the last one of the robot.")
+_link = click.option("--link", metavar="NAME", help="Take this link, not the flange (the last link).")
 _json = click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 
 
@@ -51,8 +51,8 @@ def robot() -> None:
 def dh(source: Path, convention: str, link: str | None, as_json: bool) -> None:
     """Print the Denavit-Hartenberg table of a robot.
 
-    It is exact for any axes: what the rows cannot hold stands in the transforms before the first (base) and after the
-    last (tool).
+    SOURCE is a URDF file, a data set's folder, or its dataset.toml. The table is exact for any axes: what the rows
+    cannot hold stands in the transforms before the first (base) and after the last (tool).
     """
     from irtwin.robot.chain_table import deviation, table_of
     from irtwin.robot.kinematics import flange
@@ -109,7 +109,8 @@ def _table_lines(described: Robot, table: Table, end: str, apart: tuple[float, f
 def urdf(source: Path, out: Path) -> None:
     """Write a robot's description as URDF.
 
-    Turns the Denavit-Hartenberg table of a data set into a URDF; another data set gives the URDF that it has.
+    SOURCE is a data set's folder or its dataset.toml. Its Denavit-Hartenberg table becomes a URDF; where it has a URDF,
+    that is written.
     """
     from irtwin.signals.log import read_robot
     from irtwin.storage.files import check_place, write
@@ -129,8 +130,8 @@ def urdf(source: Path, out: Path) -> None:
 def fk(source: Path, q: tuple[float, ...], file: Path | None, link: str | None, as_json: bool) -> None:
     """Print the flange's pose at joint positions Q.
 
-    This is forward kinematics. Give a number for each joint, base to flange, or a file of many; the poses of a file are
-    printed as CSV.
+    This is forward kinematics. SOURCE is a URDF file, a data set's folder, or its dataset.toml. Q is a number for each
+    joint, base to flange, in rad (m where it slides). The poses of a file are printed as CSV.
     """
     import numpy as np
 
@@ -231,16 +232,17 @@ def _pose_lines(document: dict[str, Any]) -> Iterator[str]:
 @robot.command()
 @_source
 @click.option(
-    "--pose", type=float, nargs=6, required=True, metavar="X Y Z R P Y", help="Position, m; roll, pitch, yaw."
+    "--pose", type=float, nargs=6, required=True, metavar="X Y Z R P Y", help="Position, m; roll, pitch, yaw, rad."
 )
-@click.option("--from", "start", metavar="Q,Q,...", help="Joint positions to stay near. Default: zero.")
+@click.option("--from", "start", metavar="Q,Q,...", help="Joint positions to stay near, rad (m). Default: zero.")
 @_link
 @_json
 def ik(source: Path, pose: tuple[float, ...], start: str | None, link: str | None, as_json: bool) -> None:
     """Print joint positions that bring the flange to a pose.
 
-    This is inverse kinematics. Lists all that a search within the joint limits finds, the nearest first; those that
-    differ by whole turns of a joint count as one. Where the pose is out of reach, says by how much.
+    This is inverse kinematics. SOURCE is a URDF file, a data set's folder, or its dataset.toml. Lists all that a
+    search within the joint limits finds, the nearest first; those that differ by whole turns of a joint count as one.
+    Where the pose is out of reach, says by how much.
     """
     import numpy as np
     import pinocchio as pin
@@ -290,9 +292,9 @@ def _missed(distance: float, angle: float) -> str:
 def equations(source: Path, joint: str | None, latex: bool) -> None:
     """Print the torque of a small robot in symbols.
 
-    These are the equations of motion of a robot of up to three joints: each joint's torque by position (q), speed (dq)
-    and acceleration (ddq), for rigid bodies of the masses in the description, without friction and rotors. Coefficients
-    have six digits. Needs irtwin[symbolic].
+    SOURCE is a URDF file, a data set's folder, or its dataset.toml, of a robot of up to three joints. Prints each
+    joint's torque by position (q), speed (dq) and acceleration (ddq), for rigid bodies of the masses in the
+    description, without friction and rotors. Coefficients have six digits. Needs irtwin[symbolic].
     """
     from irtwin.robot.equations import equations as derive
     from irtwin.signals.log import read_robot
