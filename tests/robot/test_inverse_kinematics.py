@@ -11,6 +11,7 @@ from tests.robot.test_denavit_hartenberg import PANDA, UR10
 
 from irtwin import resources
 from irtwin.errors import InputError
+from irtwin.robot.chain_table import deviation, table_of
 from irtwin.robot.denavit_hartenberg import Row, Table, from_table
 from irtwin.robot.description import Robot
 from irtwin.robot.inverse_kinematics import solve
@@ -90,6 +91,14 @@ def test_an_arm_of_seven_joints_has_solutions_without_end():
     assert found.redundant
     assert len(found.solutions) > 10
     assert found.solutions[0] == pytest.approx(q, abs=1e-6)
+
+
+def test_limits_may_lie_beyond_a_half_turn():
+    far = Table((Row(0.3, 0.0, 0.0, lower=4.0, upper=5.0), Row(0.2, 0.0, 0.0, kind="prismatic", lower=7.0, upper=7.5)))
+    robot = from_table("far", far)
+    found = solve(robot, pose(robot, [4.5, 7.2]))
+    assert found.solutions == pytest.approx(np.array([[4.5, 7.2]]), abs=1e-6)
+    assert max(deviation(robot, table_of(robot))) < 1e-12
 
 
 @pytest.mark.parametrize(("x", "distance"), [(0.6, 0.0), (0.7, 0.1), (2.0, 1.4)])

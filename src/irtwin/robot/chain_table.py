@@ -16,11 +16,10 @@ import pinocchio as pin
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, Table, row_transform, screw_x, screw_z
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import flange, link_frame
+from irtwin.robot.kinematics import flange, link_frame, ranges
 
 PARALLEL = 1e-5  # rad: axes nearer to parallel than this are taken as such, because files round their angles
 _POSES = 100  # at which a table is held against its robot
-_HALF_RANGE = np.pi  # rad, or m: of a joint without limits, when poses are drawn
 
 
 @dataclass(frozen=True)
@@ -55,10 +54,8 @@ def deviation(robot: Robot, table: Table, tip: str | None = None) -> tuple[float
     chain, _ = _chain(robot, name)
     draw = np.random.default_rng(0)
     model, data, frame = robot.model, robot.model.createData(), link_frame(robot, name)
-    lower = np.array([max(joint.lower, -_HALF_RANGE) for joint in robot.joints])
-    upper = np.array([min(joint.upper, _HALF_RANGE) for joint in robot.joints])
     far, turned = 0.0, 0.0
-    for q in draw.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (_POSES, len(robot.joints))):
+    for q in draw.uniform(*ranges(robot), (_POSES, len(robot.joints))):
         pin.framesForwardKinematics(model, data, q)
         place, said = data.oMf[frame], table.flange(q[[joint - 1 for joint in chain]])
         far = max(far, float(np.abs(said[:3, 3] - place.translation).max()))

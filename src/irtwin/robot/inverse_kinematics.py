@@ -10,14 +10,13 @@ import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import flange, link_frame
+from irtwin.robot.kinematics import flange, link_frame, ranges
 
 _STARTS = 200  # of the search: one given or the middle of the ranges, the others drawn
 _STEPS = 60  # from each start
 _REACHED = 1e-9  # m and rad
 _SAME = 1e-4  # rad, m: solutions nearer than this are one
 _NEAR = 1e-5  # m: a position that is missed by less can be reached
-_FREE = np.pi  # rad, or m: range either way of a joint without limits, when starts are drawn
 _DAMPING, _LEAST_DAMPING = 1e-3, 1e-12
 
 _Error = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of a pose: what is left (m,), and its slope (m, n)
@@ -94,13 +93,12 @@ class _Search:
     def __init__(self, robot: Robot, frame: int, goal: pin.SE3, lower: np.ndarray, upper: np.ndarray) -> None:
         self._model, self._data, self._frame = robot.model, robot.model.createData(), frame
         self._goal, self._lower, self._upper = goal, lower, upper
+        self._ranges = ranges(robot)
         self._turns = np.array([joint.kind != "prismatic" for joint in robot.joints])
 
     def draw(self, random: np.random.Generator, count: int) -> np.ndarray:
         """Return (count, n) joint positions within the limits."""
-        return random.uniform(
-            np.maximum(self._lower, -_FREE), np.minimum(self._upper, _FREE), (count, len(self._lower))
-        )
+        return random.uniform(*self._ranges, (count, len(self._lower)))
 
     def whole(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (6,) m and rad from the pose to the goal, and (6, n) its slope."""

@@ -45,5 +45,13 @@ def placements(robot: Robot, q: np.ndarray, link: str | None = None) -> np.ndarr
     return result
 
 
+def ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the greatest positions to draw, (n,) rad or m: within the limits, at most pi either way."""
+    lower = np.array([joint.lower for joint in robot.joints])
+    upper = np.array([joint.upper for joint in robot.joints])
+    middle = np.clip(0.0, lower, upper)
+    return np.maximum(lower, middle - np.pi), np.minimum(upper, middle + np.pi)
+
+
 def _frames(robot: Robot) -> list[tuple[Link, int]]:
     return [(link, robot.model.getFrameId(link.name, pin.FrameType.BODY)) for link in robot.links]
