@@ -132,7 +132,7 @@ def test_faults_are_named(tmp_path, old, new, message):
             "[robot]\nname = 'a'\ndh.convention = 'standard'\n" + "[[robot.dh.row]]\n" * 101,
             "101 rows; a robot has at most 100|not valid TOML",
         ),
-        ("[robot]\nname = 'a'\n", r"\[robot\] urdf is missing"),
+        ("[robot]\nname = 'a'\n", r"\[robot\] urdf is missing; name the URDF, or describe the joints"),
     ],
 )
 def test_tables_that_are_none_are_named(tmp_path, text, message):

@@ -146,6 +146,8 @@ def _robot(folder: Path, table: Table) -> Robot:
         raise InputError(f"{table.file}: [robot] name is missing")
     if "dh" in table.values and "urdf" in table.values:
         raise InputError(f"{table.file}: [robot] has both urdf and dh; keep the one that describes the robot")
+    if "dh" not in table.values and "urdf" not in table.values:
+        raise InputError(f"{table.file}: [robot] urdf is missing; name the URDF, or describe the joints in [robot.dh]")
     robot = robot_of_table(name, table) if "dh" in table.values else read_urdf(table.path("urdf", folder))
     sheets = table.values.get("joint", {})
     if not isinstance(sheets, dict):
