@@ -137,9 +137,30 @@ def read_drawings(name: str) -> Drawings:
     }
     for key, part in parts.items():
         table[key] = _typed(part, table[key])
-    table["urdf"] = (file.parent / table["urdf"]).resolve().read_text(encoding="utf-8")
+    table["urdf"] = _bodies((file.parent / table["urdf"]).resolve().read_text(encoding="utf-8"))
     table["acceleration"] = np.asarray(table["acceleration"], dtype=float)
     return Drawings(**table)
+
+
+def _bodies(urdf: str) -> str:
+    """Return a URDF without what is no part of the arm: collision shapes, and frames other than the flange.
+
+    The plant draws numbers body by body and loads the last one, so that a frame more would make another robot.
+    """
+    root = ElementTree.fromstring(urdf)
+    parents = {joint.find("parent").get("link") for joint in root.findall("joint")}  # type: ignore[union-attr]
+    bare = set()
+    for link in root.findall("link"):
+        for shape in link.findall("collision"):
+            link.remove(shape)
+        name = link.get("name")
+        if not len(link) and name not in parents and name != "flange":
+            bare.add(name)
+            root.remove(link)
+    for joint in root.findall("joint"):
+        if joint.find("child").get("link") in bare:  # type: ignore[union-attr]
+            root.remove(joint)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _typed(part: type, table: dict[str, Any]) -> Any:

@@ -15,6 +15,7 @@ import click
 
 from irtwin import __version__
 from irtwin.errors import InputError
+from irtwin.robot_cli import robot as robot_group
 
 _DAY = 86400.0  # s
 _WORKSPACE = Path("irtwin-workspace")
@@ -66,6 +67,8 @@ def cli() -> None:
     Start with `irtwin demo`. It builds a twin, a graph and a report from simulated logs of a KUKA KR6 R700.
     """
 
+
+cli.add_command(robot_group)
 
 _workspace = click.option(
     "--workspace",

@@ -39,7 +39,7 @@ _STOPPED = 130  # exit status after Ctrl-C
 MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
 WRITTEN = (
     *("gap.json", "gap.html", "predicted.parquet", "motion.csv"),
-    *("all.owl", "closed.ttl", "robot.nq", "kept.zip"),
+    *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf"),
 )
 LONGEST_LINE = 2000  # characters of an error
 _STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
@@ -117,6 +117,10 @@ def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]
             ["excite", data / "robot.urdf", "--seconds", "2", "--out", out["motion.csv"]],
             [out["motion.csv"]],
         ),
+        "robot dh": (["robot", "dh", data, "--convention", "modified"], []),
+        "robot ik": (["robot", "ik", data, "--pose", "0.3", "0", "0.4", "0", "1", "0"], []),
+        "robot equations": (["robot", "equations", data], []),
+        "robot urdf": (["robot", "urdf", data, "--out", out["robot.urdf"]], [out["robot.urdf"]]),
         "run": (["run", data, "--workspace", workspace, "--repair"], []),
         "query": (["query", "energy_per_joint", "--workspace", workspace], []),
         "export": (["export", "--owl", out["all.owl"], "--workspace", workspace], [out["all.owl"]]),

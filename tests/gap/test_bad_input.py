@@ -126,7 +126,7 @@ def test_a_reference_run_with_other_joints_is_refused(tmp_path):
     pq.write_table(renamed.rename_columns([n.replace("joint_3", "elbow") for n in renamed.column_names]), file)
     said = irtwin("diagnose", data, "--json", tmp_path / "out.json")
     assert said.status == 2
-    assert 'reference_0.parquet: column q_elbow: the URDF has no moving joint "elbow"' in said.err
+    assert 'reference_0.parquet: column q_elbow: the robot has no moving joint "elbow"' in said.err
 
 
 def test_bad_samples_are_named_and_repaired(tmp_path):

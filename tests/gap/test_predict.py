@@ -89,7 +89,7 @@ def broken(folder, tmp_path, fault):
     pq.write_table(table, run)
     if fault == "another robot":
         pq.write_table(table.rename_columns([n.replace("joint_2", "elbow") for n in table.column_names]), run)
-        return (twin, run, "--out", out), 'run.parquet: column q_elbow: the URDF has no moving joint "elbow"'
+        return (twin, run, "--out", out), 'run.parquet: column q_elbow: the robot has no moving joint "elbow"'
     if fault == "no twin":
         return (run, run, "--out", out), "name a twin that irtwin saved"
     if fault == "no run":

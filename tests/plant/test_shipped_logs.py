@@ -74,7 +74,7 @@ def test_no_motion_touches_the_floor_or_the_arm_itself(drawings: Drawings) -> No
     for name, entry in campaign.motions.items():
         for q in motion_of(entry, drawings).q[::100]:
             assert not touching(q), name
-            assert data.body("tool0").xpos[2] > 0.1, name
+            assert data.body("flange").xpos[2] > 0.1, name
 
 
 def test_warms_up(data_set: DataSet) -> None:

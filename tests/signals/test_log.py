@@ -141,7 +141,7 @@ def changed(name: str, row: int, value: float) -> dict[str, np.ndarray]:
         ({k: v for k, v in columns().items() if k != "q_b"}, "column q_b is missing"),
         ({k: v for k, v in columns().items() if k != "time"}, "column time is missing"),
         ({k: v for k, v in columns().items() if k != "tau_b"}, "column tau_b is missing; log tau_ for every"),
-        (columns() | {"q_elbow": np.zeros(50)}, 'column q_elbow: the URDF has no moving joint "elbow"'),
+        (columns() | {"q_elbow": np.zeros(50)}, 'column q_elbow: the robot has no moving joint "elbow"'),
         (changed("tau_a", 7, math.nan), "line 9, column tau_a: is not a finite number"),
         (changed("q_a", 3, math.inf), "line 5, column q_a: is not a finite number"),
         (changed("tau_b", 10, 1e282), "line 12, column tau_b: is beyond 1e\\+06, which no robot reaches"),

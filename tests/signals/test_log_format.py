@@ -13,7 +13,7 @@ from tests.synthetic import arm, as_run, measure, swing
 import irtwin
 from irtwin.effects.catalogue import BASELINE
 from irtwin.live.joint_stream import StateReader
-from irtwin.signals import log
+from irtwin.signals import dh_table, log
 from irtwin.signals.channels import CHANNELS, Channel, columns_of
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "LOG_FORMAT.md").read_text(encoding="utf-8")
@@ -53,6 +53,8 @@ def test_the_keys_of_a_live_stream_are_those_of_the_code() -> None:
         (r"### `\[robot\]`", log.ROBOT_KEYS),
         (r"### `\[robot\.joint\.NAME\]`", log.SHEET_KEYS),
         (r"### `\[\[run\]\]`", log.RUN_KEYS),
+        (r"### `\[robot\.dh\]`", dh_table.DH_KEYS),
+        (r"### `\[\[robot\.dh\.row\]\]`", dh_table.ROW_KEYS),
     ],
 )
 def test_the_keys_are_those_of_the_code(title: str, known: tuple[str, ...]) -> None:
@@ -79,6 +81,13 @@ def test_the_example_is_a_data_set(tmp_path: Path) -> None:
     assert data_set.notes["supply"] == "400 V"
     assert [run.repeat_of for run in data_set.runs] == [None, "monday"]
     assert set(data_set.effects or ()) < set(BASELINE)
+
+
+def test_the_example_of_a_table_is_a_robot(tmp_path: Path) -> None:
+    example = re.search(r"```toml\n(\[robot\.dh\].*?)```", DOCUMENT, re.DOTALL)
+    assert example is not None
+    (tmp_path / "dataset.toml").write_text(f'[robot]\nname = "a"\n{example[1]}', encoding="utf-8")
+    assert log.read_robot(tmp_path).joint_names == ("joint_1", "slide")
 
 
 def test_the_line_of_a_live_stream_is_understood() -> None:

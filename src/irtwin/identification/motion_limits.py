@@ -164,7 +164,7 @@ class Workspace:
 
     def _floor(self, robot: Robot, limits: JointLimits) -> list[_Wall]:
         bound = min(CLEARANCE, self.reach / 10)
-        walls = [_Wall(robot.model.getFrameId(link.name, pin.FrameType.BODY), 2, 1.0, bound) for link in robot.links]
+        walls = [_Wall(frame, 2, 1.0, bound) for frame in _guarded(robot)]
         self._walls, self._frames = walls, [wall.frame for wall in walls]
         heights = self.clearance(np.random.default_rng(0).uniform(limits.lower, limits.upper, (50, len(limits.lower))))
         return [wall for wall, moves in zip(walls, np.ptp(heights, axis=0) > 1e-9, strict=True) if moves]
@@ -182,6 +182,22 @@ class Workspace:
             for axis, bound in enumerate(corner)
             if np.isfinite(bound)
         ]
+
+
+def _guarded(robot: Robot) -> list[int]:
+    """Return the frames of the links; a tool frame at the flange is left out, as it would count the flange twice."""
+    model = robot.model
+    tip = model.frames[model.getFrameId(flange(robot), pin.FrameType.BODY)]
+    kept = []
+    for link in robot.links:
+        number = model.getFrameId(link.name, pin.FrameType.BODY)
+        frame = model.frames[number]
+        again = frame.parentJoint == tip.parentJoint and np.array_equal(
+            frame.placement.translation, tip.placement.translation
+        )
+        if not again or link.mass > 0 or frame.name == tip.name:
+            kept.append(number)
+    return kept
 
 
 def _levers(robot: Robot, limits: JointLimits) -> list[np.ndarray]:

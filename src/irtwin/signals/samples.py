@@ -56,7 +56,8 @@ def _known(columns: Sequence[str], channels: Mapping[str, Channel], robot: Robot
         prefix, _, joint = name.partition("_")
         if prefix in strict and joint and name not in channels and joint not in robot.held:
             raise InputError(
-                f'{path}: column {name}: the URDF has no moving joint "{joint}" (it has {", ".join(robot.joint_names)})'
+                f'{path}: column {name}: the robot has no moving joint "{joint}" '
+                f"(it has {', '.join(robot.joint_names)})"
             )
     for needed in (name for field in REQUIRED for name in CHANNELS[field].columns(robot.joint_names)):
         if needed not in names:
