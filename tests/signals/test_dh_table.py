@@ -125,12 +125,8 @@ def test_faults_are_named(tmp_path, old, new, message):
         ("[robot]\nname = 'a'\n[robot.dh]\nconvention = 'modified'", r"\[\[robot.dh.row\]\] is missing"),
         ("[robot]\nname = 'a'\n[robot.dh]\nconvention = 'modified'\nrow = [3]", "1 should be a table"),
         (
-            "[robot]\nname = 'a'\n" + "[[robot.dh.row]]\n" * 101 + "[robot.dh.x]",
-            "no key of the log format|not valid TOML",
-        ),
-        (
-            "[robot]\nname = 'a'\ndh.convention = 'standard'\n" + "[[robot.dh.row]]\n" * 101,
-            "101 rows; a robot has at most 100|not valid TOML",
+            "[robot]\nname = 'a'\n[robot.dh]\nconvention = 'standard'\n" + "[[robot.dh.row]]\n" * 101,
+            "101 rows; a robot has at most 100",
         ),
         ("[robot]\nname = 'a'\n", r"\[robot\] urdf is missing; name the URDF, or describe the joints"),
     ],
