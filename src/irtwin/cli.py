@@ -19,6 +19,7 @@ from irtwin.errors import InputError
 _DAY = 86400.0  # s
 _WORKSPACE = Path("irtwin-workspace")
 _LONGEST = 2000  # characters of an error
+_NO_POWER = "energy and power are not known; the twin has seen no power"
 
 
 def main() -> None:
@@ -231,14 +232,16 @@ def diagnose(
 def predict(
     twin: Path, run: Path, out: Path, payload_mass: float | None, payload_com: tuple[float, float, float] | None
 ) -> None:
-    """Predict torque and power of a run with a saved twin.
+    """Predict torque, power and energy of a run with a saved twin.
 
-    TWIN is a file that `irtwin diagnose --save-twin` wrote. RUN is a CSV or Parquet file with the motion.
+    TWIN is a file that `irtwin diagnose --save-twin` wrote. RUN is a CSV or Parquet file with the motion: a log, or
+    what `plan` or `excite` wrote. A motion that leaves the robot's limits or in which two links meet is refused.
     """
     from irtwin import modelling
 
-    modelling.predict(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
-    click.echo(out)
+    expected = modelling.expect(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
+    _say_unchecked(expected.checks_itself)
+    click.echo(f"{out}: {expected.price or _NO_POWER}")
 
 
 @cli.command()
@@ -493,6 +496,11 @@ def restore(archive: Path, workspace: Path, database: str | None, graph_url: str
 
     restore_all(archive, workspace, database, graph_url)
     click.echo(workspace)
+
+
+def _say_unchecked(checks_itself: bool) -> None:
+    if not checks_itself:
+        _say("The URDF has no collision shapes, so it was not checked whether the robot meets itself.")
 
 
 def _say(line: str) -> None:
