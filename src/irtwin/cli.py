@@ -245,6 +245,85 @@ def predict(
 
 
 @cli.command()
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option("--from", "start", metavar="POSE", required=True, help="Where the motion starts.")
+@click.option("--to", "goal", metavar="POSE", required=True, help="Where it ends.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV or Parquet file.")
+@click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
+@click.option(
+    "--box",
+    "boxes",
+    type=_Number(-1e3, 1e3),
+    nargs=6,
+    multiple=True,
+    metavar="X Y Z SX SY SZ",
+    help="Keep off a box: its centre and side lengths in the base frame, m. Repeatable.",
+)
+@click.option(
+    "--objective",
+    type=click.Choice(["time", "energy"]),
+    default="time",
+    show_default=True,
+    help="What is to be least. Energy: in --seconds, or in the time of the fastest motion.",
+)
+@click.option("--seconds", type=_Number(min=0.0, min_open=True), help="Duration, s. Default: the shortest.")
+@click.option("--rate", type=_Number(10.0, 10_000.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
+@click.option("--search", type=_Number(0.1, _DAY), default=10.0, show_default=True, help="Limit to find a path, s.")
+@click.option("--payload-mass", type=_Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
+@click.option(
+    "--payload-com",
+    type=_Number(-10.0, 10.0),
+    nargs=3,
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    help="Payload's centre of mass in the flange frame, m.",
+)
+def plan(
+    source: Path,
+    start: str,
+    goal: str,
+    out: Path,
+    line: bool,
+    boxes: tuple[tuple[float, ...], ...],
+    objective: str,
+    seconds: float | None,
+    rate: float,
+    search: float,
+    payload_mass: float,
+    payload_com: tuple[float, float, float],
+) -> None:
+    """Plan a motion from pose to pose, around obstacles, and say what it costs.
+
+    SOURCE is a twin that `irtwin diagnose --save-twin` wrote, or a URDF, or the folder of a data set, of which energy
+    is not known. A POSE is joint positions, "0,-1.57,...", or a pose of the flange in the base frame,
+    "pose:x,y,z,roll,pitch,yaw", in m and rad. The motion keeps to the limits of position, speed, acceleration, jerk and
+    torque.
+    """
+    from irtwin import modelling
+    from irtwin.planning.plan import Task
+    from irtwin.planning.poses import read_target
+    from irtwin.robot.collision import Obstacle
+
+    twin = modelling.read_twin(source)
+    joints = len(twin.robot.joints)
+    task = Task(
+        start=read_target(start, joints, "--from"),
+        goal=read_target(goal, joints, "--to"),
+        obstacles=[Obstacle((x, y, z), (a, b, c)) for x, y, z, a, b, c in boxes],
+        line=line,
+        least_energy=objective == "energy",
+        seconds=seconds,
+        search=search,
+        payload_mass=payload_mass,
+        payload_com=payload_com,
+    )
+    made = modelling.plan(twin, task, out, rate)
+    _say_unchecked(made.checks_itself)
+    clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
+    click.echo(f"{out}: {made.seconds:.3f} s{clear}; {made.price or _NO_POWER}")
+
+
+@cli.command()
 @click.argument("robot")
 @_workspace
 @_database

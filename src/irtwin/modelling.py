@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from csv import writer
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
+from irtwin.errors import InputError
 from irtwin.gap import predict as predicted
 from irtwin.planning.admission import check_motion
+from irtwin.planning.plan import Plan, Task, nominal_twin
+from irtwin.planning.plan import plan as make_plan
 from irtwin.robot.collision import CollisionModel
+from irtwin.robot.urdf import read_urdf
+from irtwin.signals.channels import Signals, columns_of
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, own_runs, read_data_set
+from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load
@@ -112,3 +120,38 @@ def expect(
         pa.parquet.write_table(table, buffer)
         write(Path(out), buffer.getvalue())
     return Expectation(table, cost, collisions.checks_itself)
+
+
+def read_twin(source: Path) -> Twin:
+    """Return a saved twin; of a URDF, or a data set's folder, one that knows its robot's sheet alone."""
+    if source.suffix == ".json":
+        return load(source)
+    return nominal_twin(read_data_set(source).robot if source.is_dir() else read_urdf(source))
+
+
+def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, rate: float = 100.0) -> Plan:
+    """Plan a motion, and write it as a log, CSV or Parquet by its ending, which `predict` takes.
+
+    source: a twin or its file, a URDF, or the folder of a data set. Raises InputError as `planning.plan.plan` does.
+    """
+    if out is not None:
+        check_place(Path(out))
+        if Path(out).suffix.lower() not in (".csv", ".parquet"):
+            raise InputError(f"{out}: a plan is written as .csv or .parquet; name such a file")
+    found = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
+    if out is not None:
+        write(Path(out), _as_log(found.motion, found.joint_names, csv=Path(out).suffix.lower() == ".csv"))
+    return found
+
+
+def _as_log(motion: Motion, joints: Sequence[str], *, csv: bool) -> bytes:
+    columns = columns_of(Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq), joints)
+    if csv:
+        text = io.StringIO()
+        lines = writer(text, lineterminator="\n")
+        lines.writerow(columns)
+        lines.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(list(columns.values())))
+        return text.getvalue().encode()
+    buffer = io.BytesIO()
+    pa.parquet.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
