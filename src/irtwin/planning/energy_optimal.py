@@ -182,13 +182,9 @@ class _Search:
         rows = np.unique(np.linspace(1, len(q) - 2, _POSES).round().astype(int))
         least = min(_NEAR, self._collisions.clearance(q[0]), self._collisions.clearance(q[-1]))
         for row in rows:
-            lack = (least - self._collisions.clearance(q[row])) / _NEAR
-            if lack <= 0:
-                continue
-            value += lack**2 / len(rows)
-            for joint in range(q.shape[1]):
-                moved = q[row].copy()
-                moved[joint] += _STEP
-                change = (least - self._collisions.clearance(moved)) / _NEAR - lack
-                slope[row, joint] += 2 * lack * change / _STEP / len(rows)
+            clearance, change = self._collisions.clearance_slope(q[row])
+            lack = (least - clearance) / _NEAR
+            if lack > 0:
+                value += lack**2 / len(rows)
+                slope[row] -= 2 * lack * change / _NEAR / len(rows)
         return value, [slope]

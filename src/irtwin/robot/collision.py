@@ -15,6 +15,7 @@ from irtwin.robot.description import Robot, Shape
 
 STEP = 1e-3  # m: how far the fastest point moves between two checks, at most
 _PROBES = 300  # random poses at which pairs that always touch are found
+_DIFFERENCE = 1e-4  # rad or m: for slopes
 _SMALLEST, _LARGEST = 1e-6, 1e3  # m: of a shape or an obstacle
 
 
@@ -58,6 +59,7 @@ class CollisionModel:
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
         self._margin = 0.0
+        self._nearest = 0  # pair
         self._add_links()
         if obstacles and not self._names:
             raise InputError(
@@ -100,8 +102,21 @@ class CollisionModel:
         """Return the least distance of any pair at the joint positions `q`, m; negative inside; inf without pairs."""
         if not self._geometry.collisionPairs:
             return float(np.inf)
-        nearest = pin.computeDistances(self._model, self._data, self._geometry, self._results, q)
-        return float(self._results.distanceResults[nearest].min_distance)
+        self._nearest = pin.computeDistances(self._model, self._data, self._geometry, self._results, q)
+        return float(self._results.distanceResults[self._nearest].min_distance)
+
+    def clearance_slope(self, q: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the least distance of any pair at the joint positions `q`: (n,), m, and that pair's slope, (n,)."""
+        value, slope = self.clearance(q), np.zeros(len(q))
+        if not self._pairs:
+            return value, slope
+        for joint in range(len(q)):
+            moved = q.copy()
+            moved[joint] += _DIFFERENCE
+            pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results, moved)
+            away = pin.computeDistance(self._geometry, self._results, self._nearest).min_distance
+            slope[joint] = (away - value) / _DIFFERENCE
+        return value, slope
 
     def first_meeting(self, time: np.ndarray, q: np.ndarray) -> tuple[Meeting | None, float]:
         """Return the first meeting along a motion, and the least distance of any pair until then, m.
