@@ -371,10 +371,12 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     """Design a motion that excites every base parameter.
 
     The motion is a finite Fourier series. It starts and ends at rest and keeps the joint limits, between samples too.
+    Links with collision shapes keep off one another, and torque by the URDF's bodies within its limits.
     Ctrl-C keeps the best motion so far.
     """
     from irtwin.identification import excitation
     from irtwin.identification.motion_limits import Box
+    from irtwin.robot.collision import CollisionModel
     from irtwin.robot.urdf import read_urdf
 
     robot = read_urdf(urdf)
@@ -385,6 +387,7 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
             lower=(min(x, other[0]), min(y, other[1]), min(z, other[2])),
             upper=(max(x, other[0]), max(y, other[1]), max(z, other[2])),
         )
+    _say_unchecked(CollisionModel(robot).checks_itself)
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
     ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)

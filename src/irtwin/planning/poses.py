@@ -126,7 +126,7 @@ def _solutions(robot: Robot, pose: Pose, limits: JointLimits, near: np.ndarray |
     start = limits.centre if near is None else near
     random = np.random.default_rng(0).uniform(limits.lower, limits.upper, (_STARTS, len(start)))
     tries = [follow(robot, pose.placement, q, limits) for q in (start, *random)]
-    found = [q for q, away, turned in tries if away < 1e-6 and turned < 1e-6]
+    found = [q for q, away, turned in tries if max(away, turned) < 1e-6]
     if not found:
         _, away, turned = min(tries, key=lambda each: each[1] + _ANGLE * each[2])
         shown = " ".join(f"{value:g}" for value in (*pose.place, *pose.angles))
