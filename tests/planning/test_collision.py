@@ -51,6 +51,11 @@ def test_a_shape_of_no_size_is_refused():
         CollisionModel(parse_urdf(ROBOT.urdf.replace('radius="0.04" length="0.3"', 'radius="0" length="0.3"')))
 
 
+def test_more_shapes_than_can_be_checked_are_refused():
+    with pytest.raises(InputError, match="503 collision shapes and boxes cannot be checked; give at most 500"):
+        CollisionModel(ROBOT, [Obstacle((5, 0, 0), (1, 1, 1))] * 500)
+
+
 def test_a_thin_wall_between_two_samples_is_met():
     """The tip goes through a wall of 2 mm in one step of 1.2 rad: time and pair are those of geometry."""
     wall = Obstacle((0.5, 0.0, 0.3), (0.002, 2.0, 0.6))

@@ -16,6 +16,7 @@ from irtwin.robot.description import Robot, Shape
 STEP = 1e-3  # m: how far the fastest point moves between two checks, at most
 _PROBES = 300  # random poses at which pairs that always touch are found
 _DIFFERENCE = 1e-4  # rad or m: for slopes
+_MOST_SHAPES = 500  # every two of them are a pair
 _SMALLEST, _LARGEST = 1e-6, 1e3  # m: of a shape or an obstacle
 
 
@@ -52,7 +53,7 @@ class CollisionModel:
     """
 
     def __init__(self, robot: Robot, obstacles: Sequence[Obstacle] = ()) -> None:
-        """Raise InputError on a shape of no size, or where there are obstacles and no shape to keep off them."""
+        """Raise InputError on a shape of no size, on too many, or where obstacles have no shape to keep off them."""
         self._robot = robot
         self._model = robot.model
         self._data = robot.model.createData()
@@ -60,6 +61,12 @@ class CollisionModel:
         self._names: list[str] = []
         self._margin = 0.0
         self._nearest = 0  # pair
+        shapes = sum(len(link.collisions) for link in robot.links) + len(obstacles)
+        if shapes > _MOST_SHAPES:
+            raise InputError(
+                f"{robot.name}: {shapes} collision shapes and boxes cannot be checked; give at most "
+                f"{_MOST_SHAPES}, coarser ones"
+            )
         self._add_links()
         if obstacles and not self._names:
             raise InputError(
