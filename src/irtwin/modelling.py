@@ -4,19 +4,32 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from csv import writer
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
+from irtwin.errors import InputError
 from irtwin.gap import predict as predicted
+from irtwin.planning.admission import check_motion
+from irtwin.planning.plan import Plan, Task, nominal_twin
+from irtwin.planning.plan import plan as make_plan
+from irtwin.robot.collision import CollisionModel
+from irtwin.robot.urdf import read_urdf
+from irtwin.signals.channels import Signals, columns_of
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, own_runs, read_data_set
+from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import as_sampled
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit
+from irtwin.twin.price import Price, price
 from irtwin.twin.twin import Twin
 
 
@@ -55,7 +68,8 @@ def predict(
 
     twin: one that was identified, or the file of a saved one; `out`: a Parquet file to write it to. payload_mass kg,
     payload_com m in the flange frame: what the controller was told; None takes it from the data set that lists the run.
-    Raises InputError on a file that is no twin or no run of its robot.
+    Raises InputError on a file that is no twin or no run of its robot, or on a motion that the robot cannot make: one
+    that leaves its limits, or in which two links meet.
 
     >>> import irtwin
     >>> twin = irtwin.identify(demo)
@@ -63,13 +77,81 @@ def predict(
     >>> table.column_names[:2], table.column_names[-1]
     (['time', 'tau_joint_a1'], 'power')
     """
+    return expect(twin, run_file, out, payload_mass=payload_mass, payload_com=payload_com).table
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What a twin expects of a motion: a row a sample, and its price, None where the twin knows nothing of power.
+
+    checks_itself: whether the robot has shapes that were held to keep off one another.
+    """
+
+    table: pa.Table
+    price: Price | None
+    checks_itself: bool
+
+
+def expect(
+    twin: Path | str | Twin,
+    run_file: Path | str,
+    out: Path | str | None = None,
+    *,
+    payload_mass: float | None = None,
+    payload_com: tuple[float, float, float] | None = None,
+) -> Expectation:
+    """Return what `predict` does, and what the motion costs.
+
+    Arguments and errors are those of `predict`.
+    """
     if out is not None:
         check_place(Path(out))
     known = twin if isinstance(twin, Twin) else load(Path(twin))
     run = predicted.read_motion(known, Path(run_file), payload_mass, payload_com)
     table = predicted.predict(known, run)
+    pieces, _ = as_sampled(run.signals, run.file)
+    motions = [condition(replace(run, signals=piece), known.robot, known.cutoff) for piece in pieces]
+    collisions = CollisionModel(known.robot)
+    for motion in motions:
+        check_motion(known, motion, collisions, run.file)
+    cost = price(known, motions)
     if out is not None:
         buffer = io.BytesIO()
         pa.parquet.write_table(table, buffer)
         write(Path(out), buffer.getvalue())
-    return table
+    return Expectation(table, cost, collisions.checks_itself)
+
+
+def read_twin(source: Path) -> Twin:
+    """Return a saved twin; of a URDF, or a data set's folder, one that knows its robot's sheet alone."""
+    if source.suffix == ".json":
+        return load(source)
+    return nominal_twin(read_data_set(source).robot if source.is_dir() else read_urdf(source))
+
+
+def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, rate: float = 100.0) -> Plan:
+    """Plan a motion, and write it as a log, CSV or Parquet by its ending, which `predict` takes.
+
+    source: a twin or its file, a URDF, or the folder of a data set. Raises InputError as `planning.plan.plan` does.
+    """
+    if out is not None:
+        check_place(Path(out))
+        if Path(out).suffix.lower() not in (".csv", ".parquet"):
+            raise InputError(f"{out}: a plan is written as .csv or .parquet; name such a file")
+    found = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
+    if out is not None:
+        write(Path(out), _as_log(found.motion, found.joint_names, csv=Path(out).suffix.lower() == ".csv"))
+    return found
+
+
+def _as_log(motion: Motion, joints: Sequence[str], *, csv: bool) -> bytes:
+    columns = columns_of(Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq), joints)
+    if csv:
+        text = io.StringIO()
+        lines = writer(text, lineterminator="\n")
+        lines.writerow(columns)
+        lines.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(list(columns.values())))
+        return text.getvalue().encode()
+    buffer = io.BytesIO()
+    pa.parquet.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()

@@ -9,12 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.arms import kr6, two_joints
+from tests.planning.boxes import arm as boxed_arm
 from tests.synthetic import arm
 
 from irtwin.errors import InputError
 from irtwin.identification import excitation
 from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import CLEARANCE, FULL_SPEED_AFTER, Box
+from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
 from irtwin.robot.urdf import parse_urdf
@@ -128,7 +130,7 @@ def test_a_continuous_joint_needs_no_position_limit() -> None:
 
 
 def test_a_sliding_joint_is_excited_too() -> None:
-    slide = two_joints('<limit lower="-0.3" upper="0.4" velocity="1" effort="9"/>', "prismatic")
+    slide = two_joints('<limit lower="-0.3" upper="0.4" velocity="1" effort="90"/>', "prismatic")
     found = excite(slide, 6.0, iterations=10)
     assert_limits_kept(slide, found)
     assert found.condition_number < 100
@@ -291,3 +293,20 @@ def test_without_a_box_only_the_floor_is_blamed() -> None:
     low = parse_urdf(TWO.urdf.replace("0 0 0.5", "0 0 -3"))
     with pytest.raises(InputError, match="with every link above the floor, z = 0 of the base frame; raise the first"):
         excite(low, 5.0)
+
+
+def test_the_robot_does_not_meet_itself_and_keeps_its_torque():
+    robot = boxed_arm(3)
+    weak = parse_urdf(robot.urdf.replace('effort="300.0"', 'effort="120"'))
+    found = excite(weak, 5.0, iterations=30)
+    time, q, dq, ddq = found.sample(1000.0)
+    assert CollisionModel(weak).first_meeting(time, q)[0] is None
+    data = weak.model.createData()
+    torque = np.array([pin.rnea(weak.model, data, *state) for state in zip(q, dq, ddq, strict=True)])
+    assert np.abs(torque).max() <= 120
+
+
+def test_a_robot_that_cannot_be_held_is_refused():
+    weak = parse_urdf(boxed_arm(3).urdf.replace('effort="300.0"', 'effort="0.01"'))
+    with pytest.raises(InputError, match="holding the arm takes more than the torque limits in every posture"):
+        excite(weak, 5.0)

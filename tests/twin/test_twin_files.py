@@ -58,6 +58,9 @@ def spoil(document, *keys, value=None, drop=False):
         (("parameters", 3, "value"), {"value": None}, 'in "parameters", entry 4: "value" is no float'),
         (("parameters", 3, "value"), {"value": float("nan")}, 'entry 4: "value" is not a finite number'),
         (("parameters", 0), {"value": 5}, 'in "parameters", entry 1: '),
+        (("covariance",), {"value": ["1.0"]}, '"covariance" should have'),
+        (("covariance", 1), {"value": "1.0 x"}, '"covariance" row 2 is not 2 finite numbers'),
+        (("covariance", 1), {"value": "1.0 nan"}, '"covariance" row 2 is not 2 finite numbers'),
         (("parameters", 0), {"drop": True}, 'parameter m of effect "rigid_body" on link_1 is missing'),
     ],
 )

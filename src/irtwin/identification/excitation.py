@@ -17,6 +17,7 @@ from irtwin.identification.base_condition import BaseRegressor
 from irtwin.identification.descent import descend
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
+from irtwin.identification.own_body import OwnBody
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals, columns_of
@@ -88,7 +89,8 @@ def excite(
 ) -> Excitation:
     """Search a motion of `seconds` whose scaled base regressor has the least condition number (Yan 2018, eq. 4).
 
-    The limits of the joints, the floor and the `box` are kept at every instant. Equal seeds give equal motions, other
+    The limits of the joints, the floor and the `box` are kept at every instant; the robot's collision shapes keep off
+    one another, and the torque by the URDF's bodies within its limits. Equal seeds give equal motions, other
     seeds other ones, unless `time_limit` (s) ends the search before its `iterations`. Its most work, for robots of many
     joints, or a KeyboardInterrupt ends it with the best motion so far. Raises InputError where limits are missing or
     contradictory or the box is out of reach.
@@ -131,6 +133,7 @@ class _Search:
         self._robot = robot
         self._limits = JointLimits.of(robot)
         self._workspace = Workspace(robot, self._limits, box)
+        self._body = OwnBody(robot)
         self._regressor = BaseRegressor(robot)
         self._random = random
         period = seconds / math.ceil(seconds / _LONGEST_PERIOD)
@@ -141,8 +144,13 @@ class _Search:
         self._keep_off = 0.03 * self._workspace.reach  # from walls at the grid: for what happens in between
         self._work = 0.0
         self.bounded = False
-        self.best: FourierSeries | None = None
+        self._better: list[FourierSeries] = []  # than all before, the best last
         self.best_condition = math.inf
+
+    @property
+    def best(self) -> FourierSeries | None:
+        """The best motion so far."""
+        return self._better[-1] if self._better else None
 
     def run(self, iterations: int) -> Iterator[None]:
         """Improve `best` step by step."""
@@ -170,7 +178,10 @@ class _Search:
 
     def result(self, seconds: float, rate: float, interrupted: bool) -> Excitation:
         """Return the best motion and what is known of it."""
-        assert self.best is not None
+        while self.best is not None and not self._body.proves(self.best):
+            self._better.pop()
+        if self.best is None:
+            raise InputError(f"{self._robot.name}: found no motion in which it does not meet itself; try another seed")
         count = max(2, round(self.best.period * rate))
         motion = self.best.motion(np.arange(count) * (self.best.period / count))
         return Excitation(
@@ -204,9 +215,14 @@ class _Search:
         condition = self._regressor.condition_number(*self._motion(x))
         if self.best is None or condition < self.best_condition:
             series = self._rest.series(x)
-            if self._limits.margin(series) > 0 and self._workspace.least_clearance(series) > 0:
-                self.best, self.best_condition = series, condition
+            if self._keeps(series):
+                self._better.append(series)
+                self.best_condition = condition
         return condition
+
+    def _keeps(self, series: FourierSeries) -> bool:
+        inside = self._limits.margin(series) > 0 and self._workspace.least_clearance(series) > 0
+        return inside and self._body.allows(series)
 
     def _cost(self, flat: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
         """Return cost plus logarithmic barriers at the limits, and its gradient; infinite where a limit is broken."""
@@ -217,6 +233,9 @@ class _Search:
         room = (clearance - self._keep_off) / self._workspace.reach
         if max(float(np.abs(share).max()) for share in shares) >= 1 or room.min(initial=1.0) <= 0:
             return math.inf, flat
+        nearness, nearness_slope = self._body.barrier(motion[0])
+        if nearness == math.inf:
+            return math.inf, flat
         weight /= len(motion[0])
         value, slope = self._regressor.cost(*motion, slow=0.02 * self._limits.speed)
         value -= weight * (sum(float(np.log1p(-(share**2)).sum()) for share in shares) + float(np.log(room).sum()))
@@ -224,6 +243,8 @@ class _Search:
             weight * 2 * share / (1 - share**2) / limit for share, limit in zip(shares, self._ranges, strict=True)
         ]
         barriers[0] -= weight * np.einsum("nw,nwj->nj", 1 / (room * self._workspace.reach), clearance_slope)
+        value += weight * nearness
+        barriers[0] += weight * nearness_slope
         slopes = (slope.q, slope.dq, slope.ddq)
         gradient = sum(b.T @ (s + r) for b, s, r in zip(self._rest.bases, slopes, barriers, strict=True))
         return value, np.asarray(gradient).ravel()
@@ -252,7 +273,7 @@ class _Search:
                 )
             )
         self._keep_off = min(self._keep_off, best / 3)
-        return np.asarray(q[clearance >= 0.5 * best])
+        return self._body.postures(np.asarray(q[clearance >= 0.5 * best]))
 
     def _towards(self, posture: np.ndarray) -> np.ndarray:
         """Return a posture nearer to the inside of all walls, within the joint limits: (n,)."""
@@ -280,4 +301,7 @@ class _Search:
 
     def _clear(self, x: np.ndarray) -> bool:
         at_grid = self._workspace.clearance(self._motion(x)[0]).min(initial=math.inf)
-        return at_grid > self._keep_off and self._workspace.least_clearance(self._rest.series(x)) > 0
+        series = self._rest.series(x)
+        if at_grid <= self._keep_off or self._workspace.least_clearance(series) <= 0:
+            return False
+        return self._body.allows(series) and self._body.barrier(self._motion(x)[0])[0] < math.inf

@@ -38,7 +38,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Shape:
-    """A visual shape of a link: "box" (x, y, z), "cylinder" (radius, length), "sphere" (radius), in m.
+    """A shape of a link: "box" (x, y, z), "cylinder" (radius, length), "sphere" (radius), in m.
 
     `placement` is the (4, 4) transform from the shape's frame to the link's; `colour` is RGBA in 0..1.
     """
@@ -51,11 +51,12 @@ class Shape:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid body, nominal inertia as the URDF gives it: mass in kg; its visual shapes."""
+    """A rigid body, nominal inertia as the URDF gives it: mass in kg; its visual shapes, and those that collide."""
 
     name: str
     mass: float
     shapes: tuple[Shape, ...] = ()
+    collisions: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -83,12 +83,8 @@ def _links(root: Element, source: str) -> dict[str, Link]:
         if value < 0:
             raise InputError(f'{source}: link "{name}" has the negative mass {value} kg')
         _check_inertia(element, f'{source}: inertia of link "{name}"')
-        shapes = tuple(
-            shape
-            for visual in element.findall("visual")
-            if (shape := _shape(visual, materials, f'{source}: visual of link "{name}"')) is not None
-        )
-        links[name] = Link(name, value, shapes)
+        shapes, collisions = (_shapes(element, kind, materials, source) for kind in ("visual", "collision"))
+        links[name] = Link(name, value, shapes, collisions)
     if len(links) > _MOST_LINKS:
         raise InputError(f"{source}: has {len(links)} links; a robot of more than {_MOST_LINKS} cannot be modelled")
     if not links:
@@ -108,8 +104,14 @@ def _check_inertia(link: Element, where: str) -> None:
         raise InputError(f"{where}: {negative[0]} is negative, {values[negative[0]]} kg m^2")
 
 
+def _shapes(link: Element, kind: str, materials: dict[str | None, Element], source: str) -> tuple[Shape, ...]:
+    where = f'{source}: {kind} of link "{link.get("name")}"'
+    found = (_shape(element, materials, where) for element in link.findall(kind))
+    return tuple(shape for shape in found if shape is not None)
+
+
 def _shape(visual: Element, materials: dict[str | None, Element], where: str) -> Shape | None:
-    """Return the primitive that a <visual> shows; None for a mesh, which is never opened."""
+    """Return the primitive of a <visual> or <collision>; None for a mesh, which is never opened."""
     geometry = visual.find("geometry")
     kind = geometry[0] if geometry is not None and len(geometry) else None
     if kind is None or kind.tag == "mesh":

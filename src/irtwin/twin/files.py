@@ -8,6 +8,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
@@ -70,6 +72,8 @@ def to_json(twin: Twin) -> str:
         "parameters": [asdict(parameter) for parameter in twin.parameters],
         "base_parameters": [asdict(parameter) for parameter in twin.base_parameters],
     }
+    if twin.covariance is not None:
+        document["covariance"] = [" ".join(map(repr, row[: k + 1])) for k, row in enumerate(twin.covariance.tolist())]
     if twin.quantities:
         document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
@@ -100,7 +104,7 @@ def from_json(text: str, path: Path) -> Twin:
         else (),
     )
     _check_complete(path, twin)
-    return twin
+    return replace(twin, covariance=_covariance(reader)) if "covariance" in document else twin
 
 
 class _Reader:
@@ -142,6 +146,23 @@ class _Reader:
     def rows(self, key: str, columns: _Columns) -> list[dict[str, Any]]:
         rows = [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
         return [{name: row.take(name, *kinds) for name, kinds in columns.items()} for row in rows]
+
+
+def _covariance(reader: _Reader) -> np.ndarray:
+    """Return the covariance of the parameters from the rows of its lower triangle, as text."""
+    rows, count = reader.texts("covariance"), len(reader.take("parameters", list))
+    if len(rows) != count:
+        raise reader.fail("covariance", f"should have {count} rows")
+    lower = np.zeros((count, count))
+    for number, row in enumerate(rows):
+        try:
+            values = np.array(row.split(), dtype=float)
+        except ValueError:
+            values = np.zeros(0)
+        if len(values) != number + 1 or not np.isfinite(values).all():
+            raise reader.fail("covariance", f"row {number + 1} is not {number + 1} finite numbers")
+        lower[number, : number + 1] = values
+    return np.asarray(lower + np.tril(lower, -1).T)
 
 
 def _effect_document(effect: Effect) -> str | dict[str, Any]:

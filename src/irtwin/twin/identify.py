@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect, JointEffect, Term
@@ -16,7 +17,7 @@ from irtwin.identification.base_parameters import BaseParameters, base_parameter
 from irtwin.identification.estimators import Estimate, combine, estimate
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
-from irtwin.identification.uncertainty import half_widths
+from irtwin.identification.uncertainty import half_widths, normal_covariance
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
@@ -80,6 +81,7 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
         condition_number=fit.condition if fit and np.isfinite(fit.condition) else None,
         fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
         quantities=_quantities(robot, found[: len(found) - bool(constants)], parameters),
+        covariance=block_diag(*(normal_covariance(result.covariance, result.blocks) for _, result in found)),
     )
 
 

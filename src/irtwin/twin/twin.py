@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -57,6 +57,7 @@ class Twin:
     `effects` are those that the twin models; `unidentified` were asked for, but nothing measured could show them.
     `cutoff` (Hz) is that of the filter in the fit; `condition_number` that of the scaled base regressor. `parameters`
     are the coefficients that predict; `quantities` what they say in the catalogue's terms, where that differs.
+    `covariance` (p, p) is that of the p parameters, so that 1.96 deviations are half a 95 % interval; None: not known.
     """
 
     robot: Robot
@@ -68,6 +69,12 @@ class Twin:
     condition_number: float | None = None
     fitted: tuple[str, ...] = ()  # runs
     quantities: tuple[Parameter, ...] = ()
+    covariance: np.ndarray | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def knows_power(self) -> bool:
+        """Whether some loss or draw of power was identified; mechanical power alone is none of the supply's."""
+        return any(effect.channel == "power" and not term.fixed for effect, term in self.stack.power_terms)
 
     @property
     def effect_ids(self) -> tuple[str, ...]:

@@ -1,0 +1,190 @@
+"""The motion that costs the least energy in a given time: path and time law changed together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize
+
+from irtwin.planning.timing import MotionLimits, Timed, Torque, shares
+from irtwin.robot.collision import CollisionModel
+
+Power = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""From time (N,), q, dq, ddq (N, n) to electrical power (N,), W."""
+
+_DEGREE = 5
+_FREE = 7  # points of the spline between start and goal that each joint may move
+_SAMPLES = 48  # of a motion while it is sought
+_DENSE = 1500  # at the end
+_POSES = 20  # at which the distance to everything is held
+_STIFFNESS = (30.0, 1000.0)  # of the walls, as a share of the energy for a limit passed by all of it
+_ITERATIONS = 25  # for each stiffness
+_STEP = 1e-4  # rad: of differences
+_SHARE = 0.97  # of the limits that the search keeps to at its samples
+_NEAR = 0.05  # m: nearer pairs push
+
+
+@dataclass(frozen=True)
+class SplineMotion:
+    """A motion as a spline over time, (n,) joints, from rest to rest in `seconds`."""
+
+    spline: BSpline
+    seconds: float
+
+    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
+        q, dq, ddq, jerk = (self.spline(np.clip(time, 0, self.seconds), order) for order in range(4))
+        return q, dq, ddq, jerk
+
+
+def cheapest(
+    given: Timed,
+    seconds: float,
+    limits: MotionLimits,
+    torque: Torque,
+    power: Power,
+    collisions: CollisionModel,
+) -> SplineMotion | Timed:
+    """Return the motion between the ends of `given` that takes least energy in `seconds`, of all that keep the limits.
+
+    Sought from the given motion, slowed, by quasi-Newton steps (L-BFGS) over the points of a quintic spline, with walls
+    that grow stiffer. What is found counts only if it keeps every limit and touches nothing; else the given motion,
+    slowed, is the answer.
+    """
+    slowed = given.slower(seconds)
+    best: SplineMotion | Timed = slowed
+    least = _energy(best, power)
+    search = _Search(slowed, limits, torque, power, collisions)
+    points = search.start
+    for stiffness in _STIFFNESS:
+        points = search.improve(points, stiffness * least)
+        found = search.motion(points)
+        cost = _energy(found, power)
+        if cost < least and keeps(found, limits, torque, collisions):
+            best, least = found, cost
+    return best
+
+
+def keeps(motion: SplineMotion | Timed, limits: MotionLimits, torque: Torque, collisions: CollisionModel) -> bool:
+    """Return whether a motion keeps all limits and touches nothing."""
+    time = np.linspace(0, motion.seconds, _DENSE)
+    states = motion.motion(time)
+    if any(share.max() > 1 for share in shares(states, limits, torque).values()):
+        return False
+    return collisions.first_meeting(time, states[0])[0] is None
+
+
+def _energy(motion: SplineMotion | Timed, power: Power) -> float:
+    time = np.linspace(0, motion.seconds, _DENSE)
+    return float(np.trapezoid(power(time, *motion.motion(time)[:3]), time))
+
+
+class _Search:
+    """Costs of the free points, (k, n), of a spline between fixed ends at rest."""
+
+    def __init__(
+        self, given: Timed, limits: MotionLimits, torque: Torque, power: Power, collisions: CollisionModel
+    ) -> None:
+        self._limits, self._torque, self._power, self._collisions = limits, torque, power, collisions
+        self._seconds = given.seconds
+        self._time = np.linspace(0, given.seconds, _SAMPLES)
+        count = _FREE + 6  # three equal points at each end are rest: no speed, no acceleration
+        inner = np.linspace(0, given.seconds, count - _DEGREE + 1)
+        self._knots = np.concatenate([np.zeros(_DEGREE), inner, np.full(_DEGREE, given.seconds)])
+        basis = BSpline(self._knots, np.eye(count), _DEGREE)
+        self._bases = [basis(self._time, order) for order in range(4)]
+        q = given.motion(self._time)[0]
+        self._ends = np.array([q[0], q[-1]])
+        known = self._bases[0][:, :3].sum(axis=1)[:, None] * q[0] + self._bases[0][:, -3:].sum(axis=1)[:, None] * q[-1]
+        self.start = np.linalg.lstsq(self._bases[0][:, 3:-3], q - known, rcond=None)[0]
+
+    def motion(self, points: np.ndarray) -> SplineMotion:
+        """Return the motion of free points (k, n)."""
+        return SplineMotion(BSpline(self._knots, self._all(points), _DEGREE), self._seconds)
+
+    def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
+        """Return points of less cost, with walls of a stiffness, J."""
+        found = minimize(
+            lambda x: self._cost(x.reshape(points.shape), stiffness),
+            points.ravel(),
+            jac=True,
+            method="L-BFGS-B",
+            options={"maxiter": _ITERATIONS},
+        )
+        return np.asarray(found.x.reshape(points.shape))
+
+    def _all(self, points: np.ndarray) -> np.ndarray:
+        return np.concatenate([self._ends[[0, 0, 0]], points, self._ends[[1, 1, 1]]])
+
+    def _cost(self, points: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
+        states = [basis @ self._all(points) for basis in self._bases]
+        value, slopes = self._energy(states[:3])
+        slopes.append(np.zeros_like(states[3]))
+        for wall, gradients in (self._walls(states), self._distances(states[0])):
+            value += stiffness * wall
+            for order, gradient in enumerate(gradients):
+                slopes[order] = slopes[order] + stiffness * gradient
+        return value, np.concatenate([sum(b[:, 3:-3].T @ s for b, s in zip(self._bases, slopes, strict=True)).ravel()])
+
+    def _energy(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
+        """Return the energy, J, and its slope over each sample's q, dq, ddq, from differences sample by sample."""
+        weights = np.gradient(self._time)
+        weights[[0, -1]] /= 2
+        power = self._power(self._time, *states)
+        slopes = []
+        for order in range(3):
+            slope = np.empty_like(states[order])
+            scale = _STEP / self._seconds**order
+            for joint in range(slope.shape[1]):
+                moved = [state.copy() for state in states]
+                moved[order][:, joint] += scale
+                slope[:, joint] = weights * (self._power(self._time, *moved) - power) / scale
+            slopes.append(slope)
+        return float(weights @ power), slopes
+
+    def _walls(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
+        """Return the mean square by which limits are passed, and its slope over each sample's q, dq, ddq, jerk."""
+        limits = self._limits
+        half = (limits.upper - limits.lower) / 2
+        ranges = (half, limits.speed, limits.acceleration, limits.jerk)
+        centres = ((limits.upper + limits.lower) / 2, 0.0, 0.0, 0.0)
+        value, slopes = 0.0, []
+        for state, centre, greatest in zip(states, centres, ranges, strict=True):
+            share = (state - centre) / greatest
+            beyond = np.sign(share) * np.maximum(np.abs(share) - _SHARE, 0)
+            value += float((beyond**2).sum()) / len(state)
+            slopes.append(2 * beyond / greatest / len(state))
+        if np.isfinite(limits.torque).any():
+            share = self._torque(*states[:3]) / limits.torque
+            beyond = np.sign(share) * np.maximum(np.abs(share) - _SHARE, 0)
+            if beyond.any():
+                value += float((beyond**2).sum()) / len(beyond)
+                self._add_torque(states, share, beyond, slopes)
+        return value, slopes
+
+    def _add_torque(
+        self, states: list[np.ndarray], share: np.ndarray, beyond: np.ndarray, slopes: list[np.ndarray]
+    ) -> None:
+        for order in range(3):
+            scale = _STEP / self._seconds**order
+            for joint in range(share.shape[1]):
+                moved = [state.copy() for state in states[:3]]
+                moved[order][:, joint] += scale
+                change = (self._torque(*moved) / self._limits.torque - share) / scale
+                slopes[order][:, joint] += 2 * (beyond * change).sum(axis=1) / len(share)
+
+    def _distances(self, q: np.ndarray) -> tuple[float, list[np.ndarray]]:
+        """Return the mean square by which pairs are nearer than they may, over _NEAR, and its slope over q."""
+        value, slope = 0.0, np.zeros_like(q)
+        rows = np.unique(np.linspace(1, len(q) - 2, _POSES).round().astype(int))
+        least = min(_NEAR, self._collisions.clearance(q[0]), self._collisions.clearance(q[-1]))
+        for row in rows:
+            clearance, change = self._collisions.clearance_slope(q[row])
+            lack = (least - clearance) / _NEAR
+            if lack > 0:
+                value += lack**2 / len(rows)
+                slope[row] -= 2 * lack * change / _NEAR / len(rows)
+        return value, [slope]

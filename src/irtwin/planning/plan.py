@@ -1,0 +1,153 @@
+"""A planned motion: from where to where, around what, in what time, at what cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.planning.energy_optimal import Power, SplineMotion, cheapest, keeps
+from irtwin.planning.path import LONGEST_SEARCH, joint_path, line_path
+from irtwin.planning.poses import Pose, joints_for
+from irtwin.planning.timing import MotionLimits, Timed, Torque, fastest, rounded, through
+from irtwin.robot.collision import CollisionModel, Obstacle
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+from irtwin.twin.price import Price, price
+from irtwin.twin.twin import Parameter, Twin
+
+KEEP_OFF = 0.01  # m: what a path keeps between two bodies, where start and goal do
+_LONGEST = 600.0  # s
+_MOST = 1_000_000  # samples
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a motion is to do: start and goal, boxes about it, and what counts.
+
+    line: the flange goes straight. least_energy: in `seconds`, or in the time of the fastest, the motion that costs
+    least; else the fastest, slowed evenly to `seconds`. search: how long a path may be sought, s. Payload in kg and m
+    in the flange frame.
+    """
+
+    start: np.ndarray | Pose
+    goal: np.ndarray | Pose
+    obstacles: Sequence[Obstacle] = ()
+    line: bool = False
+    least_energy: bool = False
+    seconds: float | None = None
+    search: float = LONGEST_SEARCH
+    payload_mass: float = 0.0
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A planned motion, its price (None where the twin knows nothing of power) and its least clearance, m.
+
+    unchecked: links with mass but without collision shapes. fastest: how long the fastest motion on the path takes, s.
+    """
+
+    joint_names: tuple[str, ...]
+    motion: Motion
+    price: Price | None
+    clearance: float
+    checks_itself: bool
+    unchecked: tuple[str, ...]
+    fastest: float
+
+    @property
+    def seconds(self) -> float:
+        """How long the motion takes."""
+        return float(self.motion.time[-1])
+
+
+def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
+    """Plan a motion of the twin's robot, sampled evenly at (nearly) `rate`, Hz.
+
+    Raises InputError where start or goal is out of reach, outside the limits or in collision, where there is no way or
+    not enough time or torque, or where energy is to be least and the twin knows nothing of power.
+    """
+    if task.least_energy and not twin.knows_power:
+        raise InputError("least energy needs a twin that has seen power; name one that `irtwin diagnose` saved")
+    if task.seconds is not None and not 0 < task.seconds <= _LONGEST:
+        raise InputError(f"a motion cannot be planned to last {task.seconds:g} s; give up to {_LONGEST:g} s")
+    limits = MotionLimits.of(twin.robot)
+    collisions = CollisionModel(twin.robot, task.obstacles)
+    quickest = _fastest(twin, task, limits, collisions)
+    if task.seconds is not None and task.seconds < quickest.seconds:
+        raise InputError(
+            f"the motion cannot be done in {task.seconds:g} s; the fastest on this way takes {quickest.seconds:.3f} s"
+        )
+    seconds = task.seconds or quickest.seconds
+    chosen: Timed | SplineMotion = quickest.slower(seconds)
+    if task.least_energy and not task.line:
+        chosen = cheapest(quickest, seconds, limits, _torque(twin, task), _power(twin, task), collisions)
+    if not keeps(chosen, limits, _torque(twin, task), collisions):
+        raise InputError(f"a motion of {seconds:g} s asks for more torque than the joints have; give another duration")
+    collisions.keep_off(0.0)
+    count = max(20, round(seconds * rate))
+    if count > _MOST:
+        raise InputError(f"{seconds:g} s at {rate:g} Hz are {count} samples; ask for at most {_MOST}")
+    motion = _motion(task, np.linspace(0, seconds, count + 1), *chosen.motion(np.linspace(0, seconds, count + 1))[:3])
+    meeting, clearance = collisions.first_meeting(motion.time, motion.q)
+    if meeting is not None:
+        raise InputError(f"between samples of {rate:g} Hz {meeting}; ask for a higher rate")
+    return Plan(
+        joint_names=twin.robot.joint_names,
+        motion=motion,
+        price=price(twin, [motion]),
+        clearance=clearance,
+        checks_itself=collisions.checks_itself,
+        unchecked=collisions.unchecked,
+        fastest=quickest.seconds,
+    )
+
+
+def nominal_twin(robot: Robot) -> Twin:
+    """Return a twin of a robot's URDF and data sheet alone: bodies and rotors as they say, and nothing of power."""
+    effects = ("rigid_body", "rotor_inertia")
+    terms = Stack(robot, effects).torque_terms
+    parameters = [
+        Parameter(effect.id, term.joint, term.link, term.name, term.expected, term.unit) for effect, term in terms
+    ]
+    return Twin(robot, effects, tuple(parameters))
+
+
+def _fastest(twin: Twin, task: Task, limits: MotionLimits, collisions: CollisionModel) -> Timed:
+    robot = twin.robot
+    start = joints_for(robot, task.start, collisions, None, "the start")
+    goal = joints_for(robot, task.goal, collisions, start, "the goal")
+    if np.abs(goal - start).max() < 1e-6:
+        raise InputError("start and goal are the same pose; give another goal")
+    ends = min(collisions.clearance(start), collisions.clearance(goal))
+    collisions.keep_off(min(KEEP_OFF, ends / 2))
+    if task.line:
+        return fastest(through(line_path(robot, collisions, start, goal)), limits, _torque(twin, task))
+    corners = joint_path(robot, collisions, start, goal, task.search)
+
+    def is_clear(q: np.ndarray) -> bool:
+        return collisions.first_meeting(np.arange(float(len(q))), q)[0] is None
+
+    return fastest(rounded(corners, is_clear), limits, _torque(twin, task))
+
+
+def _torque(twin: Twin, task: Task) -> Torque:
+    def torque(q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+        return twin.joint_torque(_motion(task, np.arange(float(len(q))), q, dq, ddq))
+
+    return torque
+
+
+def _power(twin: Twin, task: Task) -> Power:
+    def power(time: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+        return twin.power(_motion(task, time, q, dq, ddq))
+
+    return power
+
+
+def _motion(task: Task, time: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> Motion:
+    return Motion(time, q, dq, ddq, run="planned", payload_mass=task.payload_mass, payload_com=task.payload_com)

@@ -1,0 +1,146 @@
+"""Where a motion starts and ends: joint positions, or a pose of the flange that joint positions are found for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.errors import InputError
+from irtwin.identification.motion_limits import JointLimits
+from irtwin.robot.collision import CollisionModel
+from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import flange
+
+_STARTS = 60  # random joint positions from which a pose is sought
+_STEPS = 150
+_DAMPING = 1e-3
+_FOUND = 1e-9  # m and rad
+_ANGLE = 0.3  # m/rad: how a wrong direction weighs beside a wrong place
+_SPACE = 1e-6  # rad: kept off the limits, so that rounding does not pass them
+_FARTHEST = 1e3
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A pose of the flange in the base frame: place (3,) m; roll, pitch, yaw (3,) rad about the fixed x, y, z."""
+
+    place: tuple[float, float, float]
+    angles: tuple[float, float, float]
+
+    @property
+    def placement(self) -> pin.SE3:
+        """The pose as Pinocchio's transform."""
+        return pin.SE3(pin.rpy.rpyToMatrix(np.array(self.angles)), np.array(self.place))
+
+
+def read_target(text: str, joints: int, option: str) -> np.ndarray | Pose:
+    """Return the joint positions (n,) or the pose that an option says: "0,-1.57,..." or "pose:x,y,z,roll,pitch,yaw".
+
+    Raises InputError on anything else.
+    """
+    of_flange = text.startswith("pose:")
+    wanted = 6 if of_flange else joints
+    try:
+        values = [float(word) for word in text.removeprefix("pose:").split(",")]
+    except ValueError:
+        values = []
+    if len(values) != wanted or not all(math.isfinite(value) and abs(value) <= _FARTHEST for value in values):
+        shown = text if len(text) < 60 else f"{text[:60]}..."
+        raise InputError(
+            f'{option} "{shown}": give {joints} joint positions, as "0,-1.57,...", or a pose of the flange, as '
+            '"pose:x,y,z,roll,pitch,yaw", in m and rad'
+        )
+    if of_flange:
+        return Pose((values[0], values[1], values[2]), (values[3], values[4], values[5]))
+    return np.array(values)
+
+
+def joints_for(
+    robot: Robot, target: np.ndarray | Pose, collisions: CollisionModel, near: np.ndarray | None, what: str
+) -> np.ndarray:
+    """Return joint positions (n,) of a target within all limits, clear of all; of several those nearest to `near`.
+
+    Raises InputError where there are none: which joint is outside its limits, by how far the pose is out of reach, or
+    which pair touches.
+    """
+    limits = JointLimits.of(robot)
+    found = [target] if isinstance(target, np.ndarray) else _solutions(robot, target, limits, near, what)
+    _check_limits(robot, found[0], what)
+    for q in found:
+        if not collisions.touches(q):
+            return q
+    pair = collisions.meeting(found[0])
+    assert pair is not None
+    raise InputError(f"{what} is in collision: {pair[0]} touches {pair[1]}; choose another one")
+
+
+def flange_placement(robot: Robot, q: np.ndarray) -> pin.SE3:
+    """Return the flange's transform in the base frame at the joint positions `q`: (n,)."""
+    model, data = robot.model, robot.model.createData()
+    pin.forwardKinematics(model, data, q)
+    return pin.updateFramePlacement(model, data, model.getFrameId(flange(robot), pin.FrameType.BODY))
+
+
+def follow(robot: Robot, target: pin.SE3, start: np.ndarray, limits: JointLimits) -> tuple[np.ndarray, float, float]:
+    """Return joint positions within their limits near `start`, and how far they leave the target: m, rad.
+
+    Damped least squares (Nakamura and Hanafusa, 1986).
+    """
+    model, data = robot.model, robot.model.createData()
+    frame = model.getFrameId(flange(robot), pin.FrameType.BODY)
+    lower, upper = limits.lower + _SPACE, limits.upper - _SPACE
+    q = np.clip(start, lower, upper)
+
+    def error(q: np.ndarray) -> np.ndarray:
+        pin.forwardKinematics(model, data, q)
+        return np.asarray(pin.log6(pin.updateFramePlacement(model, data, frame).actInv(target)).vector)
+
+    weights = np.array([1.0] * 3 + [_ANGLE] * 3)
+    left = error(q)
+    damping = _DAMPING
+    for _ in range(_STEPS):
+        if np.abs(left).max() < _FOUND:
+            break
+        jacobian = weights[:, None] * pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
+        step = np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(len(q)), jacobian.T @ (weights * left))
+        tried = np.clip(q + step, lower, upper)
+        after = error(tried)
+        if np.linalg.norm(weights * after) < np.linalg.norm(weights * left):
+            q, left, damping = tried, after, max(damping / 10, 1e-12)
+        elif damping > 1e3:
+            break
+        else:
+            damping *= 10
+    reached = flange_placement(robot, q)
+    return (
+        q,
+        float(np.linalg.norm(reached.translation - target.translation)),
+        float(np.linalg.norm(pin.log3(reached.rotation.T @ target.rotation))),
+    )
+
+
+def _solutions(robot: Robot, pose: Pose, limits: JointLimits, near: np.ndarray | None, what: str) -> list[np.ndarray]:
+    start = limits.centre if near is None else near
+    random = np.random.default_rng(0).uniform(limits.lower, limits.upper, (_STARTS, len(start)))
+    tries = [follow(robot, pose.placement, q, limits) for q in (start, *random)]
+    found = [q for q, away, turned in tries if max(away, turned) < 1e-6]
+    if not found:
+        _, away, turned = min(tries, key=lambda each: each[1] + _ANGLE * each[2])
+        shown = " ".join(f"{value:g}" for value in (*pose.place, *pose.angles))
+        raise InputError(
+            f"{what} {shown} is out of reach: the flange stays {1000 * away:.0f} mm and {np.degrees(turned):.1f} deg "
+            "off it; choose a nearer pose"
+        )
+    return sorted(found, key=lambda q: float(np.linalg.norm(q - start)))
+
+
+def _check_limits(robot: Robot, q: np.ndarray, what: str) -> None:
+    for joint, value in zip(robot.joints, q, strict=True):
+        if not joint.lower <= value <= joint.upper:
+            raise InputError(
+                f"{what}: {joint.name} at {value:g} {joint.unit} is outside its limits, {joint.lower:g} to "
+                f"{joint.upper:g} {joint.unit}"
+            )

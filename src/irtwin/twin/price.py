@@ -1,0 +1,116 @@
+"""What a motion costs by a twin: energy, peak and mean power, and how sure the twin is of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.identification.uncertainty import NORMAL
+from irtwin.identification.validation import energy
+from irtwin.signals.motion import Motion
+from irtwin.twin.identify import power_slope
+from irtwin.twin.twin import Twin
+
+_PIECE = 4096  # samples whose regressor is held at once
+_WATT_HOUR = 3600.0  # J
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A predicted value with half its 95 % interval; None where the twin does not know how sure its numbers are."""
+
+    value: float
+    half_width: float | None
+
+
+@dataclass(frozen=True)
+class Price:
+    """What a motion takes: seconds, energy J, greatest and mean electrical power W.
+
+    The intervals are those of the twin's parameters; what its effects leave out is not in them.
+    """
+
+    seconds: float
+    energy: Figure
+    peak: Figure
+    mean: Figure
+
+    def __str__(self) -> str:
+        hours = Figure(self.energy.value / _WATT_HOUR, _scaled(self.energy.half_width, 1 / _WATT_HOUR))
+        parts = (
+            f"energy {_shown(self.energy)} J ({_shown(hours)} Wh)",
+            f"peak power {_shown(self.peak)} W",
+            f"mean power {_shown(self.mean)} W",
+        )
+        known = self.energy.half_width is not None
+        return ", ".join(parts) + ("; +- 95 % interval of the twin's parameters" if known else "; intervals not known")
+
+
+def price(twin: Twin, motions: Sequence[Motion]) -> Price | None:
+    """Return what motions take together; None where the twin has identified nothing of power.
+
+    To first order in the parameters; effects that build on predicted power (bus, chopper) are taken as they are.
+    """
+    if not twin.knows_power:
+        return None
+    powers = [twin.power(motion) for motion in motions]
+    seconds = sum(float(motion.time[-1] - motion.time[0]) for motion in motions)
+    total = sum(energy(motion.time, power) for motion, power in zip(motions, powers, strict=True))
+    highest = int(np.argmax([power.max() for power in powers]))
+    most = int(np.argmax(powers[highest]))
+    widths: tuple[float | None, float | None] = (None, None)
+    if twin.covariance is not None:
+        slope = sum((_slope(twin, motion, _weights(motion.time)) for motion in motions), np.zeros(len(twin.parameters)))
+        at_peak = np.zeros(len(powers[highest]))
+        at_peak[most] = 1.0
+        widths = _half_width(twin, slope), _half_width(twin, _slope(twin, motions[highest], at_peak))
+    mean = Figure(total / seconds, _scaled(widths[0], 1 / seconds))
+    return Price(seconds, Figure(total, widths[0]), Figure(float(powers[highest][most]), widths[1]), mean)
+
+
+def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
+    """Return the slope of the weighted (N,) sum of power over each of the twin's p parameters, (p,)."""
+    stack = twin.stack
+    torque_values, power_values = (
+        np.array([twin.value(effect.id, term) for effect, term in terms], dtype=float)
+        for terms in (stack.torque_terms, stack.power_terms)
+    )
+    over_torque, over_power = np.zeros(len(torque_values)), np.zeros(len(power_values))
+    for piece in motion.pieces(_PIECE):
+        own = weights[piece.start - motion.start : piece.start - motion.start + len(piece.time)]
+        if not own.any():
+            continue
+        torque = stack.real_torque(piece, torque_values)
+        slope = own[:, None] * power_slope(stack, piece, torque, power_values)
+        over_torque += np.einsum("tj,tjk->k", slope, stack.torque_columns(piece, torque_values)) * stack.real
+        over_power += own @ stack.predicted_power_columns(piece, torque_values, power_values)
+    places = {(p.effect, p.joint, p.link, p.name): place for place, p in enumerate(twin.parameters)}
+    result = np.zeros(len(twin.parameters))
+    for terms, slopes in ((stack.torque_terms, over_torque), (stack.power_terms, over_power)):
+        for (effect, term), value in zip(terms, slopes, strict=True):
+            if not term.fixed:
+                result[places[effect.id, term.joint, term.link, term.name]] += value
+    return result
+
+
+def _half_width(twin: Twin, slope: np.ndarray) -> float:
+    assert twin.covariance is not None
+    return NORMAL * float(np.sqrt(max(float(slope @ twin.covariance @ slope), 0.0)))
+
+
+def _weights(time: np.ndarray) -> np.ndarray:
+    """Return the weights of the trapezoidal rule, (N,) s."""
+    steps = np.diff(time)
+    return np.asarray((np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / 2)
+
+
+def _scaled(width: float | None, factor: float) -> float | None:
+    return None if width is None else width * factor
+
+
+def _shown(figure: Figure) -> str:
+    if figure.half_width is None:
+        return f"{figure.value:.4g}"
+    return f"{figure.value:.4g} +- {figure.half_width:.2g}"
