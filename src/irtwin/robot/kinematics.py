@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from irtwin.errors import InputError
 from irtwin.robot.description import Link, Robot
 
 
@@ -21,6 +22,27 @@ def flange(robot: Robot) -> str:
     for frame in list(robot.model.frames)[1:]:  # a parent comes before its children
         depths.append(depths[frame.parentFrame] + 1)
     return max(_frames(robot), key=lambda entry: depths[entry[1]])[0].name
+
+
+def link_frame(robot: Robot, link: str) -> int:
+    """Return Pinocchio's number of a link's frame. Raises InputError where the robot has no such link."""
+    if link not in (known.name for known in robot.links):
+        raise InputError(f'{robot.name} has no link "{link}" (it has {", ".join(one.name for one in robot.links)})')
+    return int(robot.model.getFrameId(link, pin.FrameType.BODY))
+
+
+def placements(robot: Robot, q: np.ndarray, link: str | None = None) -> np.ndarray:
+    """Return the placements of a link, the flange where None, in the base frame: (N, 4, 4) m, at `q`: (N, n) rad or m.
+
+    Raises InputError where the robot has no such link.
+    """
+    model, data = robot.model, robot.model.createData()
+    frame = link_frame(robot, link or flange(robot))
+    result = np.empty((len(q), 4, 4))
+    for row, sample in enumerate(np.asarray(q, dtype=float)):
+        pin.forwardKinematics(model, data, sample)
+        result[row] = pin.updateFramePlacement(model, data, frame).homogeneous
+    return result
 
 
 def _frames(robot: Robot) -> list[tuple[Link, int]]:

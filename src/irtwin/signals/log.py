@@ -1,4 +1,4 @@
-"""A data set as handed over: a folder with dataset.toml, a URDF and one file a run."""
+"""A data set as handed over: a folder with dataset.toml, a URDF (or a table of joints) and one file a run."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
+from irtwin.signals.dh_table import robot_of_table
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
@@ -99,7 +100,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         ambient_temperature=table.number("ambient_temperature"),
         power_at=power_at,
         simulated=table.values.get("simulated") is True or all(run.role == "simulated" for run in runs),
-        notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf")},
+        notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
         repairs=tuple(repairs),
     )
 
@@ -131,18 +132,28 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
     return 0.0, (0.0, 0.0, 0.0)
 
 
+def read_robot(source: Path) -> Robot:
+    """Read a robot from a URDF file, a data set's folder or its dataset.toml; runs are not read. Raises InputError."""
+    file = source / "dataset.toml" if source.is_dir() else source
+    if file.suffix != ".toml":
+        return read_urdf(file)
+    return _robot(file.parent, Table(file, "[robot]", take(read_toml(file), "robot", dict, file, "[robot]")))
+
+
 def _robot(folder: Path, table: Table) -> Robot:
     name = table.text("name")
     if name is None:
         raise InputError(f"{table.file}: [robot] name is missing")
-    robot = read_urdf(table.path("urdf", folder))
+    if "dh" in table.values and "urdf" in table.values:
+        raise InputError(f"{table.file}: [robot] has both urdf and dh; keep the one that describes the robot")
+    robot = robot_of_table(name, table) if "dh" in table.values else read_urdf(table.path("urdf", folder))
     sheets = table.values.get("joint", {})
     if not isinstance(sheets, dict):
         raise InputError(f"{table.file}: [robot.joint.NAME] should be a table for each joint")
     for joint in sheets:
         if joint not in robot.joint_names:
             raise InputError(
-                f'{table.file}: [robot.joint.{joint}]: the URDF has no moving joint "{joint}" '
+                f'{table.file}: [robot.joint.{joint}]: the robot has no moving joint "{joint}" '
                 f"(it has {', '.join(robot.joint_names)})"
             )
     joints = []

@@ -1,0 +1,146 @@
+"""The table [robot.dh] of dataset.toml: a robot by its Denavit-Hartenberg parameters instead of a URDF."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.errors import InputError
+from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, from_table
+from irtwin.robot.denavit_hartenberg import Table as DhTable
+from irtwin.robot.description import Robot
+from irtwin.signals.toml_file import Table, shown
+
+DH_KEYS = ("convention", "base", "tool", "row")
+ROW_KEYS = (
+    "name",
+    "type",
+    "a",
+    "alpha",
+    "d",
+    "theta",
+    "lower",
+    "upper",
+    "velocity",
+    "effort",
+    "mass",
+    "com",
+    "inertia",
+)
+_TYPES = ("revolute", "continuous", "prismatic")
+_FARTHEST = 1e3  # m, or rad
+_MOST_ROWS = 100
+
+
+def robot_of_table(name: str, robot: Table) -> Robot:
+    """Make the robot of the key `dh` of [robot]. Raises InputError, naming file, table and key, on what is wrong."""
+    values = robot.values["dh"]
+    if not isinstance(values, dict):
+        raise InputError(f"{robot.file}: [robot.dh] should be a table, with convention and [[robot.dh.row]]")
+    table = Table(robot.file, "[robot.dh]", values)
+    _check_keys(table, DH_KEYS)
+    convention = table.text("convention")
+    if convention not in CONVENTIONS:
+        said = "is missing" if convention is None else f'= "{convention}"'
+        raise InputError(f"{robot.file}: [robot.dh] convention {said}; use {' or '.join(CONVENTIONS)} (Craig's)")
+    rows = values.get("row")
+    if not isinstance(rows, list) or not rows:
+        raise InputError(f"{robot.file}: [[robot.dh.row]] is missing; give one for each joint, base to flange")
+    if len(rows) > _MOST_ROWS:
+        raise InputError(f"{robot.file}: [[robot.dh.row]]: {len(rows)} rows; a robot has at most {_MOST_ROWS}")
+    read = [_row(robot, number, each) for number, each in enumerate(rows, start=1)]
+    described = DhTable(tuple(read), convention, _placement(table, "base"), _placement(table, "tool"))
+    twice = [each for each in described.joint_names if described.joint_names.count(each) > 1]
+    if twice:
+        raise InputError(f'{robot.file}: [[robot.dh.row]]: two joints are named "{twice[0]}"; give each its own name')
+    return from_table(name, described)
+
+
+def _row(robot: Table, number: int, values: Any) -> Row:
+    if not isinstance(values, dict):
+        raise InputError(f"{robot.file}: [[robot.dh.row]] {number} should be a table, not {shown(values)}")
+    table = Table(robot.file, f"[[robot.dh.row]] {number}", values)
+    _check_keys(table, ROW_KEYS)
+    kind = table.text("type", "revolute") or ""
+    if kind not in _TYPES:
+        raise InputError(f'{table.file}: {table.name} type = "{kind}"; use {", ".join(_TYPES)}')
+    lower, upper = _limits(table, kind)
+    row = Row(
+        a=_within(table, "a"),
+        alpha=_within(table, "alpha"),
+        d=_within(table, "d"),
+        theta=_within(table, "theta"),
+        kind=kind,
+        lower=lower,
+        upper=upper,
+        velocity=table.number("velocity", least=0.0) or 0.0,
+        effort=table.number("effort", least=0.0) or 0.0,
+        name=table.text("name"),
+    )
+    mass, com = table.number("mass", least=0.0), _numbers(table, "com", 3, "m: x, y, z in the row's frame")
+    inertia = _numbers(table, "inertia", 6, "kg m^2: xx, yy, zz, xy, xz, yz about the centre of mass")
+    if mass is None and (com or inertia):
+        raise InputError(f"{table.file}: {table.name} mass is missing; com and inertia say nothing without it")
+    if inertia and min(inertia[:3]) < 0:
+        raise InputError(f"{table.file}: {table.name} inertia: a moment of inertia cannot be negative")
+    if mass is not None:
+        row = replace(row, mass=mass, com=com or row.com, inertia=inertia or (0.0,) * 6)
+    return row
+
+
+def _limits(table: Table, kind: str) -> tuple[float, float]:
+    lower, upper = table.number("lower"), table.number("upper")
+    if kind == "continuous":
+        if lower is not None or upper is not None:
+            raise InputError(f"{table.file}: {table.name}: a continuous joint has no lower or upper limit; remove it")
+        return -math.inf, math.inf
+    if (lower is None) != (upper is None):
+        raise InputError(f"{table.file}: {table.name} {'lower' if lower is None else 'upper'} is missing")
+    if lower is None or upper is None:
+        return -math.inf, math.inf
+    if lower > upper:
+        raise InputError(f"{table.file}: {table.name} lower = {lower:g} lies above upper = {upper:g}")
+    return lower, upper
+
+
+def _within(table: Table, key: str) -> float:
+    """Return a length or an angle: 0 where it is absent, refused where no robot has it, as degrees or millimetres."""
+    value = table.number(key) or 0.0
+    angle = key in ("alpha", "theta")
+    greatest, unit = (4 * math.pi, "rad") if angle else (_FARTHEST, "m")
+    if abs(value) > greatest:
+        raise InputError(f"{table.file}: {table.name} {key} = {value:g} {unit} is beyond {greatest:.3g} {unit}")
+    return value
+
+
+def _placement(table: Table, key: str) -> np.ndarray:
+    """Return the (4, 4) transform of six numbers x, y, z, roll, pitch, yaw; the identity where they are absent."""
+    six = _numbers(table, key, 6, "x, y, z in m and roll, pitch, yaw in rad")
+    if six is None:
+        return np.eye(4)
+    return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(np.array(six[3:])), np.array(six[:3])).homogeneous)
+
+
+def _numbers(table: Table, key: str, count: int, meaning: str) -> Any:
+    """Return a tuple of so many numbers; None where the key is absent."""
+    value = table.values.get(key)
+    if value is None:
+        return None
+    if not (isinstance(value, list) and len(value) == count):
+        raise InputError(f"{table.file}: {table.name} {key} should be {count} numbers ({meaning}), not {shown(value)}")
+    parts = (Table(table.file, f"{table.name} {key}", {"part": part}).number("part") for part in value)
+    return tuple(0.0 if part is None else part for part in parts)
+
+
+def _check_keys(table: Table, known: Sequence[str]) -> None:
+    for key in table.values:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, 1)
+            hint = f"did you mean {near[0]}?" if near else f"it may have {', '.join(known)}"
+            raise InputError(f"{table.file}: {table.name} {shown(key)[1:-1]} is no key of a table of joints; {hint}")
