@@ -6,6 +6,7 @@ Arm_D has a run and no twin. The ledger of each run adds up to its modelled ener
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any
@@ -16,6 +17,7 @@ from irtwin.knowledge.vocabulary import ID
 from irtwin.storage import experiment_schema as experiment
 from irtwin.storage import gap_schema as gap
 from irtwin.storage import schema
+from irtwin.storage import structure_schema as structure
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base
 
@@ -66,7 +68,7 @@ FITS = [  # robot, run, joint, part, RMSE, R squared
 def fill(workspace: Workspace) -> None:
     """Put the fleet into a workspace's database."""
     with Session(workspace.engine) as session, session.begin():
-        for row in [*_robots(), *_runs(), *_twins(), *_energies(), *_diagnoses()]:
+        for row in [*_robots(), *_structures(), *_runs(), *_twins(), *_energies(), *_diagnoses()]:
             session.add(row)
             session.flush()
 
@@ -86,6 +88,51 @@ def _robots() -> Iterator[Base]:
                 upper_limit_rad=3.0, speed_limit_rad_s=4.0, torque_limit_nm=None if robot == "Arm_B" else 100.0,
                 gear_ratio=50.0 if robot == "Arm_A" else None,
             )  # fmt: skip
+
+
+def _structures() -> Iterator[Base]:
+    """A post of 0.5 m, joint 1 on it about z, 0.4 m further joint 2 about y, a flange; Arm_C turns about x."""
+    level = {"origin_roll_rad": 0.0, "origin_pitch_rad": 0.0, "origin_yaw_rad": 0.0}
+    places = {"j1": (0.0, 0.0, 0.5), "j2": (0.4, 0.0, 0.0), "mount": (0.1, 0.0, 0.0)}
+    axes: dict[str, tuple[float | None, ...]] = {"j1": (0.0, 0.0, 1.0), "j2": (0.0, 1.0, 0.0), "mount": (None,) * 3}
+    for robot, joints in JOINTS.items():
+        links = ["base", *(f"link_{joint}" for joint in joints), "flange"]
+        for number, link in enumerate(links):
+            yield structure.Link(
+                robot_id=robot, name=link, number=number, mass_kg=None if number == 0 else 2.0 * number
+            )
+        for joint, parent, child in zip([*joints, "mount"], links, links[1:], strict=False):
+            x, y, z = places[joint]
+            about_x = robot == "Arm_C" and joint == "j1"
+            axis_x, axis_y, axis_z = (1.0, 0.0, 0.0) if about_x else axes[joint]
+            yield structure.LinkJoint(
+                robot_id=robot, name=joint, kind="fixed" if joint == "mount" else "revolute",
+                parent_link=parent, child_link=child, origin_x_m=x, origin_y_m=y, origin_z_m=z, axis_x=axis_x,
+                axis_y=axis_y, axis_z=axis_z, **level,
+            )  # fmt: skip
+        yield from _devices(robot, None, "controller", "time", "time of the sample", "s")
+        yield from _devices(robot, None, "power_meter", "power", "electrical power", "W")
+        if robot == "Arm_A":
+            for joint in joints:
+                yield from _devices(robot, joint, "encoder", f"q_{joint}", "position", "rad")
+    ends = {f"{end}_{name}": 0.0 for end in ("base", "tool") for name in ("x_m", "y_m", "z_m")}
+    ends |= {f"{end}_{name}_rad": 0.0 for end in ("base", "tool") for name in ("roll", "pitch", "yaw")}
+    yield structure.DHTable(
+        robot_id="Arm_A", convention="standard", end_link="flange", deviation_m=1e-16, deviation_rad=0.0, **ends
+    )
+    for number, (joint, a, alpha, d) in enumerate([("j1", 0.4, -0.5 * math.pi, 0.5), ("j2", 0.1, 0.0, 0.0)], 1):
+        yield structure.DHRow(
+            robot_id="Arm_A", convention="standard", number=number, joint=joint, a_m=a, alpha_rad=alpha, d_m=d,
+            theta_rad=0.0,
+        )  # fmt: skip
+
+
+def _devices(robot: str, joint: str | None, kind: str, column: str, label: str, unit: str) -> Iterator[Base]:
+    device = kind if joint is None else f"{kind}.{joint}"
+    yield structure.Device(robot_id=robot, device_id=device, kind=kind, joint=joint)
+    yield structure.DeviceChannel(
+        robot_id=robot, column_name=column, device_id=device, joint=joint, label=label, unit=unit, rate_hz=100.0
+    )
 
 
 def _runs() -> Iterator[Base]:

@@ -28,7 +28,8 @@ from irtwin.knowledge.store.snapshot import Snapshot, kept
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
-from irtwin.providers.records import check_name, find_robot, identifier, ingest, load_robot, robot_iri
+from irtwin.providers.records import check_name, find_robot, identifier, ingest, robot_iri
+from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.gap.page import render_alone
@@ -255,9 +256,10 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
 
 
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
-    robot = load_robot(place, robot_id)
+    robot = robot_iri(robot_id)
     out = place.report_path(robot_id)
-    render(graph, robot_iri(robot_id), place.read_file, out, partial(draw_scene, robot), partial(explain_one, graph))
+    scene = partial(draw_scene, robot_of_graph(graph, robot))
+    render(graph, robot, place.read_file, out, scene, partial(explain_one, graph))
     return out
 
 

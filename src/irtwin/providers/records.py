@@ -17,12 +17,13 @@ import pyarrow as pa
 from sqlalchemy import select
 
 from irtwin.errors import InputError
+from irtwin.providers.structure_rows import device_rows, structure_rows
 from irtwin.robot import description
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals import log
 from irtwin.signals.channels import columns_of, from_columns
 from irtwin.storage.database import Outcome, Workspace
-from irtwin.storage.schema import Joint, Robot, Run
+from irtwin.storage.schema import Base, Joint, Robot, Run
 
 _INDIVIDUALS = "https://w3id.org/irtwin/id/"
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
@@ -41,8 +42,12 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
         row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
         for row, run in zip(runs, data_set.runs, strict=True)
     }
-    joints = [_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)]
-    return workspace.ingest(_robot_row(robot_id, data_set), joints, runs, series)
+    parts: list[Base] = [
+        *(_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)),
+        *structure_rows(robot_id, data_set.robot),
+        *device_rows(robot_id, data_set),
+    ]
+    return workspace.ingest(_robot_row(robot_id, data_set), parts, runs, series)
 
 
 def identifier(name: str) -> str:

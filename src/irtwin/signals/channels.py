@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, replace
+from functools import partial
 from typing import Annotated, Any, Self, get_type_hints
 
 import numpy as np
@@ -23,8 +24,8 @@ class Channel:
 
     Its columns are PREFIX_JOINT, one a joint; PREFIX alone where it is the whole robot's, and not `per_joint`.
     `unit`, of a joint that slides `sliding`; `greatest`: the largest magnitude that any robot reaches; `label`: what it
-    is. `streamed`: its key in a live stream, None where a stream has none. `strict`: PREFIX_NAME is a mistake where no
-    joint has that name; else it is some other column.
+    is; `device`: what measures it. `streamed`: its key in a live stream, None where a stream has none. `strict`:
+    PREFIX_NAME is a mistake where no joint has that name; else it is some other column.
     """
 
     prefix: str
@@ -35,6 +36,7 @@ class Channel:
     sliding: str | None = None
     streamed: str | None = None
     strict: bool = False
+    device: str = "sensor"
 
     def column(self, joint: str) -> str:
         """Return the name of its column for a joint; of the whole robot's, whatever the joint."""
@@ -49,6 +51,10 @@ class Channel:
         return self.sliding if self.sliding and kind == "prismatic" else self.unit
 
 
+_encoder = partial(Channel, strict=True, device="encoder")
+_meter = partial(Channel, per_joint=False, device="power_meter")
+
+
 @dataclass(frozen=True)
 class Signals:
     """One run's samples, N rows of a robot of n joints, in SI units; None where nothing was logged.
@@ -57,17 +63,22 @@ class Signals:
     `meter_voltage` and `meter_current` are the whole robot's, where its power is measured.
     """
 
-    time: Annotated[Samples, Channel("time", "s", 1e11, "time of the sample", per_joint=False)]
-    q: Annotated[Samples, Channel("q", "rad", 1e4, "position", sliding="m", streamed="position", strict=True)]
+    time: Annotated[Samples, Channel("time", "s", 1e11, "time of the sample", per_joint=False, device="controller")]
+    q: Annotated[Samples, _encoder("q", "rad", 1e4, "position", sliding="m", streamed="position")]
     _: KW_ONLY
-    dq: Annotated[Logged, Channel("dq", "rad/s", 1e4, "speed", sliding="m/s", streamed="velocity", strict=True)] = None
-    ddq: Annotated[Logged, Channel("ddq", "rad/s^2", 1e6, "acceleration", sliding="m/s^2", strict=True)] = None
-    torque: Annotated[Logged, Channel("tau", "N m", 1e6, "torque", sliding="N", streamed="effort", strict=True)] = None
-    current: Annotated[Logged, Channel("i", "A", 1e5, "motor current")] = None
-    temperature: Annotated[Logged, Channel("temp", "degC", 1e3, "temperature", streamed="temperature")] = None
-    power: Annotated[Logged, Channel("power", "W", 1e7, "electrical power", per_joint=False, streamed="power")] = None
-    meter_voltage: Annotated[Logged, Channel("voltage", "V", 1e5, "supply voltage", per_joint=False)] = None
-    meter_current: Annotated[Logged, Channel("current", "A", 1e5, "supply current", per_joint=False)] = None
+    dq: Annotated[Logged, _encoder("dq", "rad/s", 1e4, "speed", sliding="m/s", streamed="velocity")] = None
+    ddq: Annotated[Logged, _encoder("ddq", "rad/s^2", 1e6, "acceleration", sliding="m/s^2")] = None
+    torque: Annotated[
+        Logged,
+        Channel("tau", "N m", 1e6, "torque", sliding="N", streamed="effort", strict=True, device="torque_sensor"),
+    ] = None
+    current: Annotated[Logged, Channel("i", "A", 1e5, "motor current", device="current_sensor")] = None
+    temperature: Annotated[
+        Logged, Channel("temp", "degC", 1e3, "temperature", streamed="temperature", device="thermometer")
+    ] = None
+    power: Annotated[Logged, _meter("power", "W", 1e7, "electrical power", streamed="power")] = None
+    meter_voltage: Annotated[Logged, _meter("voltage", "V", 1e5, "supply voltage")] = None
+    meter_current: Annotated[Logged, _meter("current", "A", 1e5, "supply current")] = None
 
     def logged(self) -> dict[str, Samples]:
         """Return what was logged, by field, in the order of the table."""

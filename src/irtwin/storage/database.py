@@ -15,10 +15,20 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
+from irtwin.storage import structure_schema as _structure_schema  # noqa: F401  likewise
 from irtwin.storage.files import inside
 from irtwin.storage.gap_schema import GapDiagnosis
-from irtwin.storage.rows import drop_activities, drop_data_set, drop_robot, facts, insert_rows, values, with_dependents
-from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Joint, Robot, Run, Series, Twin
+from irtwin.storage.rows import (
+    drop_activities,
+    drop_data_set,
+    drop_robot,
+    facts,
+    insert_rows,
+    part_tables,
+    values,
+    with_dependents,
+)
+from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Robot, Run, Series, Twin
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
 
 Outcome = Literal["new", "unchanged", "replaced"]
@@ -93,18 +103,18 @@ class Workspace:
             yield session
 
     def ingest(
-        self, robot: Robot, joints: Sequence[Joint], runs: Sequence[Run], series: Mapping[str, pa.Table]
+        self, robot: Robot, parts: Sequence[Base], runs: Sequence[Run], series: Mapping[str, pa.Table]
     ) -> Outcome:
         """Take in a robot's data set, all of it or nothing.
 
-        `series` holds the measured samples of each run, by `run_id`. The data set that is there already
-        changes nothing; another one of the same robot replaces it, and all that was derived from it is dropped.
-        Runs that were watched live are no part of a data set and stay.
+        `parts` are the rows of joints, links, shapes and devices; `series` holds the measured samples of each run, by
+        `run_id`. The data set that is there already changes nothing; another one of the same robot replaces it, and all
+        that was derived from it is dropped. Runs that were watched live are no part of a data set and stay.
         """
         missing = {run.run_id for run in runs} ^ set(series)
         if missing:
             raise ValueError(f"runs and series differ: {sorted(missing)}")
-        rows = [robot, *joints, *runs]
+        rows = [robot, *parts, *runs]
         with self._writing() as session:
             known = bool(session.scalar(select(exists().where(Robot.robot_id == robot.robot_id))))
             if known and self._holds(session, robot.robot_id, rows):
@@ -232,14 +242,15 @@ class Workspace:
 
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
         """Whether exactly these source rows are stored already, with their series undamaged."""
-        stored: list[Base] = []
-        for kind in (Robot, Joint):
-            stored += session.scalars(select(kind).where(kind.robot_id == robot_id))
-        stored += session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
+        runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
+        stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
+        for table in part_tables():
+            found = session.execute(select(table).where(table.columns["robot_id"] == robot_id))
+            stored |= {(table.name, *row) for row in found}
         measured = select(Series.path, Series.series_id).join(Run)
         measured = measured.where(Run.robot_id == robot_id, Series.kind == "measured")
         whole = all(is_whole(self.folder, path, checksum) for path, checksum in session.execute(measured))
-        return whole and {facts(row) for row in stored} == {facts(row) for row in rows}
+        return whole and stored == {facts(row) for row in rows}
 
     def _make_tables(self) -> None:
         tables = Base.metadata.sorted_tables

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, RowMapping, Select, Table, delete, insert, select
 from sqlalchemy.orm import Session
 
-from irtwin.storage.schema import LIVE, Activity, Base, Joint, Robot, Run, Series, in_utc
+from irtwin.storage.schema import LIVE, Activity, Base, Robot, Run, Series, in_utc
 
 Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 
@@ -41,6 +41,17 @@ def facts(row: Base) -> tuple[object, ...]:
     if isinstance(row, Run):
         said["start_time"] = in_utc(row.start_time) if row.start_time_from == "log" else None
     return (row.__tablename__, *said.values())
+
+
+def part_tables() -> list[Table]:
+    """Return the tables of what a data set says of the robot itself: its joints, links, shapes and devices."""
+    return [
+        table
+        for table in Base.metadata.sorted_tables
+        if table.name not in (Robot.__tablename__, Run.__tablename__)
+        and "robot_id" in table.columns
+        and "activity_id" not in table.columns
+    ]
 
 
 def insert_rows(session: Session, rows: Iterable[Base]) -> None:
@@ -93,7 +104,7 @@ def drop_data_set(session: Session, robot_id: str) -> None:
     runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
     session.execute(delete(Series).where(Series.run_id.in_(runs)))
     session.execute(delete(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
-    session.execute(delete(Joint).where(Joint.robot_id == robot_id))
+    _drop_parts(session, robot_id)
 
 
 def drop_robot(session: Session, robot_id: str) -> None:
@@ -101,8 +112,14 @@ def drop_robot(session: Session, robot_id: str) -> None:
     made = select(Activity.activity_id).where(Activity.robot_id == robot_id)
     drop_activities(session, set(session.scalars(made)))
     session.execute(delete(Series).where(Series.run_id.in_(select(Run.run_id).where(Run.robot_id == robot_id))))
-    for kind in (Run, Joint, Robot):
+    _drop_parts(session, robot_id)
+    for kind in (Run, Robot):
         session.execute(delete(kind).where(kind.robot_id == robot_id))
+
+
+def _drop_parts(session: Session, robot_id: str) -> None:
+    for table in part_tables():
+        session.execute(delete(table).where(table.columns["robot_id"] == robot_id))
 
 
 def drop_activities(session: Session, activities: set[str]) -> None:

@@ -1,0 +1,196 @@
+"""What a URDF says of a robot beside its moving joints: every link and joint, their places, and the shapes of links.
+
+Meshes are named, never opened.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+from defusedxml import ElementTree as SafeXml
+
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+
+Three = tuple[float, float, float]
+_SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ()}
+PURPOSES = ("visual", "collision")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a frame lies in another: xyz in m, rpy in rad (turned about fixed x, then y, then z)."""
+
+    xyz: Three = (0.0, 0.0, 0.0)
+    rpy: Three = (0.0, 0.0, 0.0)
+
+    @property
+    def transform(self) -> np.ndarray:
+        """The (4, 4) transform from the frame to the one that it lies in, m."""
+        return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(*self.rpy), np.array(self.xyz)).homogeneous)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A link: mass in kg, centre of mass `com` in m, `inertia` xx, yy, zz, xy, xz, yz about it in kg m^2.
+
+    All in the link's own axes; None where the URDF gives the link no inertia.
+    """
+
+    name: str
+    mass: float | None
+    com: Three | None
+    inertia: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint between two links, at zero at `origin` in the parent's frame; `axis`, of length one, in its own.
+
+    kind: "revolute", "continuous", "prismatic", or "fixed", which a joint that mimics another is too; a fixed one has
+    no axis.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Origin
+    axis: Three | None
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A shape of a link, for the eye or against collisions; sizes in m by `kind`, as in robot.description.Shape.
+
+    Of a "mesh", `file` is its path as the URDF writes it, and `size` the factors that it is stretched by. `colour` is
+    RGBA in 0..1, None where none is given.
+    """
+
+    link: str
+    purpose: str  # one of PURPOSES
+    kind: str
+    size: tuple[float, ...]
+    origin: Origin
+    colour: tuple[float, ...] | None = None
+    file: str | None = None
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Links, the base first and each after its parent; the joints in between; the links' shapes."""
+
+    bodies: tuple[Body, ...]
+    connections: tuple[Connection, ...]
+    solids: tuple[Solid, ...]
+
+
+def structure_of(robot: Robot) -> Structure:
+    """Return the structure of a robot. Raises InputError where a shape against collisions cannot be read."""
+    root = SafeXml.fromstring(robot.urdf.encode("utf-8"), forbid_dtd=True)
+    moving = set(robot.joint_names)
+    links = {str(link.get("name")): link for link in root.findall("link")}
+    joints = {str(joint.find("child").get("link")): joint for joint in root.findall("joint")}
+    children: dict[str, list[str]] = {}
+    for child, joint in joints.items():
+        children.setdefault(_parent(joint), []).append(child)
+    order: list[str] = []
+    todo = [name for name in links if name not in joints]
+    while todo:
+        order.append(todo.pop())
+        todo += reversed(children.get(order[-1], []))
+    colours = {material.get("name"): material.find("color") for material in root.findall("material")}
+    return Structure(
+        tuple(_body(name, links[name]) for name in order),
+        tuple(_connection(joints[name], name, moving) for name in order if name in joints),
+        tuple(solid for name in order for solid in _solids(robot.name, name, links[name], colours)),
+    )
+
+
+def _parent(joint: Element) -> str:
+    return str(joint.find("parent").get("link"))  # type: ignore[union-attr]
+
+
+def _body(name: str, link: Element) -> Body:
+    inertial = link.find("inertial")
+    mass = None if inertial is None else inertial.find("mass")
+    if inertial is None or mass is None:
+        return Body(name, None, None, None)
+    origin = _origin(inertial)
+    moments = inertial.find("inertia")
+    turned = None
+    if moments is not None:
+        xx, yy, zz, xy, xz, yz = (float(moments.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+        turn = origin.transform[:3, :3]
+        said = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+        turned = tuple(float(said[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    return Body(name, float(mass.get("value", "0")), origin.xyz, turned)
+
+
+def _connection(joint: Element, child: str, moving: set[str]) -> Connection:
+    name = str(joint.get("name"))
+    axis = None
+    if name in moving:
+        element = joint.find("axis")
+        said = np.array([1.0, 0.0, 0.0] if element is None else _numbers(element.get("xyz"), 3, name))
+        said = said / np.abs(said).max()  # else the squares of huge numbers would be infinite
+        axis = _three(said / np.linalg.norm(said))
+    kind = str(joint.get("type")) if name in moving else "fixed"
+    return Connection(name, kind, _parent(joint), child, _origin(joint), axis)
+
+
+def _solids(robot: str, name: str, link: Element, colours: dict[str | None, Element | None]) -> Iterator[Solid]:
+    for purpose in PURPOSES:
+        where = f'URDF of {robot}: {purpose} of link "{name}"'
+        for element in link.findall(purpose):
+            geometry = element.find("geometry")
+            shape = geometry[0] if geometry is not None and len(geometry) else None
+            if shape is None or shape.tag not in _SIZES:
+                continue
+            size = [value for key in _SIZES[shape.tag] for value in _size(shape, key, where)]
+            file = None
+            if shape.tag == "mesh":
+                file, size = shape.get("filename", ""), _numbers(shape.get("scale", "1 1 1"), 3, where)
+            colour = _colour(element, colours, where) if purpose == "visual" else None
+            yield Solid(name, purpose, shape.tag, tuple(size), _origin(element, where), colour, file)
+
+
+def _size(shape: Element, key: str, where: str) -> list[float]:
+    return _numbers(shape.get(key), 3 if key == "size" else 1, where)
+
+
+def _colour(visual: Element, colours: dict[str | None, Element | None], where: str) -> tuple[float, ...] | None:
+    material = visual.find("material")
+    if material is None:
+        return None
+    colour = material.find("color")
+    colour = colours.get(material.get("name")) if colour is None else colour
+    return None if colour is None else tuple(_numbers(colour.get("rgba"), 4, where))
+
+
+def _origin(element: Element, where: str = "URDF") -> Origin:
+    origin = element.find("origin")
+    if origin is None:
+        return Origin()
+    xyz, rpy = (_numbers(origin.get(key, "0 0 0"), 3, where) for key in ("xyz", "rpy"))
+    return Origin(_three(xyz), _three(rpy))
+
+
+def _three(values: Sequence[float] | np.ndarray) -> Three:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def _numbers(text: str | None, count: int, where: str) -> list[float]:
+    try:
+        values = [float(word) for word in (text or "").split()]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise InputError(f'{where}: "{(text or "")[:60]}" should be {count} finite number{"s" if count > 1 else ""}')
+    return values

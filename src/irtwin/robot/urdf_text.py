@@ -1,0 +1,71 @@
+"""URDF text of a structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+import numpy as np
+
+from irtwin.robot.description import Joint
+from irtwin.robot.structure import Body, Connection, Origin, Solid, Structure
+
+_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def urdf_text(name: str, structure: Structure, joints: Iterable[Joint]) -> str:
+    """Return a structure as URDF text, numbers to their last digit; `joints` give the limits of those that move."""
+    limits = {joint.name: joint for joint in joints}
+    root = Element("robot", name=name)
+    for body in structure.bodies:
+        _link(root, body, [solid for solid in structure.solids if solid.link == body.name])
+    for connection in structure.connections:
+        _joint(root, connection, limits.get(connection.name))
+    return tostring(root, encoding="unicode")
+
+
+def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:
+    link = SubElement(root, "link", name=body.name)
+    if body.mass is not None:
+        inertial = SubElement(link, "inertial")
+        SubElement(inertial, "mass", value=repr(body.mass))
+        if body.com is not None:
+            SubElement(inertial, "origin", xyz=_words(body.com))
+        if body.inertia is not None:
+            SubElement(inertial, "inertia", dict(zip(_MOMENTS, map(repr, body.inertia), strict=True)))
+    for solid in solids:
+        shape = SubElement(link, solid.purpose)
+        _origin(shape, solid.origin)
+        SubElement(SubElement(shape, "geometry"), solid.kind, _sizes(solid))
+        if solid.colour is not None:
+            SubElement(SubElement(shape, "material", name=""), "color", rgba=_words(solid.colour))
+
+
+def _sizes(solid: Solid) -> dict[str, str]:
+    if solid.kind == "box":
+        return {"size": _words(solid.size)}
+    if solid.kind == "mesh":
+        return {"filename": solid.file or "", "scale": _words(solid.size)}
+    return dict(zip(("radius", "length"), map(repr, solid.size), strict=False))  # a sphere has no length
+
+
+def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
+    joint = SubElement(root, "joint", name=connection.name, type=connection.kind)
+    _origin(joint, connection.origin)
+    SubElement(joint, "parent", link=connection.parent)
+    SubElement(joint, "child", link=connection.child)
+    if connection.axis is not None:
+        SubElement(joint, "axis", xyz=_words(connection.axis))
+    if limits is not None:
+        said = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "effort")}
+        known = {name: repr(value) for name, value in said.items() if np.isfinite(value)}
+        if known:
+            SubElement(joint, "limit", known)
+
+
+def _origin(element: Element, origin: Origin) -> None:
+    SubElement(element, "origin", xyz=_words(origin.xyz), rpy=_words(origin.rpy))
+
+
+def _words(values: Sequence[float]) -> str:
+    return " ".join(map(repr, values))
