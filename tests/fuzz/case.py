@@ -15,13 +15,14 @@ from tests.fuzz.streams import StreamPlan, streams
 BRIEF = ("diagnose",)
 ALONE = ("diagnose with page and twin", "predict")
 MOTION = ("excite",)
+PLANNED = ("plan",)
 DESCRIBED = ("robot dh", "robot urdf", "robot ik")
 IN_SYMBOLS = ("robot equations",)
 WITH_WORKSPACE = ("run", "query", "export", "live", "diagnose into workspace", "query")
 KEPT_AND_MOVED = ("run", "map", "explain", "export", "reason", "backup", "restore", "repair", "drop")
 ADOPTED = ("run", "diagnose into workspace", "adopt", "query")
 _LONG = (WITH_WORKSPACE, KEPT_AND_MOVED, ADOPTED)
-_TRIED = (BRIEF,) * 36 + (ALONE,) * 16 + (MOTION,) * 8 + (DESCRIBED,) * 4 + (IN_SYMBOLS,) * 2 + _LONG
+_TRIED = (BRIEF,) * 36 + (ALONE,) * 16 + (MOTION,) * 4 + (PLANNED,) * 4 + (DESCRIBED,) * 4 + (IN_SYMBOLS,) * 2 + _LONG
 
 
 @dataclass(frozen=True)

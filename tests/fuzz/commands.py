@@ -38,7 +38,7 @@ _EXCITING = 2.0  # s until Ctrl-C: the best motion so far is kept
 _STOPPED = 130  # exit status after Ctrl-C
 MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
 WRITTEN = (
-    *("gap.json", "gap.html", "predicted.parquet", "motion.csv"),
+    *("gap.json", "gap.html", "predicted.parquet", "motion.csv", "plan.csv"),
     *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf"),
 )
 LONGEST_LINE = 2000  # characters of an error
@@ -72,7 +72,7 @@ def try_case(case: Case, tried: Counter[str] | None = None) -> Fault | None:
         if made.status:
             raise AssertionError(f"the harness cannot make the data set of this case:\n{made.err}\n{case.to_json()}")
         for place, command in enumerate(case.commands):
-            arguments, writes = _arguments(command, folder)
+            arguments, writes = _arguments(case, command, folder)
             if arguments is None:
                 continue
             stdin = folder / "stdin"
@@ -99,7 +99,7 @@ def _make(case: Case, folder: Path) -> None:
         spoil.spoil(folder, way, seed)
 
 
-def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]]:
+def _arguments(case: Case, command: str, folder: Path) -> tuple[list[str] | None, list[Path]]:
     """Return a command's arguments, None where there is nothing to try it on, and the files it is to write."""
     data, workspace, twin = folder / "data", folder / "workspace", folder / "twin.json"
     out = {name: folder / name for name in WRITTEN}
@@ -116,6 +116,10 @@ def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]
         "excite": (
             ["excite", data / "robot.urdf", "--seconds", "2", "--out", out["motion.csv"]],
             [out["motion.csv"]],
+        ),
+        "plan": (
+            ["plan", data / "robot.urdf", *_ends(case), "--out", out["plan.csv"], "--search", "2"],
+            [out["plan.csv"]],
         ),
         "robot dh": (["robot", "dh", data, "--convention", "modified"], []),
         "robot ik": (["robot", "ik", data, "--pose", "0.3", "0", "0.4", "0", "1", "0"], []),
@@ -142,9 +146,17 @@ def _arguments(command: str, folder: Path) -> tuple[list[str] | None, list[Path]
     return list(map(str, words)), writes
 
 
+def _ends(case: Case) -> list[str]:
+    """Return the options of a plan's start and goal."""
+    return [f"--{end}={','.join([place] * max(1, _moving(case)))}" for end, place in (("from", "0"), ("to", "0.3"))]
+
+
+def _moving(case: Case) -> int:
+    return sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
+
+
 def _stream(case: Case, folder: Path) -> bytes:
-    moving = sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
-    return streams.lines(case.stream, _robot(folder), moving)
+    return streams.lines(case.stream, _robot(folder), _moving(case))
 
 
 def _robot(folder: Path) -> str:
