@@ -22,6 +22,10 @@ def test_examples_hold(demo):
     assert result.failed == 0
 
 
+def test_completion_offers_each_name():
+    assert set(irtwin.__all__) <= set(dir(irtwin))
+
+
 @pytest.mark.parametrize("name", irtwin.__all__)
 def test_every_name_is_there(name):
     assert getattr(irtwin, name).__doc__
