@@ -216,7 +216,8 @@ def _diagnosis(draw: random.Random, robot_id: str, verdict: str, names: list[str
         return
     for rank, joint in enumerate(draw.sample(JOINTS, 3), 1):
         yield "gap_location", at | {
-            "rank": rank, "channel": "torque", "joint": joint, "regime": "low_speed", "follows": "speed",
+            "location_id": f"torque@{joint}:low_speed", "rank": rank,
+            "channel": "torque", "joint": joint, "regime": "low_speed", "follows": "speed",
             "share": 0.6 / rank, "share_lower": 0.3 / rank, "share_upper": 0.8 / rank, "excess": 9.0,
             "excess_lower": 5.0, "excess_upper": 12.0, "concentration": 2.0, "false_discovery_rate": 0.01,
         }  # fmt: skip

@@ -235,6 +235,7 @@ def _diagnoses() -> Iterator[Base]:
     of = {"diagnosis_id": "Arm_A.d1", "activity_id": "diagnosis.Arm_A"}
     yield gap.GapLocation(
         **of,
+        location_id="torque@j2:low_speed",
         robot_id="Arm_A",
         rank=1,
         channel="torque",
@@ -244,7 +245,7 @@ def _diagnoses() -> Iterator[Base]:
         share=0.7,
         **_SURE,
     )
-    yield gap.GapLocation(**of, **_SURE, robot_id="Arm_A", rank=2, channel="power", share=0.2)
+    yield gap.GapLocation(**of, **_SURE, location_id="power", robot_id="Arm_A", rank=2, channel="power", share=0.2)
     yield gap.GapShrinkage(**of, closed_fraction=0.8, lower=0.7, upper=0.9)
     yield gap.GapChange(
         **of, measure="torque_rmse", part="together", place="all", before=1.0, after=0.4, noise_floor=0.3, lower=0.35,

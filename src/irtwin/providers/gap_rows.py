@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.document import Cause, Change, Document
+from irtwin.gap.document.document import Cause, Change, Document, Location
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.storage import experiment_schema, gap_schema
 from irtwin.storage.schema import Base
@@ -62,8 +62,9 @@ def _sizes(said: Document, at: Place) -> Iterator[Base]:
 
 def _locations(said: Document, at: Place) -> Iterator[Base]:
     for rank, one in enumerate(said.locations, start=1):
+        key = {"diagnosis_id": at.diagnosis_id, "location_id": _location_id(one)}
         yield gap_schema.GapLocation(
-            diagnosis_id=at.diagnosis_id,
+            **key,
             rank=rank,
             robot_id=at.robot_id,
             channel=one.channel,
@@ -80,7 +81,13 @@ def _locations(said: Document, at: Place) -> Iterator[Base]:
             false_discovery_rate=one.false_discovery_rate,
         )
         for name in dict.fromkeys(one.runs or ()):
-            yield gap_schema.GapLocationRun(diagnosis_id=at.diagnosis_id, rank=rank, run_id=at.run_id(name))
+            yield gap_schema.GapLocationRun(**key, run_id=at.run_id(name))
+
+
+def _location_id(one: Location) -> str:
+    """Return the name of a place, such as "torque@joint_2:reversal": a diagnosis names each place once."""
+    joint = "" if one.joint is None else f"@{one.joint}"
+    return f"{one.channel}{joint}" + ("" if one.regime is None else f":{one.regime}")
 
 
 def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:

@@ -57,7 +57,8 @@ class GapLocation(Base):
     __tablename__ = "gap_location"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    rank: Mapped[int] = mapped_column(primary_key=True)
+    location_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
+    rank: Mapped[int]
     robot_id: Mapped[str]
     channel: Mapped[str]
     joint: Mapped[str | None]
@@ -80,7 +81,7 @@ class GapLocationRun(Base):
     __tablename__ = "gap_location_run"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    rank: Mapped[int] = mapped_column(primary_key=True)
+    location_id: Mapped[str] = mapped_column(primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
