@@ -18,7 +18,7 @@ from irtwin.planning.plan import Plan, Task, nominal_twin, plan
 from irtwin.planning.poses import Pose, flange_placement, read_target
 from irtwin.planning.timing import MotionLimits
 from irtwin.robot.collision import CollisionModel, Obstacle
-from irtwin.twin.files import load, save
+from irtwin.twin.files import load, to_json
 
 SIX = arm(6)
 START, GOAL = np.array([-0.9, 1.0, 0.6, 0.0, 0.5, 0.0]), np.array([0.9, 1.0, 0.6, 0.0, 0.5, 0.0])
@@ -113,8 +113,8 @@ def test_a_pose_that_is_none_is_refused(text):
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("plan")
     robot = arm(3)
-    save(twin_of(robot), place / "twin.json")
-    save(twin_of(robot, power=False), place / "no_power.json")
+    (place / "twin.json").write_text(to_json(twin_of(robot)))
+    (place / "no_power.json").write_text(to_json(twin_of(robot, power=False)))
     (place / "bare.urdf").write_text(arm(3, shapes=False).urdf)
     return place
 
@@ -204,4 +204,4 @@ def test_a_plan_for_another_robot_is_refused(folder, tmp_path):
     (tmp_path / "plan.csv").write_text(text.replace("joint_3", "elbow"))
     said = irtwin("predict", folder / "twin.json", tmp_path / "plan.csv", "--out", tmp_path / "o.parquet")
     assert said.status == 2
-    assert "plan.csv: column q_elbow: the URDF has no moving joint" in said.err
+    assert "plan.csv: column q_elbow: the robot has no moving joint" in said.err
