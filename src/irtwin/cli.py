@@ -387,9 +387,10 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
             lower=(min(x, other[0]), min(y, other[1]), min(z, other[2])),
             upper=(max(x, other[0]), max(y, other[1]), max(z, other[2])),
         )
-    _say_unchecked(CollisionModel(robot).checks_itself)
+    checks_itself = CollisionModel(robot).checks_itself
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
+    _say_unchecked(checks_itself)
     ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
     click.echo(f"\n{ended}This is the best motion so far." if ended else "", err=True)
     click.echo(

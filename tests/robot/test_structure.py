@@ -74,6 +74,5 @@ def test_a_transform_is_that_of_its_numbers():
 
 
 def test_a_shape_against_collisions_that_cannot_be_read_is_named():
-    robot = parse_urdf(ARM.replace('radius="0.2"', 'radius="thick"'))
-    with pytest.raises(InputError, match='URDF of arm: collision of link "body": "thick" should be 1 finite number'):
-        structure_of(robot)
+    with pytest.raises(InputError, match='URDF: collision of link "body": "thick" should be 1 finite number'):
+        parse_urdf(ARM.replace('radius="0.2"', 'radius="thick"'))

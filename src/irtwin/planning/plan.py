@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.effects.drive import RotorInertia
+from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.planning.energy_optimal import Power, SplineMotion, cheapest, keeps
@@ -109,7 +111,7 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
 
 def nominal_twin(robot: Robot) -> Twin:
     """Return a twin of a robot's URDF and data sheet alone: bodies and rotors as they say, and nothing of power."""
-    effects = ("rigid_body", "rotor_inertia")
+    effects = (RigidBody.id, RotorInertia.id)
     terms = Stack(robot, effects).torque_terms
     parameters = [
         Parameter(effect.id, term.joint, term.link, term.name, term.expected, term.unit) for effect, term in terms

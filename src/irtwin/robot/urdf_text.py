@@ -59,8 +59,8 @@ def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
     if limits is not None:
         said = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "effort")}
         known = {name: repr(value) for name, value in said.items() if np.isfinite(value)}
-        if known:
-            SubElement(joint, "limit", known)
+        if known:  # the format asks for speed and effort too: 0 is no limit
+            SubElement(joint, "limit", {"velocity": "0.0", "effort": "0.0"} | known)
 
 
 def _origin(element: Element, origin: Origin) -> None:
