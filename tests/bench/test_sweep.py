@@ -22,6 +22,7 @@ def test_an_unknown_threshold_is_refused_before_anything_is_diagnosed(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_weights_are_found_again():
     rng = np.random.default_rng(1)
     true = DEFAULT.confidence

@@ -30,6 +30,7 @@ def around_the_wall() -> Plan:
     return plan(nominal_twin(SIX), Task(START, GOAL, [WALL]))
 
 
+@pytest.mark.slow
 def test_a_plan_goes_around_a_box():
     straight = np.array([START, GOAL])
     model = CollisionModel(SIX, [WALL])

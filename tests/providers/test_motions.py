@@ -69,6 +69,7 @@ def keep(workspace: Workspace, provider: str, subject: str, made: Any) -> None:
     workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
 
 
+@pytest.mark.slow
 def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

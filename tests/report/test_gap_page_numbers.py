@@ -126,6 +126,7 @@ def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, 
     return cause, change | {"rmse_before": [1.4]}
 
 
+@pytest.mark.slow
 def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("attributed")
     pairs = [friction_of("joint_a2", 0.35, 0.61), friction_of("joint_a5", 0.65, 0.72)]
@@ -150,6 +151,7 @@ def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     assert [bar["x"][0] for bar in drawn["budget"]["data"][:2]] == pytest.approx([90 * 0.65, 90 * 0.35])
 
 
+@pytest.mark.slow
 def test_what_is_drawn_of_shares_adds_up(tmp_path: Path) -> None:
     said = told_apart(gap_cases.diagnosis("attributed"), itertools.count())
     page_of(tmp_path, said)

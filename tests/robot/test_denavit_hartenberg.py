@@ -94,6 +94,7 @@ def test_the_flange_is_where_the_product_of_matrices_puts_it(convention, matrix,
     assert np.abs(placements(from_table("UR10", table), np.array([q]))[0] - product).max() < EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @settings(deadline=None)
 @given(urdf=chains())

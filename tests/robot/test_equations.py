@@ -17,6 +17,7 @@ from irtwin.robot.equations import equations
 from irtwin.robot.urdf import parse_urdf
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=15)
 @given(urdf=chains(most=3))
 def test_they_are_those_of_newton_and_euler(urdf):

@@ -40,6 +40,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.abs(np.mod(one - other + np.pi, 2 * np.pi) - np.pi).max())
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=15)
 @given(shares=st.lists(st.floats(0.02, 0.98), min_size=6, max_size=6))
 def test_a_pose_that_was_reached_is_found_again(shares):
@@ -63,6 +64,7 @@ def test_all_solutions_of_an_arm_with_eight_are_found():
     assert not found.redundant
 
 
+@pytest.mark.slow
 def test_solutions_are_within_the_limits_and_the_turn_is_the_nearest():
     start = np.array([0.2, -1.4, 1.5, 0.3, 0.8, 5.5])
     found = solve(KR6, pose(KR6, start), start=start)
@@ -101,6 +103,7 @@ def test_limits_may_lie_beyond_a_half_turn():
     assert max(deviation(robot, table_of(robot))) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("x", "distance"), [(0.6, 0.0), (0.7, 0.1), (2.0, 1.4)])
 def test_out_of_reach_says_by_how_much(x, distance):
     wanted = pose(SCARA, [0.0, 0.0, 0.1, 0.0])

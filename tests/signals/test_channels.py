@@ -74,6 +74,7 @@ def test_a_channel_of_some_joints_is_refused() -> None:
         from_columns({"time": np.arange(3.0), "q_a": np.zeros(3), "q_b": np.zeros(3), "tau_a": np.zeros(3)}, JOINTS)
 
 
+@pytest.mark.slow
 def test_a_line_of_the_table_is_all_that_a_new_channel_takes(tmp_path: Path) -> None:
     """The line is the one in CONTRIBUTING.md; `added_channel.py` uses the package that has it."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

@@ -194,6 +194,7 @@ def test_a_small_file_of_many_samples_is_refused_unread(folder):
     assert "40000000 samples of 3 columns" in refused(folder)
 
 
+@pytest.mark.slow
 def test_columns_that_nobody_asked_for_are_not_read(folder):
     (file,) = (folder / "runs").iterdir()
     table = pq.read_table(file).append_column("bomb", pa.array(["x" * 1_000_000] * 200))

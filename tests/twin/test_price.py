@@ -31,6 +31,7 @@ def test_energy_is_the_integral_of_power_and_runs_add_up():
     assert both.energy.half_width <= one.energy.half_width + other.energy.half_width
 
 
+@pytest.mark.slow
 def test_the_interval_is_that_of_the_parameters():
     """Parameters drawn from their covariance spread the energy as the interval says."""
     twin, motion = fitted(3.0), swing(ROBOT, 7)
@@ -48,6 +49,7 @@ def test_the_interval_is_that_of_the_parameters():
     assert price(twin, [motion]).energy.half_width == pytest.approx(spread, rel=0.25)
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_truth():
     """Of ten twins of noisy runs, of a robot that is as they model it, nearly all say the true energy."""
     motion = swing(ROBOT, 7)
