@@ -21,6 +21,8 @@ from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
 from irtwin.robot.urdf import parse_urdf
 
+pytestmark = pytest.mark.slow
+
 KR6 = kr6()
 TWO = two_joints()
 
@@ -56,7 +58,6 @@ def assert_limits_kept(robot: Robot, found: Excitation) -> None:
         assert np.abs(ddq[:, column]).max() < joint.velocity / FULL_SPEED_AFTER
 
 
-@pytest.mark.slow
 def test_the_kr6_is_excited_well_below_a_condition_number_of_a_hundred() -> None:
     found = excite(KR6, 20.0, iterations=50)
     _, q, dq, ddq = found.sample(20)
@@ -72,7 +73,6 @@ def test_its_condition_number_is_what_another_way_finds() -> None:
     assert scaled_condition_number(TWO, q, dq, ddq) == pytest.approx(found.condition_number, rel=0.5)
 
 
-@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10_000), st.floats(1.0, 45.0))
 def test_limits_hold_between_the_samples_for_any_seed(seed: int, seconds: float) -> None:
@@ -85,7 +85,6 @@ def test_limits_hold_between_the_samples_for_any_seed(seed: int, seconds: float)
     assert not ddq[[0, -1]].any()
 
 
-@pytest.mark.slow
 def test_links_stay_above_the_floor_and_the_flange_in_its_box() -> None:
     box = Box((0.25, -0.35, 0.3), (0.75, 0.35, 0.9))
     found = excite(KR6, 10.0, box=box, iterations=40)
@@ -100,7 +99,6 @@ def test_links_stay_above_the_floor_and_the_flange_in_its_box() -> None:
     assert found.clearance <= min(sides, lowest - CLEARANCE)
 
 
-@pytest.mark.slow
 def test_a_box_smaller_than_any_random_posture_hits_is_still_found() -> None:
     found = excite(KR6, 10.0, box=Box((0.5, 0.0, 0.5), (0.55, 0.05, 0.55)), iterations=5)
     assert found.clearance > 0
@@ -278,7 +276,6 @@ def test_a_robot_that_reaches_to_the_stars_is_refused() -> None:
         excite(parse_urdf(TWO.urdf.replace("0.2 0 0", "1e300 0 0")), 5.0)
 
 
-@pytest.mark.slow
 def test_fast_joints_of_a_long_range_are_slowed_until_the_way_is_clear() -> None:
     found = excite(two_joints('<limit lower="-2000" upper="2000" velocity="5000" effort="9"/>'), 5.0, iterations=1)
     assert found.clearance > 0

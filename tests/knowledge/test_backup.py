@@ -24,6 +24,8 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base, Series
 from irtwin.storage.series import checksum
 
+pytestmark = pytest.mark.slow
+
 State = tuple[dict[str, list[tuple[object, ...]]], dict[str, str], int]
 
 
@@ -79,7 +81,6 @@ def archive(kept: bytes, tmp_path: Path) -> Path:
     return tmp_path / "kept.zip"
 
 
-@pytest.mark.slow
 def test_what_is_restored_is_what_was_kept(filled: Workspace, archive: Path, tmp_path: Path) -> None:
     restore(archive, tmp_path / "after")
     with Workspace.existing(tmp_path / "after") as place:
@@ -129,7 +130,6 @@ KNOWING = KnowledgeGraph()
 KNOWING.replace(in_graph([Triple(NamedNode("a:a"), NamedNode("a:a"), NamedNode("a:a"))], GRAPH_SOURCE), GRAPH_SOURCE)
 
 
-@pytest.mark.slow
 def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> None:
     filled = Workspace(tmp_path / "before")
     tests = Path(rows.__file__).parents[1]
@@ -193,7 +193,6 @@ def test_a_cut_off_archive_is_told(archive: Path, share: float) -> None:
     refuse(archive, "damaged")
 
 
-@pytest.mark.slow
 def test_no_flipped_byte_is_restored(archive: Path, filled: Workspace) -> None:
     """Each is told, but for those that mean nothing, as the date of an entry."""
     data = archive.read_bytes()
@@ -268,7 +267,6 @@ def test_nothing_is_overwritten(archive: Path, filled: Workspace, tmp_path: Path
     assert (tmp_path / "empty" / "irtwin.db").is_file()
 
 
-@pytest.mark.slow
 def test_a_lost_or_altered_file_is_not_backed_up(tmp_path: Path) -> None:
     with Workspace(tmp_path / "before") as place:
         fill(place)
@@ -287,7 +285,6 @@ def test_a_lost_or_altered_file_is_not_backed_up(tmp_path: Path) -> None:
         assert not list(place.folder.glob(".*"))
 
 
-@pytest.mark.slow
 def test_an_incomplete_archive_of_an_earlier_version_is_told(archive: Path, filled: Workspace) -> None:
     with filled.reading() as session:
         path = session.scalars(select(Series.path)).first()

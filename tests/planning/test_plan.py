@@ -20,6 +20,8 @@ from irtwin.planning.timing import MotionLimits
 from irtwin.robot.collision import CollisionModel, Obstacle
 from irtwin.twin.files import load, to_json
 
+pytestmark = pytest.mark.slow
+
 SIX = arm(6)
 START, GOAL = np.array([-0.9, 1.0, 0.6, 0.0, 0.5, 0.0]), np.array([0.9, 1.0, 0.6, 0.0, 0.5, 0.0])
 WALL = Obstacle((0.6, 0.0, 0.4), (0.5, 0.1, 0.8))
@@ -30,7 +32,6 @@ def around_the_wall() -> Plan:
     return plan(nominal_twin(SIX), Task(START, GOAL, [WALL]))
 
 
-@pytest.mark.slow
 def test_a_plan_goes_around_a_box():
     straight = np.array([START, GOAL])
     model = CollisionModel(SIX, [WALL])

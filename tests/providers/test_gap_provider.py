@@ -23,6 +23,8 @@ from irtwin.storage.database import Workspace
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
 
+pytestmark = pytest.mark.slow
+
 ROBOT = "arm_2"
 BARE = ("rigid_body", "viscous_friction")
 FULL = (*BARE, "coulomb_friction")

@@ -17,6 +17,8 @@ from tests.gap_pages import figures_of, page_of
 from irtwin.gap.document.document import Document
 from irtwin.report import wording
 
+pytestmark = pytest.mark.slow
+
 NUMBER = re.compile(r"−?\d[\d\u202f]*(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 CELLS = re.compile(
     r'<(td class="number"|small|dd|b|span class="badge[^"]*"|p class="hint")>(.*?)</(?:td|dd|b|span|p|small)>'
@@ -126,7 +128,6 @@ def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, 
     return cause, change | {"rmse_before": [1.4]}
 
 
-@pytest.mark.slow
 def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("attributed")
     pairs = [friction_of("joint_a2", 0.35, 0.61), friction_of("joint_a5", 0.65, 0.72)]
@@ -151,7 +152,6 @@ def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     assert [bar["x"][0] for bar in drawn["budget"]["data"][:2]] == pytest.approx([90 * 0.65, 90 * 0.35])
 
 
-@pytest.mark.slow
 def test_what_is_drawn_of_shares_adds_up(tmp_path: Path) -> None:
     said = told_apart(gap_cases.diagnosis("attributed"), itertools.count())
     page_of(tmp_path, said)

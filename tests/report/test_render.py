@@ -11,6 +11,8 @@ from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import content_policy, render
 
+pytestmark = pytest.mark.slow
+
 HOSTILE = "<script>alert(1)</script>\"'&</title>"
 
 
@@ -108,7 +110,6 @@ def test_hostile_joint_names_in_the_data_of_figures_cannot_end_the_script(graph:
     assert data.startswith("{") and data.endswith("}") and "<" not in data
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "runs", "expected"),
     [
@@ -142,14 +143,12 @@ def test_a_robot_without_twin_or_runs_has_a_page(graph: KnowledgeGraph, page_of:
     assert "No run of this robot is in the graph." in page
 
 
-@pytest.mark.slow
 def test_a_hundred_runs(graph: KnowledgeGraph, page_of: PageOf):
     page = page_of(six_axis(graph, runs=100))
     assert len(page) < 9e6
     assert page.count("<option ") == 100
 
 
-@pytest.mark.slow
 def test_two_robots_do_not_mix(graph: KnowledgeGraph, page_of: PageOf):
     six, ur3 = six_axis(graph), power_only(graph)
     assert "cycle_6" not in page_of(ur3)

@@ -15,6 +15,8 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import LIVE, Activity
 from irtwin.storage.staging import staged
 
+pytestmark = pytest.mark.slow
+
 __all__ = ["workspace"]
 
 KILLED = """
@@ -46,7 +48,6 @@ def test_what_is_made_apart_takes_its_place(workspace: Workspace) -> None:
     assert not list(workspace.folder.glob(".staged-*"))
 
 
-@pytest.mark.slow
 def test_what_was_there_is_worked_on_apart(workspace: Workspace) -> None:
     populate(workspace)
     before = state(workspace)
@@ -102,7 +103,6 @@ def test_a_damaged_series_is_set_right_by_its_data_set(workspace: Workspace, dam
     assert workspace.read_series(WORK).equals(rows.samples(1))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("point", ["apart", "_link", "insert_values"])
 def test_a_kill_leaves_the_earlier_state(tmp_path: Path, point: str) -> None:
     with Workspace(tmp_path) as place:
