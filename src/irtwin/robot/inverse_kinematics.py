@@ -127,7 +127,9 @@ class _Search:
             free = ~(((q <= self._lower) & (slope.T @ value > 0)) | ((q >= self._upper) & (slope.T @ value < 0)))
             part = slope[:, free]
             step = np.zeros_like(q)
-            step[free] = -np.linalg.solve(part.T @ part + damping * np.eye(part.shape[1]), part.T @ value)
+            count = part.shape[1]
+            damped = np.vstack([part, np.sqrt(damping) * np.eye(count)])  # not squared: links may be kilometres long
+            step[free] = -np.linalg.lstsq(damped, np.append(value, np.zeros(count)))[0]
             tried = np.clip(q + step, self._lower, self._upper)
             new, new_slope = error(tried)
             if new @ new < value @ value:
