@@ -12,6 +12,7 @@ from irtwin.errors import InputError
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
+from irtwin.robot.inverse_kinematics import damped_step
 from irtwin.robot.kinematics import flange
 
 _STARTS = 60  # random joint positions from which a pose is sought
@@ -105,8 +106,7 @@ def follow(robot: Robot, target: pin.SE3, start: np.ndarray, limits: JointLimits
         if np.abs(left).max() < _FOUND:
             break
         jacobian = weights[:, None] * pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
-        step = np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(len(q)), jacobian.T @ (weights * left))
-        tried = np.clip(q + step, lower, upper)
+        tried = np.clip(q + damped_step(jacobian, weights * left, damping), lower, upper)
         after = error(tried)
         if np.linalg.norm(weights * after) < np.linalg.norm(weights * left):
             q, left, damping = tried, after, max(damping / 10, 1e-12)

@@ -68,6 +68,16 @@ def solve(
     return Found(np.empty((0, len(lower))), distance, angle, redundant)
 
 
+def damped_step(slope: np.ndarray, value: np.ndarray, damping: float) -> np.ndarray:
+    """Return x, (n,), of least |slope x - value|^2 + damping |x|^2; slope: (m, n), value: (m,).
+
+    Nakamura and Hanafusa (1986). The slope is not squared: links may be kilometres long.
+    """
+    count = slope.shape[1]
+    stacked = np.vstack([slope, np.sqrt(damping) * np.eye(count)])
+    return np.asarray(np.linalg.lstsq(stacked, np.append(value, np.zeros(count)))[0])
+
+
 def _limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     lower = np.array([joint.lower for joint in robot.joints])
     upper = np.array([joint.upper for joint in robot.joints])
@@ -127,9 +137,7 @@ class _Search:
             free = ~(((q <= self._lower) & (slope.T @ value > 0)) | ((q >= self._upper) & (slope.T @ value < 0)))
             part = slope[:, free]
             step = np.zeros_like(q)
-            count = part.shape[1]
-            damped = np.vstack([part, np.sqrt(damping) * np.eye(count)])  # not squared: links may be kilometres long
-            step[free] = -np.linalg.lstsq(damped, np.append(value, np.zeros(count)))[0]
+            step[free] = -damped_step(part, value, damping)
             tried = np.clip(q + step, self._lower, self._upper)
             new, new_slope = error(tried)
             if new @ new < value @ value:
