@@ -5,7 +5,6 @@ Meshes are named, never opened.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
@@ -14,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 from defusedxml import ElementTree as SafeXml
 
-from irtwin.errors import InputError
 from irtwin.robot.description import Robot
+from irtwin.robot.urdf import numbers
 
 Three = tuple[float, float, float]
 _SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ()}
@@ -137,7 +136,7 @@ def _connection(joint: Element, child: str, moving: set[str]) -> Connection:
     axis = None
     if name in moving:
         element = joint.find("axis")
-        said = np.array([1.0, 0.0, 0.0] if element is None else _numbers(element.get("xyz"), 3, name))
+        said = np.array([1.0, 0.0, 0.0] if element is None else numbers(element.get("xyz"), 3, name))
         said = said / np.abs(said).max()  # else the squares of huge numbers would be infinite
         axis = _three(said / np.linalg.norm(said))
     kind = str(joint.get("type")) if name in moving else "fixed"
@@ -152,16 +151,16 @@ def _solids(robot: str, name: str, link: Element, colours: dict[str | None, Elem
             shape = geometry[0] if geometry is not None and len(geometry) else None
             if shape is None or shape.tag not in _SIZES:
                 continue
-            size = [value for key in _SIZES[shape.tag] for value in _size(shape, key, where)]
+            size = tuple(value for key in _SIZES[shape.tag] for value in _size(shape, key, where))
             file = None
             if shape.tag == "mesh":
-                file, size = shape.get("filename", ""), _numbers(shape.get("scale", "1 1 1"), 3, where)
+                file, size = shape.get("filename", ""), numbers(shape.get("scale", "1 1 1"), 3, where)
             colour = _colour(element, colours, where) if purpose == "visual" else None
-            yield Solid(name, purpose, shape.tag, tuple(size), _origin(element, where), colour, file)
+            yield Solid(name, purpose, shape.tag, size, _origin(element, where), colour, file)
 
 
-def _size(shape: Element, key: str, where: str) -> list[float]:
-    return _numbers(shape.get(key), 3 if key == "size" else 1, where)
+def _size(shape: Element, key: str, where: str) -> tuple[float, ...]:
+    return numbers(shape.get(key), 3 if key == "size" else 1, where)
 
 
 def _colour(visual: Element, colours: dict[str | None, Element | None], where: str) -> tuple[float, ...] | None:
@@ -170,27 +169,17 @@ def _colour(visual: Element, colours: dict[str | None, Element | None], where: s
         return None
     colour = material.find("color")
     colour = colours.get(material.get("name")) if colour is None else colour
-    return None if colour is None else tuple(_numbers(colour.get("rgba"), 4, where))
+    return None if colour is None else tuple(numbers(colour.get("rgba"), 4, where))
 
 
 def _origin(element: Element, where: str = "URDF") -> Origin:
     origin = element.find("origin")
     if origin is None:
         return Origin()
-    xyz, rpy = (_numbers(origin.get(key, "0 0 0"), 3, where) for key in ("xyz", "rpy"))
+    xyz, rpy = (numbers(origin.get(key, "0 0 0"), 3, where) for key in ("xyz", "rpy"))
     return Origin(_three(xyz), _three(rpy))
 
 
 def _three(values: Sequence[float] | np.ndarray) -> Three:
     x, y, z = (float(value) for value in values)
     return x, y, z
-
-
-def _numbers(text: str | None, count: int, where: str) -> list[float]:
-    try:
-        values = [float(word) for word in (text or "").split()]
-    except ValueError:
-        values = []
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise InputError(f'{where}: "{(text or "")[:60]}" should be {count} finite number{"s" if count > 1 else ""}')
-    return values

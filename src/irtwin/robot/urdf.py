@@ -117,7 +117,7 @@ def _shape(visual: Element, materials: dict[str | None, Element], where: str) ->
     if kind is None or kind.tag == "mesh":
         return None
     if kind.tag == "box":
-        size = _numbers(kind.get("size"), 3, where)
+        size = numbers(kind.get("size"), 3, where)
     elif kind.tag == "cylinder":
         size = (_number(kind.get("radius"), where), _number(kind.get("length"), where))
     elif kind.tag == "sphere":
@@ -128,15 +128,15 @@ def _shape(visual: Element, materials: dict[str | None, Element], where: str) ->
     if material is not None and material.find("color") is None:
         material = materials.get(material.get("name"))
     colour = None if material is None else material.find("color")
-    rgba = _GREY if colour is None else _numbers(colour.get("rgba"), 4, where)
+    rgba = _GREY if colour is None else numbers(colour.get("rgba"), 4, where)
     return Shape(kind.tag, size, _placement(visual.find("origin"), where), (rgba[0], rgba[1], rgba[2], rgba[3]))
 
 
 def _placement(origin: Element | None, where: str) -> np.ndarray:
     if origin is None:
         return np.eye(4)
-    rpy = _numbers(origin.get("rpy", "0 0 0"), 3, where)
-    xyz = _numbers(origin.get("xyz", "0 0 0"), 3, where)
+    rpy = numbers(origin.get("rpy", "0 0 0"), 3, where)
+    xyz = numbers(origin.get("xyz", "0 0 0"), 3, where)
     return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(np.array(rpy)), np.array(xyz)).homogeneous)
 
 
@@ -187,7 +187,7 @@ def _held(root: Element, source: str) -> tuple[str, ...]:
 
 def _joint(element: Element, name: str, kind: str, where: str) -> Joint:
     axis = element.find("axis")
-    if axis is not None and not any(_numbers(axis.get("xyz"), 3, where)):
+    if axis is not None and not any(numbers(axis.get("xyz"), 3, where)):
         raise InputError(f"{where}: its axis is zero; give a direction")
     limit = element.find("limit")
 
@@ -237,10 +237,11 @@ def _attribute(element: Element, key: str, source: str, what: str) -> str:
 
 
 def _number(text: str | None, where: str) -> float:
-    return _numbers(text, 1, where)[0]
+    return numbers(text, 1, where)[0]
 
 
-def _numbers(text: str | None, count: int, where: str) -> tuple[float, ...]:
+def numbers(text: str | None, count: int, where: str) -> tuple[float, ...]:
+    """Return so many finite numbers of an attribute. Raises InputError, naming `where`, on anything else."""
     try:
         values = tuple(float(word) for word in (text or "").split())
     except ValueError:
