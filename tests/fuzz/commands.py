@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import multiprocessing
 import os
 import pkgutil
 import re
@@ -16,6 +17,7 @@ import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -32,7 +34,7 @@ for _module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):  # here, once,
         importlib.import_module(_module.name)
 
 SECONDS = 60  # of the processor, as others may share it
-_PATIENCE = 600  # s, for what waits and does nothing
+_PATIENCE = 300  # s, for what waits and does nothing
 MEGABYTES = 2000  # beside what the libraries take
 _EXCITING = 2.0  # s until Ctrl-C: the best motion so far is kept
 _STOPPED = 130  # exit status after Ctrl-C
@@ -62,6 +64,14 @@ class Fault:
     command: str
     kind: str
     said: str
+
+
+def try_case_apart(case: Case) -> Fault | None:
+    """Try a case from a process that has opened no store: a fork lacks RocksDB's threads, and waits for them."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
+    with ProcessPoolExecutor(1, mp_context=context) as apart:
+        return apart.submit(try_case, case).result()
 
 
 def try_case(case: Case, tried: Counter[str] | None = None) -> Fault | None:

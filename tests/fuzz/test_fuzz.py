@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from tests.fuzz.case import ALONE, Case, cases, read_case
-from tests.fuzz.commands import fault_of, in_child, try_case
+from tests.fuzz.commands import fault_of, in_child, try_case_apart
 
 FEW = settings(
     max_examples=12, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
@@ -22,7 +22,7 @@ FEW = settings(
 @FEW
 @given(cases())
 def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(case: Case):
-    fault = try_case(replace(case, commands=ALONE))
+    fault = try_case_apart(replace(case, commands=ALONE))
     assert fault is None, f"{fault.kind}\n{fault.said}\n{case.to_json()}"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.fuzz.case import read_case
-from tests.fuzz.commands import try_case
+from tests.fuzz.commands import try_case_apart
 
 pytestmark = pytest.mark.slow
 
@@ -15,5 +15,5 @@ KEPT = sorted((Path(__file__).parent / "kept").glob("*.json"))
 
 @pytest.mark.parametrize("file", KEPT, ids=lambda file: file.stem)
 def test_what_once_failed_comes_to_an_answer_or_to_one_line(file: Path):
-    fault = try_case(read_case(file.read_text(encoding="utf-8")))
+    fault = try_case_apart(read_case(file.read_text(encoding="utf-8")))
     assert fault is None, f"{fault.kind}\n{fault.said}"
