@@ -38,7 +38,7 @@ def own_test(name: str) -> Path:
 def imported(file: Path) -> frozenset[str]:
     """Return the modules of irtwin that a file imports anywhere, those of helpers too, and what a command runs."""
     text = file.read_text(encoding="utf-8")
-    found = {"cli", "__main__"} if '"-m", "irtwin"' in text else set()
+    found = {"cli.__init__", "__main__"} if '"-m", "irtwin"' in text else set()
     for part in ast.walk(ast.parse(text)):
         names = []
         if isinstance(part, ast.ImportFrom) and part.module:

@@ -180,7 +180,7 @@ def test_queries_cannot_reach_other_servers(workspace):
 
 
 def test_the_map_command_writes_quads(workspace, tmp_path):
-    mapping = Path(__file__).parents[1] / "mappings/robot.r2rml.ttl"
+    mapping = Path(__file__).parents[2] / "mappings/robot.r2rml.ttl"
     out = tmp_path / "robot.nq"
     done = irtwin("map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
     assert done.returncode == 0, done.stderr

@@ -1,0 +1,63 @@
+"""All commands in one group, and how a command ends."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from io import TextIOWrapper
+
+import click
+
+from irtwin import __version__
+from irtwin.cli import graph, motion, robot, service, twin, upkeep
+from irtwin.cli.options import say
+from irtwin.errors import InputError
+
+_LONGEST = 2000  # characters of an error
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line on standard error and exit status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 is no reason to stop
+    try:
+        cli.main(standalone_mode=False)
+        sys.stdout.flush()
+    except InputError as error:
+        say(f"irtwin: {error}"[:_LONGEST])
+        sys.exit(2)
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+            raise
+        if error.errno != errno.EPIPE:  # else who read the answer has left, and needs no word
+            say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; free some space and try again")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python flushes once more at its end
+        sys.exit(2)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("irtwin: stopped", err=True)
+        sys.exit(130)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="irtwin")
+def cli() -> None:
+    """Build a digital twin of an industrial robot's energy and keep it in a knowledge graph.
+
+    Start with `irtwin demo`. It builds a twin, a graph and a report from simulated logs of a KUKA KR6 R700.
+    """
+
+
+for command in (
+    *(twin.run, twin.demo, twin.diagnose, twin.adopt),
+    *(motion.plan, motion.predict, motion.excite),
+    *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
+    *(service.serve, service.live),
+    *(upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
+    robot.robot,
+):
+    cli.add_command(command)

@@ -1,0 +1,186 @@
+"""Commands on motions: plan one, price one, design one that excites every base parameter."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from irtwin.cli.options import DAY, Number, say
+
+_NO_POWER = "energy and power are not known; the twin has seen no power"
+
+
+@click.command()
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option("--from", "start", metavar="POSE", required=True, help="Where the motion starts.")
+@click.option("--to", "goal", metavar="POSE", required=True, help="Where it ends.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV or Parquet file.")
+@click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
+@click.option(
+    "--box",
+    "boxes",
+    type=Number(-1e3, 1e3),
+    nargs=6,
+    multiple=True,
+    metavar="X Y Z SX SY SZ",
+    help="Keep off a box: its centre and side lengths in the base frame, m. Repeatable.",
+)
+@click.option(
+    "--objective",
+    type=click.Choice(["time", "energy"]),
+    default="time",
+    show_default=True,
+    help="What is to be least. Energy: in --seconds, or in the time of the fastest motion.",
+)
+@click.option("--seconds", type=Number(min=0.0, min_open=True), help="Duration, s. Default: the shortest.")
+@click.option("--rate", type=Number(10.0, 10_000.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
+@click.option("--search", type=Number(0.1, DAY), default=10.0, show_default=True, help="Limit to find a path, s.")
+@click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
+@click.option(
+    "--payload-com",
+    type=Number(-10.0, 10.0),
+    nargs=3,
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    help="Payload's centre of mass in the flange frame, m.",
+)
+def plan(
+    source: Path,
+    start: str,
+    goal: str,
+    out: Path,
+    line: bool,
+    boxes: tuple[tuple[float, ...], ...],
+    objective: str,
+    seconds: float | None,
+    rate: float,
+    search: float,
+    payload_mass: float,
+    payload_com: tuple[float, float, float],
+) -> None:
+    """Plan a motion from pose to pose, around obstacles, and say what it costs.
+
+    SOURCE is a twin that `irtwin diagnose --save-twin` wrote, or a URDF, or the folder of a data set, of which energy
+    is not known. A POSE is joint positions, "0,-1.57,...", or a pose of the flange in the base frame,
+    "pose:x,y,z,roll,pitch,yaw", in m and rad. The motion keeps to the limits of position, speed, acceleration, jerk and
+    torque.
+    """
+    from irtwin import modelling
+    from irtwin.planning.plan import Task
+    from irtwin.planning.poses import read_target
+    from irtwin.robot.collision import Obstacle
+
+    twin = modelling.read_twin(source)
+    joints = len(twin.robot.joints)
+    task = Task(
+        start=read_target(start, joints, "--from"),
+        goal=read_target(goal, joints, "--to"),
+        obstacles=[Obstacle((x, y, z), (a, b, c)) for x, y, z, a, b, c in boxes],
+        line=line,
+        least_energy=objective == "energy",
+        seconds=seconds,
+        search=search,
+        payload_mass=payload_mass,
+        payload_com=payload_com,
+    )
+    made = modelling.plan(twin, task, out, rate)
+    _say_unchecked(made.checks_itself)
+    clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
+    click.echo(f"{out}: {made.seconds:.3f} s{clear}; {made.price or _NO_POWER}")
+
+
+@click.command()
+@click.argument("twin", type=click.Path(path_type=Path))
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
+@click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload mass, kg. Default: from the run's data set.")
+@click.option(
+    "--payload-com",
+    type=Number(-10.0, 10.0),
+    nargs=3,
+    metavar="X Y Z",
+    help="Payload's centre of mass in the flange frame, m. Default: from the run's data set.",
+)
+def predict(
+    twin: Path, run: Path, out: Path, payload_mass: float | None, payload_com: tuple[float, float, float] | None
+) -> None:
+    """Predict torque, power and energy of a run with a saved twin.
+
+    TWIN is a file that `irtwin diagnose --save-twin` wrote. RUN is a CSV or Parquet file with the motion: a log, or
+    what `plan` or `excite` wrote. A motion that leaves the robot's limits or in which two links meet is refused.
+    """
+    from irtwin import modelling
+
+    expected = modelling.expect(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
+    _say_unchecked(expected.checks_itself)
+    click.echo(f"{out}: {expected.price or _NO_POWER}")
+
+
+@click.command()
+@click.argument("urdf", type=click.Path(path_type=Path))
+@click.option("--seconds", type=Number(min=1.0), required=True, help="Duration of the motion, s.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV file to write.")
+@click.option("--rate", type=Number(min=1.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Each seed gives another motion.")
+@click.option(
+    "--box",
+    type=Number(-1e3, 1e3),
+    nargs=6,
+    metavar="X Y Z X Y Z",
+    help="Keep the flange in a box, given by two corners in the base frame, m. Links always stay above the floor.",
+)
+def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
+    """Design a motion that excites every base parameter.
+
+    The motion is a finite Fourier series. It starts and ends at rest and keeps the joint limits, between samples too.
+    Links with collision shapes keep off one another, and torque by the URDF's bodies within its limits.
+    Ctrl-C keeps the best motion so far.
+    """
+    from irtwin.identification import excitation
+    from irtwin.identification.motion_limits import Box
+    from irtwin.robot.collision import CollisionModel
+    from irtwin.robot.urdf import read_urdf
+
+    robot = read_urdf(urdf)
+    within = None
+    if box is not None:
+        x, y, z, *other = box
+        within = Box(
+            lower=(min(x, other[0]), min(y, other[1]), min(z, other[2])),
+            upper=(max(x, other[0]), max(y, other[1]), max(z, other[2])),
+        )
+    checks_itself = CollisionModel(robot).checks_itself
+    motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
+    motion.write_csv(out)
+    _say_unchecked(checks_itself)
+    ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
+    click.echo(f"\n{ended}This is the best motion so far." if ended else "", err=True)
+    click.echo(
+        f"{out}: condition number {motion.condition_number:.1f}, "
+        f"{motion.limit_margin:.1%} margin to the joint limits, "
+        + ("no wall within reach" if motion.clearance == math.inf else f"{motion.clearance:.3f} m to the nearest wall")
+    )
+
+
+def _say_unchecked(checks_itself: bool) -> None:
+    if not checks_itself:
+        say("The URDF has no collision shapes, so it was not checked whether the robot meets itself.")
+
+
+def _excitation_progress() -> Callable[[int, float, float], None]:
+    """Return a progress line that is rewritten in a terminal, and said every few seconds in a log."""
+    shown = [-5.0]
+
+    def progress(iteration: int, condition: float, elapsed: float) -> None:
+        line = f"{elapsed:5.0f} s  step {iteration:4d}  condition number {condition:8.1f}"
+        if sys.stderr.isatty():
+            click.echo(f"\r{line}", err=True, nl=False)
+        elif elapsed - shown[0] >= 5.0:
+            shown[0] = elapsed
+            click.echo(line, err=True)
+
+    return progress

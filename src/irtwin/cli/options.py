@@ -1,0 +1,50 @@
+"""What several commands share: options, numbers, and lines on standard error."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+DAY = 86400.0  # s
+_WORKSPACE = Path("irtwin-workspace")
+
+
+class Number(click.FloatRange):
+    """A finite number; a plain range lets NaN pass."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; fail where it is none, or not finite."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return float(number)
+
+
+workspace_option = click.option(
+    "--workspace",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=_WORKSPACE,
+    show_default=True,
+    help="Folder with the database, series, graph and reports.",
+)
+database_option = click.option(
+    "--database",
+    metavar="URL",
+    envvar="IRTWIN_DATABASE",
+    help="SQLAlchemy URL of the database. Default: SQLite in the workspace.",
+)
+graph_option = click.option(
+    "--graph",
+    "graph_url",
+    metavar="URL",
+    envvar="IRTWIN_GRAPH",
+    help="Query URL of a SPARQL 1.1 server for the graph. Default: a folder in the workspace.",
+)
+
+
+def say(line: str) -> None:
+    """Write one line to standard error: names that were read may hold what breaks lines or steers a terminal."""
+    click.echo("".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line), err=True)

@@ -1,0 +1,111 @@
+"""Commands that build twins: a data set in, a twin, a graph and a report out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from irtwin.cli.options import database_option, graph_option, say, workspace_option
+
+
+@click.command()
+@click.argument("dataset", type=click.Path(path_type=Path))
+@workspace_option
+@database_option
+@graph_option
+@click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
+def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | None, repair: bool) -> None:
+    """Build a twin, a graph and a report from a data set.
+
+    DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
+    """
+    from irtwin.workflow import run as run_all
+
+    report = run_all(dataset, workspace, database=database, graph_url=graph_url, repair=repair, announce=say)
+    click.echo(report)
+
+
+@click.command()
+@workspace_option
+def demo(workspace: Path) -> None:
+    """Run the example data set: simulated logs of a KUKA KR6 R700."""
+    from irtwin.workflow import run as run_all
+    from irtwin.workflow import unpack_demo
+
+    data_set = unpack_demo(workspace)
+    click.echo(f"The example data set is in {data_set}. Use it as a template for your own.", err=True)
+    report = run_all(data_set, workspace, announce=say)
+    click.echo(f"\nOpen the report in a browser: {report.resolve()}")
+    click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
+
+
+@click.command()
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option(
+    "--json",
+    "out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="JSON file to write the diagnosis to.",
+)
+@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML file to write the report to.")
+@click.option(
+    "--save-twin",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="JSON file to write the twin to, with the causes added.",
+)
+@click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
+@click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
+@click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Also store the diagnosis there.")
+@database_option
+@graph_option
+def diagnose(
+    dataset: Path,
+    out: Path,
+    report: Path | None,
+    save_twin: Path | None,
+    withhold: tuple[str, ...],
+    seed: int,
+    repair: bool,
+    workspace: Path | None,
+    database: str | None,
+    graph_url: str | None,
+) -> None:
+    """Find where a twin and its robot differ, and why.
+
+    The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
+    """
+    from irtwin import workflow
+    from irtwin.report.gap.headline import line
+
+    found = workflow.diagnose(
+        dataset,
+        withhold=withhold,
+        seed=seed,
+        repair=repair,
+        workspace=workspace,
+        database=database,
+        graph_url=graph_url,
+        json_file=out,
+        report=report,
+        twin_file=save_twin,
+        announce=say,
+    )
+    click.echo(line(found.document, found.against))
+
+
+@click.command()
+@click.argument("robot")
+@workspace_option
+@database_option
+@graph_option
+def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Replace a robot's twin by the one of its diagnosis.
+
+    The energy in the graph is then computed with the new twin, and the energy report is written again.
+    """
+    from irtwin import workflow
+
+    click.echo(workflow.adopt(robot, workspace, database=database, graph_url=graph_url))

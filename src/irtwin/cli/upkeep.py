@@ -1,0 +1,71 @@
+"""Commands that keep a workspace whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from irtwin.cli.options import database_option, graph_option, say, workspace_option
+
+
+@click.command()
+@click.argument("robot")
+@workspace_option
+@database_option
+@graph_option
+def drop(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Remove a ROBOT from the workspace.
+
+    Its runs, twin, diagnosis, live runs and report are deleted, and everything that the graph says about it.
+    """
+    from irtwin import upkeep
+
+    upkeep.drop(robot, workspace, database=database, graph_url=graph_url)
+
+
+@click.command()
+@workspace_option
+@database_option
+def repair(workspace: Path, database: str | None) -> None:
+    """Rebuild a damaged graph from the database.
+
+    Lists the series, twins and diagnoses that are missing or altered; the exit status is then 2. A damaged database
+    needs `restore`.
+    """
+    from irtwin import upkeep
+
+    upkeep.repair(workspace, database=database, announce=say)
+    click.echo(workspace)
+
+
+@click.command()
+@click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
+@workspace_option
+@database_option
+@graph_option
+def backup(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Write a workspace into one ARCHIVE, even while others write to it.
+
+    It holds graph, database (also the rows of a server), series, twins, diagnoses and reports, with checksums.
+    """
+    from irtwin import workflow
+
+    workflow.backup(archive, workspace, database=database, graph_url=graph_url)
+    click.echo(archive)
+
+
+@click.command()
+@click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
+@workspace_option
+@database_option
+@graph_option
+def restore(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Create a new workspace from an ARCHIVE that `backup` wrote.
+
+    A damaged archive restores nothing, and nothing is overwritten.
+    """
+    from irtwin.knowledge.store.backup import restore as restore_all
+
+    restore_all(archive, workspace, database, graph_url)
+    click.echo(workspace)
