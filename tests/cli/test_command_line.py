@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from tests.data_sets import few_runs_of_the_demo
 
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL
 from irtwin.workflow import unpack_demo
-from tests.data_sets import few_runs_of_the_demo
 
 pytestmark = pytest.mark.slow
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.data_sets import irtwin
 
 from irtwin import resources
 from irtwin.robot.kinematics import placements
 from irtwin.robot.urdf import read_urdf
-from tests.data_sets import irtwin
 
 KR6 = resources.folder("ontology") / "robots" / "kuka_kr6_r700.urdf"
 PENDULUM = """[robot]

@@ -14,6 +14,7 @@ from tests import gap_cases, rows
 from tests.gap_pages import figures_of, graph_of, page_of, six_axis
 
 from irtwin.errors import InputError
+from irtwin.gap.document.curves import Curves
 from irtwin.providers.gap import record
 from irtwin.providers.records import robot_iri
 from irtwin.report.gap.page import render_gap
@@ -189,3 +190,22 @@ def test_every_figure_is_drawn_without_network(pages: dict[str, Path]) -> None:
             assert page.evaluate("document.documentElement.scrollWidth") == 1440
             assert complaints == [], verdict
         browser.close()
+
+
+def test_the_residual_of_a_joint_that_slides_is_a_force(tmp_path: Path):
+    drawn = gap_cases.evidence("attributed")
+    joints = {curve["joint"] for curve in drawn["follows"] if curve["channel"] == "torque"}
+    with Workspace(tmp_path / "w") as workspace:
+        six_axis(workspace)
+        with workspace.engine.begin() as connection:
+            connection.exec_driver_sql("UPDATE joint SET kind = 'prismatic'")
+        record(workspace, rows.ROBOT, gap_cases.document("attributed"), Curves.from_json(drawn))
+        render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, tmp_path / "p.html")
+    titles = [
+        figure["layout"]["yaxis"]["title"]["text"]
+        for name, figure in figures_of(tmp_path / "p.html").items()
+        if name.startswith(("follows", "runs_torque"))
+    ]
+    assert joints
+    assert "N m" not in " ".join(titles)
+    assert any(title.endswith(", N") for title in titles)

@@ -31,10 +31,11 @@ def figures(answers: Answers, curves: Curves) -> dict[str, Figure]:
     if curves.heat_map is not None:
         drawn["heat_map"] = heat_map(curves.heat_map)
     for place, curve in enumerate(curves.follows):
-        drawn[f"follows_{place}"] = follows(curve, effect_names(answers))
+        unit = "W" if curve.channel == "power" else effort_unit(curve.joint, answers)
+        drawn[f"follows_{place}"] = follows(curve, unit, effect_names(answers))
     for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
         if name == "runs_power" or joint is not None:
-            drawn[name] = runs(curves.runs, joint)
+            drawn[name] = runs(curves.runs, joint, "W" if joint is None else effort_unit(joint, answers))
     drawn["by_cause"] = by_cause(answers)
     drawn["budget"] = budget(answers)
     if curves.experiment is not None:
@@ -46,6 +47,11 @@ def foremost_joint(answers: Answers) -> str | None:
     """Return the joint with the largest share of the gap, None where no torque shows one."""
     joints = (row["joint"] for row in answers["locations"].rows if row["channel"] == "torque" and row["joint"])
     return next(joints, None)
+
+
+def effort_unit(joint: str | None, answers: Answers) -> str:
+    """Return the unit of a joint's effort: a force where it slides, a torque where it turns."""
+    return "N" if any(row["joint"] == joint for row in answers["sliding_joints"].rows) else "N m"
 
 
 def heat_map(given: ExcessMap) -> Figure | None:
@@ -98,9 +104,8 @@ def effect_names(answers: Answers) -> dict[str, str]:
     return {wording.local_name(effect): label for effect, label in named if label}
 
 
-def follows(curve: Followed, names: Mapping[str, str]) -> Figure:
-    """Draw the residual against the variable that it follows, and the effect's curve on it."""
-    unit = "W" if curve.channel == "power" else "N m"
+def follows(curve: Followed, unit: str, names: Mapping[str, str]) -> Figure:
+    """Draw the residual, of this unit, against the variable that it follows, and the effect's curve on it."""
     x = list(curve.x)
     edge = {
         "type": "scatter",
@@ -146,15 +151,14 @@ def follows(curve: Followed, names: Mapping[str, str]) -> Figure:
     return {"data": data, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"residual, {unit}"}}}}
 
 
-def runs(given: Sequence[RunError], joint: str | None) -> Figure | None:
-    """Draw the RMSE of each held-out run before and after, with its noise floor; power where `joint` is None.
+def runs(given: Sequence[RunError], joint: str | None, unit: str) -> Figure | None:
+    """Draw the RMSE of each held-out run before and after, of this unit, with its floor; power where `joint` is None.
 
     None where nothing changed.
     """
     rows = [row for row in given if row.joint == joint]
     if all(row.before == row.after for row in rows):
         return None
-    unit = "W" if joint is None else "N m"
     names = _numbered([plain(row.run) for row in rows])
     data: list[dict[str, Any]] = [
         {
