@@ -26,7 +26,7 @@ async def waiting(turns: Turns[str], served: Served, *requests: str) -> list[asy
     async def wait(request: str) -> None:
         thing = await turns.take(request[0])
         served.append(request)
-        turns.give(thing)
+        turns.give(request[0], thing)
 
     tasks = []
     for request in requests:
@@ -37,9 +37,9 @@ async def waiting(turns: Turns[str], served: Served, *requests: str) -> list[asy
 
 def test_clients_take_turns() -> None:
     async def run() -> None:
-        turns, served = Turns[str](64), Served()
+        turns, served = Turns[str](64, 1), Served()
         tasks = await waiting(turns, served, "A1", "A2", "A3", "A4", "B1", "C1", "B2")
-        turns.give("worker")
+        turns.add("worker")
         await asyncio.gather(*tasks)
         assert served == ["A1", "B1", "C1", "A2", "B2", "A3", "A4"]
 
@@ -48,8 +48,8 @@ def test_clients_take_turns() -> None:
 
 def test_a_free_one_is_lent_at_once() -> None:
     async def run() -> None:
-        turns = Turns[str](0)
-        turns.give("worker")
+        turns = Turns[str](0, 1)
+        turns.add("worker")
         assert await turns.take("A") == "worker"
         with pytest.raises(Displaced):
             await turns.take("A")
@@ -59,9 +59,9 @@ def test_a_free_one_is_lent_at_once() -> None:
 
 def test_in_a_full_queue_who_has_fewer_places_takes_one_of_who_has_most() -> None:
     async def run() -> None:
-        turns, served = Turns[str](3), Served()
+        turns, served = Turns[str](3, 1), Served()
         tasks = await waiting(turns, served, "A1", "A2", "A3", "A4", "B1", "B2")
-        turns.give("worker")
+        turns.add("worker")
         ends = await asyncio.gather(*tasks, return_exceptions=True)
         assert served == ["A1", "B1", "A2"]
         assert [isinstance(end, Displaced) for end in ends] == [False, False, True, True, False, True]
@@ -71,16 +71,34 @@ def test_in_a_full_queue_who_has_fewer_places_takes_one_of_who_has_most() -> Non
 
 def test_who_leaves_keeps_nothing() -> None:
     async def run() -> None:
-        turns, served = Turns[str](64), Served()
+        turns, served = Turns[str](64, 1), Served()
         tasks = await waiting(turns, served, "A1", "B1", "C1", "A2")
         tasks[0].cancel()
         await asyncio.sleep(0)
         tasks[1].cancel()
-        turns.give("worker")  # to C1, though B1 did not get to say that it left
+        turns.add("worker")  # to C1, though B1 did not get to say that it left
         tasks[2].cancel()  # with the worker in its hand
         await asyncio.gather(*tasks, return_exceptions=True)
         assert served == ["A2"]
         assert await turns.take("A") == "worker"
+
+    scenario(run)
+
+
+def test_no_client_holds_more_than_its_share() -> None:
+    async def run() -> None:
+        turns, served = Turns[str](64, 2), Served()
+        for worker in ("first", "second", "third"):
+            turns.add(worker)
+        assert [await turns.take("A") for _ in range(2)] == ["first", "second"]
+        (third_of_a,) = await waiting(turns, served, "A3")
+        assert served == []
+        assert await turns.take("B") == "third"
+        turns.give("B", "third")
+        assert not third_of_a.done()
+        turns.lose("A")
+        await third_of_a
+        assert served == ["A3"]
 
     scenario(run)
 

@@ -122,13 +122,16 @@ class Worker:
 
 
 class Pool:
-    """A fixed number of workers, and a queue of bounded length before them, in which clients take turns."""
+    """A fixed number of workers, and a queue of bounded length before them, in which clients take turns.
+
+    Where there are several, no client holds the last one: a small query need not wait for another client's large ones.
+    """
 
     def __init__(self, folder: Path, size: int, limits: Limits):
         self._folder = folder
         self._size = size
         self._limits = limits
-        self._idle: Turns[Worker] = Turns(limits.waiting)
+        self._idle: Turns[Worker] = Turns(limits.waiting, max(1, size - 1))
         self._starting: set[asyncio.Task[None]] = set()
         self.workers: set[Worker] = set()
 
@@ -154,14 +157,16 @@ class Pool:
             yield worker
         finally:
             if worker.idle and worker.alive:
-                self._idle.give(worker)
+                self._idle.give(client, worker)
             else:
+                self._idle.lose(client)
                 self._replace(worker)
 
     async def _wait(self, client: str) -> Worker:
         try:
             async with asyncio.timeout(self._limits.seconds):
                 while not (worker := await self._idle.take(client)).alive:
+                    self._idle.lose(client)
                     self._replace(worker)
                 return worker
         except TimeoutError:
@@ -187,4 +192,4 @@ class Pool:
     async def _start(self) -> None:
         worker = await Worker.start(self._folder, self._limits)
         self.workers.add(worker)
-        self._idle.give(worker)
+        self._idle.add(worker)

@@ -83,7 +83,7 @@ def application(
     graph: Path, host: str, *, token: str | None, limits: Limits, opened: Callable[[], None] = lambda: None
 ) -> Starlette:
     """Return the ASGI application; its workers live between its start-up and its shutdown."""
-    pool = Pool(graph, max(2, os.cpu_count() or 2), limits)
+    pool = Pool(graph, 1 + max(2, os.cpu_count() or 2), limits)
     updates = Updates(graph, token, limits)
 
     @asynccontextmanager
