@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Sequence
 from csv import writer
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
+from irtwin.check.check import Checked, check, checked
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
@@ -49,7 +51,7 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     >>> friction.joint, friction.unit, friction.lower < friction.value < friction.upper
     ('joint_a1', 'N m', True)
     """
-    given = data_set if isinstance(data_set, DataSet) else read_data_set(Path(data_set))
+    given = checked(data_set if isinstance(data_set, DataSet) else read_data_set(Path(data_set))).data_set
     own = own_runs(given.runs)
     cutoff = choose_cutoff(own)
     motions = [condition(run, given.robot, cutoff) for run in own]
@@ -78,6 +80,17 @@ def predict(
     (['time', 'tau_joint_a1'], 'power')
     """
     return expect(twin, run_file, out, payload_mass=payload_mass, payload_com=payload_com).table
+
+
+def check_log(folder: Path, *, repair: bool = False, json_file: Path | None = None) -> Checked:
+    """Read a data set and check its logs; write what was found. Raises InputError on what cannot be read."""
+    if json_file is not None:
+        check_place(json_file)
+    result = check(read_data_set(folder, repair=repair))
+    if json_file is not None:
+        document = {"findings": [finding.to_json() for finding in result.findings]}
+        write(json_file, (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+    return result
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from irtwin import resources
 from irtwin.asking import WORKSPACE
+from irtwin.check.check import checked
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
@@ -59,10 +60,7 @@ def run(
     """
     announce = _clocked(announce)
     announce("Reading the data set")
-    data_set = read_data_set(Path(dataset), repair=repair)
-    _check_effects(data_set)
-    for line in data_set.repairs:
-        announce(f"  {line}")
+    data_set = _read(Path(dataset), repair, announce)
     with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
         robot_id = _take_in(place, data_set, announce)
         graph.load_ontology()
@@ -100,10 +98,7 @@ def diagnose(
     for file in filter(None, (json_file, report, twin_file)):
         check_place(file)
     announce("Reading the data set")
-    data_set = read_data_set(Path(dataset), repair=repair)
-    _check_effects(data_set)
-    for line in data_set.repairs:
-        announce(f"  {line}")
+    data_set = _read(Path(dataset), repair, announce)
     found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
     if json_file is not None:
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
@@ -179,6 +174,18 @@ def unpack_demo(workspace: Path) -> Path:
     shutil.copytree(resources.folder("demo") / "kuka_kr6_r700", data_set, dirs_exist_ok=True)
     shutil.copyfile(resources.folder("ontology") / "robots" / "kuka_kr6_r700.urdf", data_set / "robot.urdf")
     return data_set
+
+
+def _read(folder: Path, repair: bool, announce: Announce) -> DataSet:
+    """Read a data set and check it; say what was dropped, found and mended. Raises InputError on what must be cured."""
+    data_set = read_data_set(folder, repair=repair)
+    _check_effects(data_set)
+    for line in data_set.repairs:
+        announce(f"  {line}")
+    found = checked(data_set)
+    for line in dict.fromkeys(finding.say for finding in found.findings):
+        announce(f"  {line}")
+    return found.data_set
 
 
 def _check_effects(data_set: DataSet) -> None:

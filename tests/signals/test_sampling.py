@@ -57,7 +57,9 @@ def test_a_hole_in_time_cuts_a_run_in_two(tmp_path):
     assert (len(first.signals.time), len(second.signals.time)) == (200, 400)
     assert second.signals.time[0] == pytest.approx(1002.0)
     assert second.payload_mass == first.payload_mass
-    assert data_set.repairs == (f"{folder}/runs/swing_1.parquet: no samples from 1.99 s to 1002 s; taken as 2 runs",)
+    (finding,) = data_set.findings
+    assert (finding.fault, finding.channel, finding.mended) == ("hole", "time", True)
+    assert finding.say == f"{folder}/runs/swing_1.parquet: no samples from 1.99 s to 1002 s; taken as 2 runs"
 
 
 def test_the_second_piece_started_when_its_samples_do(tmp_path):
@@ -83,7 +85,7 @@ def test_a_piece_too_short_is_left_out_and_said():
     pieces, said = as_sampled(signals(time), FILE)
     assert [len(piece.time) for piece in pieces] == [290]
     (line,) = said
-    assert line.endswith("taken as one run; 10 samples left out, in pieces of fewer than 20")
+    assert line.say.endswith("taken as one run; 10 samples left out, in pieces of fewer than 20")
 
 
 def test_nothing_but_holes_is_refused():
@@ -125,7 +127,7 @@ def test_held_positions_are_taken_at_the_rate_of_their_updates(hold):
     (piece,), (said,) = as_sampled(held, FILE)
     np.testing.assert_array_equal(piece.time, held.time[::hold])
     np.testing.assert_array_equal(piece.q, held.q[::hold])
-    assert f"positions change at {500 / hold:.4g} Hz, samples are stamped at 500 Hz" in said
+    assert f"positions change at {500 / hold:.4g} Hz, samples are stamped at 500 Hz" in said.say
 
 
 def test_a_standstill_of_held_positions_is_no_hole():

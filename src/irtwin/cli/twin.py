@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from irtwin.cli.options import database_option, graph_option, say, workspace_option
+
+if TYPE_CHECKING:
+    from irtwin.signals.finding import Finding
 
 
 @click.command()
@@ -24,6 +29,26 @@ def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | N
 
     report = run_all(dataset, workspace, database=database, graph_url=graph_url, repair=repair, announce=say)
     click.echo(report)
+
+
+@click.command()
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option("--json", "out", type=click.Path(path_type=Path, dir_okay=False), help="JSON file to write findings to.")
+@click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
+def check(dataset: Path, out: Path | None, repair: bool) -> None:
+    """Look for faults in a log: signs, swapped columns, units, dead channels.
+
+    What the data leave no doubt of is mended where that is possible (never in your files). The exit status is 2 where
+    something must be cured first; `run` and `diagnose` stop there, too.
+    """
+    from irtwin import modelling
+
+    result = modelling.check_log(dataset, repair=repair, json_file=out)
+    for line in dict.fromkeys(f"{_state(finding)}: {finding.say}" for finding in result.findings):
+        say(line)
+    if not result.sound:
+        sys.exit(2)
+    say("no fault found" if not result.findings else "nothing that must be cured first")
 
 
 @click.command()
@@ -109,3 +134,8 @@ def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | No
     from irtwin import workflow
 
     click.echo(workflow.adopt(robot, workspace, database=database, graph_url=graph_url))
+
+
+def _state(finding: Finding) -> str:
+    state = "mended" if finding.mended else "cure first" if finding.stops else "doubtful"
+    return f"{finding.fault.replace('_', ' ')} ({state})"

@@ -14,6 +14,7 @@ from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.dh_table import robot_of_table
+from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
@@ -52,8 +53,8 @@ class Run:
 class DataSet:
     """A robot and its runs; `effects` is what the twin is said to model, None for the baseline.
 
-    `repairs` says what was done to the samples: some dropped, a run cut at a hole in time, held samples thinned out,
-    joints that mimic others left out.
+    `repairs` says what was done in reading: bad samples dropped, joints that mimic others left out; `findings` what
+    was mended: a run cut at a hole in time, held samples thinned out.
     """
 
     folder: Path
@@ -65,6 +66,7 @@ class DataSet:
     simulated: bool
     notes: Mapping[str, Any]
     repairs: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
@@ -81,7 +83,8 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     repairs += [
         f"{file}: [robot] {key} is kept as a note; did you mean {near}?" for key, near in table.near_misses(ROBOT_KEYS)
     ]
-    runs = list(_runs(folder, file, document, robot, repair, repairs))
+    findings: list[Finding] = []
+    runs = list(_runs(folder, file, document, robot, repair, repairs, findings))
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
@@ -102,6 +105,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         simulated=table.values.get("simulated") is True or all(run.role == "simulated" for run in runs),
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
         repairs=tuple(repairs),
+        findings=tuple(findings),
     )
 
 
@@ -178,7 +182,13 @@ def _robot(folder: Path, table: Table) -> Robot:
 
 
 def _runs(
-    folder: Path, file: Path, document: dict[str, Any], robot: Robot, repair: bool, repairs: list[str]
+    folder: Path,
+    file: Path,
+    document: dict[str, Any],
+    robot: Robot,
+    repair: bool,
+    repairs: list[str],
+    findings: list[Finding],
 ) -> Iterator[Run]:
     for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
         table = Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
@@ -189,7 +199,8 @@ def _runs(
             raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
         signals, dropped = read_signals(path, robot, repair=repair)
         pieces, sampled = as_sampled(signals, path)
-        repairs += dropped + sampled
+        repairs += dropped
+        findings += sampled
         run = Run(
             name=path.stem,
             file=path,

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from irtwin.errors import InputError
-from irtwin.robot.description import Joint, Robot
+from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, REQUIRED, Channel, Signals, by_column, from_columns
 from irtwin.signals.sources.catalogue import source_of
 from irtwin.signals.sources.source import MOST_COLUMNS, Source
@@ -35,8 +35,6 @@ def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bo
         columns = {name: values[keep] for name, values in columns.items()}
     if len(columns["time"]) < FEWEST:
         raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {FEWEST}")
-    for joint in robot.joints:
-        _check_unit(columns["time"], columns[CHANNELS["q"].column(joint.name)], joint, path)
     signals = _signals(columns, robot, path)
     if measured and signals.torque is None and signals.power is None:
         raise InputError(f"{path}: has neither torque nor power; {_remedy(signals)}")
@@ -113,23 +111,6 @@ def _bad_samples(
     falls[kept[1:]] = time[1:] <= latest[:-1]
     drop(falls, "time", "does not rise")
     return keep, dropped
-
-
-def _check_unit(time: np.ndarray, q: np.ndarray, joint: Joint, path: Path) -> None:
-    """Raise where a position is plainly in degrees: its speed or its range is far beyond the joint's."""
-    if joint.kind == "prismatic":
-        return
-    with np.errstate(over="ignore"):
-        speed = np.quantile(np.abs(np.diff(q) / np.diff(time)), 0.99)
-    bounds = joint.upper - joint.lower
-    too_fast = np.isfinite(joint.velocity) and speed > 4 * joint.velocity
-    too_far = np.isfinite(bounds) and bounds > 0 and np.ptp(q) > 1.5 * bounds
-    unbounded = not np.isfinite(bounds) and np.ptp(q) > 100
-    if too_far or unbounded or (too_fast and np.abs(q).max() > 2 * np.pi):
-        raise InputError(
-            f"{path}: column {CHANNELS['q'].column(joint.name)} spans {np.ptp(q):.3g} at up to {speed:.3g} per second, "
-            f"far beyond the joint's limits in rad: it looks like degrees; convert it to rad"
-        )
 
 
 def _signals(columns: Mapping[str, np.ndarray], robot: Robot, path: Path) -> Signals:

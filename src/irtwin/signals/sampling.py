@@ -9,6 +9,7 @@ import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
+from irtwin.signals.finding import Finding
 from irtwin.signals.samples import FEWEST
 
 HOLE = 25.0  # intervals without a sample: nobody knows what the robot did meanwhile
@@ -24,7 +25,7 @@ def interval(time: np.ndarray) -> float:
     return float(max(np.median(gaps), np.quantile(gaps, 0.9) / _BURST))
 
 
-def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[str]]:
+def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[Finding]]:
     """Return a run's samples at the rate at which they were taken, in pieces without a hole; say what was done.
 
     Held positions: one sample of each update stays. A piece of fewer than 20 samples is left out. A run that has
@@ -45,7 +46,9 @@ def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[str]]:
     left_out = sum(len(piece.time) for piece in pieces if len(piece.time) < FEWEST)
     dropped = f"; {left_out} samples left out, in pieces of fewer than {FEWEST}" if left_out else ""
     taken = "one run" if len(long) == 1 else f"{len(long)} runs"
-    return long, [*said, f"{path}: no samples {first}{others}; taken as {taken}{dropped}"]
+    found = f"{path}: no samples {first}{others}; taken as {taken}{dropped}"
+    evidence = {"holes": float(len(pieces) - 1), "left_out": float(left_out)}
+    return long, [*said, Finding("hole", "time", (path.stem,), True, True, evidence, found)]
 
 
 def holes(time: np.ndarray) -> np.ndarray:
@@ -69,14 +72,15 @@ def _cut(signals: Signals) -> list[Signals]:
     return done
 
 
-def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[str]]:
+def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[Finding]]:
     step = _hold(signals.q)
     if step is None:
         return signals, []
     rows = _updates(signals.q, step)
     logged, true = 1 / interval(signals.time), 1 / interval(signals.time[rows])
     said = f"{path}: positions change at {true:.4g} Hz, samples are stamped at {logged:.4g} Hz; taken at the former"
-    return signals.rows(rows), [said]
+    evidence = {"logged_hz": logged, "true_hz": true}
+    return signals.rows(rows), [Finding("held_samples", "q", (path.stem,), True, True, evidence, said)]
 
 
 def _hold(q: np.ndarray) -> int | None:

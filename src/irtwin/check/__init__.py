@@ -1,0 +1,1 @@
+"""What is wrong with a log, before any physics is fitted to it."""

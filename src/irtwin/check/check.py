@@ -1,0 +1,102 @@
+"""All checks of a data set, in order, and what can be mended without doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from irtwin.check.arrangement import arrangement_findings
+from irtwin.check.channels import channel_findings
+from irtwin.check.moving import moving
+from irtwin.check.plausibility import plausibility_findings
+from irtwin.check.speeds import speed_findings
+from irtwin.check.torque import torque_findings
+from irtwin.errors import InputError
+from irtwin.signals.channels import CHANNELS, Signals, columns_of, from_columns
+from irtwin.signals.finding import Finding
+from irtwin.signals.log import DataSet
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A data set, mended where that leaves no doubt, and what was found in the one that was given."""
+
+    data_set: DataSet
+    findings: tuple[Finding, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing has to be cured first."""
+        return not any(finding.stops for finding in self.findings)
+
+
+def check(data_set: DataSet) -> Checked:
+    """Look for faults of a log that would be taken for physics."""
+    with threadpool_limits(limits=1, user_api="blas"):  # its matrices are small
+        found = _findings(data_set)
+    return Checked(_mended(data_set, found), tuple(found))
+
+
+def _findings(data_set: DataSet) -> list[Finding]:
+    """Return all findings; what would follow from one that stops is not looked for."""
+    found = _by_column(data_set)
+    seen = moving(data_set)
+    if seen.runs:
+        found += plausibility_findings(data_set, seen)
+        if not any(finding.stops for finding in found):
+            found += channel_findings(data_set.robot, seen) + speed_findings(data_set.robot, seen)
+        if not any(finding.stops for finding in found):
+            found += arrangement_findings(data_set.robot, seen) or torque_findings(data_set.robot, seen)
+    return found
+
+
+def checked(data_set: DataSet) -> Checked:
+    """Return what `check` does. Raises InputError by the first finding that has to be cured."""
+    result = check(data_set)
+    for finding in result.findings:
+        if finding.stops:
+            file = "" if str(data_set.folder) in finding.say else f"{data_set.folder}: "
+            raise InputError(f"{file}{finding.say}")
+    return result
+
+
+def _by_column(data_set: DataSet) -> list[Finding]:
+    """Return what reading found: one finding a column, of all runs that have it."""
+    found: dict[tuple[str, str], Finding] = {}
+    for finding in data_set.findings:
+        of_all = finding.channel == CHANNELS["q"].prefix
+        for name in CHANNELS["q"].columns(data_set.robot.joint_names) if of_all else (finding.channel,):
+            known = found.get((finding.fault, name))
+            runs = (*known.runs, *finding.runs) if known else finding.runs
+            found[finding.fault, name] = replace(known or finding, channel=name, runs=runs)
+    return list(found.values())
+
+
+def _mended(data_set: DataSet, findings: Sequence[Finding]) -> DataSet:
+    reversed_torques = {finding.channel for finding in findings if finding.fault == "sign" and finding.mended}
+    held = {finding.channel for finding in findings if finding.fault == "held_samples" and finding.mended}
+    speeds = {channel for finding in findings if finding.mended for channel in finding.channel.split(" <-> ")}
+    speeds &= set(CHANNELS["dq"].columns(data_set.robot.joint_names))
+    torques = reversed_torques & set(CHANNELS["torque"].columns(data_set.robot.joint_names))
+    if not (torques or speeds or held):
+        return data_set
+    joints = data_set.robot.joint_names
+
+    def mend(signals: Signals) -> Signals:
+        columns = columns_of(replace(signals, dq=None if speeds else signals.dq), joints)
+        for name in columns.keys() & torques:
+            columns[name] = -columns[name]
+        for name in columns.keys() & held:
+            columns[name] = _joined(signals.time, columns[name])
+        return from_columns(columns, joints)
+
+    return replace(data_set, runs=tuple(replace(run, signals=mend(run.signals)) for run in data_set.runs))
+
+
+def _joined(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return a held column with straight lines between its updates."""
+    updates = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1])
+    return np.asarray(np.interp(time, time[updates], values[updates]))

@@ -1,0 +1,122 @@
+"""Do logged speeds agree with those of the positions? Where not, the latter are used."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from irtwin.check.moving import Moving
+from irtwin.check.robust_fit import fit
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS
+from irtwin.signals.conditioning import differentiate
+from irtwin.signals.filter import low_pass
+from irtwin.signals.finding import Finding
+from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
+
+_ALIKE = 0.9  # correlation of two speeds of one joint
+_UNITS = {"deg/s": 180 / np.pi, "rpm": 30 / np.pi, "turns/s": 0.5 / np.pi}
+_TIMES = {"ms": 1e3, "µs": 1e6, "ns": 1e9}
+_NEAR = 0.03  # share by which a factor may miss a unit's
+_SCALED = 1.15  # a gain beyond it, or its inverse, is another scale
+_LATE = 0.008  # s: a shorter delay is a filter's
+_SURE = 8.0  # standard deviations
+
+
+def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
+    """Return the speed channels that contradict the positions, or `time` where its unit alone explains it."""
+    pairs = [_speeds(run, motion) for run, motion in zip(moving.runs, moving.motions, strict=True)]
+    pairs = [pair for pair in pairs if pair is not None]
+    if not pairs:
+        return []
+    derived, logged = (np.vstack(each) for each in zip(*pairs, strict=True))
+    alike = _correlation(derived, logged)
+    names = CHANNELS["dq"].columns(robot.joint_names)
+    joints = np.flatnonzero(moving.joints).tolist()
+    gains = {joint: _gain(derived[:, joint], logged[:, joint]) for joint in joints if abs(alike[joint, joint]) > _ALIKE}
+    if (time := _time_unit(list(gains.values()), moving)) is not None:
+        return [time]
+    found = []
+    for joint in joints:
+        name = names[joint]
+        if np.ptp(logged[:, joint]) == 0:
+            found.append(_finding("dead", name, moving, {}, "never changes, though the joint moves"))
+        elif joint in gains:
+            found += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving)
+        elif (other := int(np.argmax(np.abs(alike[joint])))) != joint and abs(alike[joint, other]) > _ALIKE:
+            if joint < other or abs(alike[other, joint]) <= _ALIKE:
+                said = "stand in each other's columns: name them by their joints"
+                found.append(_finding("swap", f"{name} <-> {names[other]}", moving, {}, said))
+        else:
+            found += _delayed(name, joint, moving)
+    return found
+
+
+def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], said: str) -> Finding:
+    return Finding(
+        fault, channel, moving.names, certain=True, mended=True, evidence=evidence,
+        say=f"{channel} {said}; the speeds of the positions are used instead",
+    )  # fmt: skip
+
+
+def _speeds(run: Run, motion: Motion) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return speeds (N, n) of the positions and as logged, filtered alike; None where none were logged."""
+    signals = run.signals
+    if signals.dq is None or motion.cutoff is None:
+        return None
+    logged = low_pass(make_interp_spline(signals.time, signals.dq, k=1)(motion.time), motion.rate, motion.cutoff)
+    return differentiate(motion.q, motion.rate), logged
+
+
+def _correlation(derived: np.ndarray, logged: np.ndarray) -> np.ndarray:
+    """Return (n, n): how alike the speed of joint a's positions and column b are."""
+    a, b = derived - derived.mean(axis=0), logged - logged.mean(axis=0)
+    sizes = np.outer(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
+    return np.asarray(np.divide(a.T @ b, sizes, out=np.zeros_like(sizes), where=sizes > 0))
+
+
+def _gain(derived: np.ndarray, logged: np.ndarray) -> float:
+    return float(derived @ logged / (derived @ derived))
+
+
+def _is(gain: float, factor: float) -> bool:
+    return bool(abs(gain / factor - 1) < _NEAR)
+
+
+def _time_unit(gains: list[float], moving: Moving) -> Finding | None:
+    """Times in another unit make the positions' speeds smaller by its factor, those of all joints alike."""
+    for unit, factor in _TIMES.items():
+        if gains and all(_is(gain, factor) for gain in gains):
+            evidence = {"factor": float(np.median(gains))}
+            said = f"is in {unit}: logged speeds are {factor:g} times those of the positions; convert it to s"
+            return Finding("unit", "time", moving.names, True, False, evidence, f"time {said}")
+    return None
+
+
+def _scaled(name: str, gain: float, moving: Moving) -> list[Finding]:
+    evidence = {"gain": round(gain, 4)}
+    for unit, factor in _UNITS.items():
+        if _is(gain, factor):
+            return [_finding("unit", name, moving, evidence, f"is in {unit}: convert it to rad/s")]
+    if gain < 0:
+        return [_finding("sign", name, moving, evidence, "has the sign opposite to that of its position")]
+    if not 1 / _SCALED < gain < _SCALED:
+        return [_finding("scale", name, moving, evidence, f"is {gain:.3g} times the speed of its position")]
+    return []
+
+
+def _delayed(name: str, joint: int, moving: Moving) -> list[Finding]:
+    """Return the finding where a logged speed comes late or early.
+
+    For short delays d, the speed v(t - d) is v - d dv/dt.
+    """
+    runs = [(_speeds(run, motion), motion.rate) for run, motion in zip(moving.runs, moving.motions, strict=True)]
+    pairs = [(pair[0][:, joint], pair[1][:, joint], rate) for pair, rate in runs if pair is not None]
+    columns = [np.column_stack([derived, differentiate(derived, rate)]) for derived, _, rate in pairs]
+    found = fit(np.vstack(columns), np.concatenate([logged for _, logged, _ in pairs]))
+    gain, change = found.coefficients
+    if not gain or abs(delay := float(-change / gain)) < _LATE or abs(found.t(np.array([0.0, 1.0]))) < _SURE:
+        return []
+    said = f"comes {1000 * abs(delay):.3g} ms {'after' if delay > 0 else 'before'} the speed of its position"
+    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1)}, said)]
