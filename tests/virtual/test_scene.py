@@ -108,7 +108,7 @@ def test_names_cannot_break_out_of_the_page() -> None:
     fragment = scene_html(robot, *run(robot), title=HOSTILE)
     assert embedded(fragment)["joints"][0]["name"] == HOSTILE
     assert HOSTILE not in fragment
-    assert len(re.findall(r"<script", fragment)) == len(re.findall(r"</script", fragment)) == 3
+    assert len(re.findall(r"<script", fragment)) == len(re.findall(r"</script", fragment)) == 4
     assert "<img src=x" not in fragment
 
 

@@ -1,22 +1,14 @@
 "use strict";
-// Plays a robot's run: poses from joint positions, and beside them time, power and energy. Needs MeshCat, fetches nothing.
+// Plays a robot's run: poses from joint positions, and beside them time, power and energy. Needs robot.js, fetches nothing.
 // Other scripts take part through `irtwin:time` events on document: {detail: {time: seconds, source: element}}.
 (function () {
-  const { Viewer, THREE } = MeshCat;
-  const LOW = new THREE.Color("#0072b2"), MIDDLE = new THREE.Color("#c9ced3"), HIGH = new THREE.Color("#d55e00");
+  const { THREE } = MeshCat, { supported, makeViewer, build, shade } = irtwinRobot;
   const TRAIL = 20; // seconds of the flange's path that stay in sight
   const SVG = "http://www.w3.org/2000/svg";
 
   function floats(text) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     return new Float32Array(bytes.buffer);
-  }
-
-  const matrix = (values) => new THREE.Matrix4().fromArray(values);
-
-  function supported() {
-    const probe = document.createElement("canvas");
-    return Boolean(probe.getContext("webgl2") || probe.getContext("webgl"));
   }
 
   // ---- the run: signals at even frames, straight lines between them
@@ -38,54 +30,11 @@
     };
   }
 
-  // ---- the robot: one node a joint, its placement times its own motion
-
-  function jointMatrix(joint, position) {
-    const own = new THREE.Matrix4(), axis = new THREE.Vector3(...joint.axis);
-    if (joint.unit === "m") own.setPosition(axis.multiplyScalar(position));
-    else own.makeRotationAxis(axis, position);
-    return matrix(joint.placement).multiply(own);
-  }
-
-  function geometry(part) {
-    const [a, b, c] = part.size;
-    if (part.kind === "box") return new THREE.BoxGeometry(a, b, c);
-    if (part.kind === "sphere") return new THREE.SphereGeometry(a, 36, 24);
-    return new THREE.CylinderGeometry(a, a, b, 48).rotateX(Math.PI / 2); // three.js cylinders stand along y
-  }
-
-  function buildRobot(viewer, data) {
-    const paths = [];
-    data.joints.forEach((joint, index) => paths.push([...(joint.parent < 0 ? ["robot"] : paths[joint.parent]), "joint " + index]));
-    data.parts.forEach((part, index) => {
-      const [red, green, blue, alpha] = part.colour;
-      const material = new THREE.MeshStandardMaterial({
-        color: new THREE.Color(red, green, blue), roughness: 0.6, metalness: 0.05, transparent: alpha < 1, opacity: alpha,
-      });
-      const mesh = new THREE.Mesh(geometry(part), material);
-      mesh.castShadow = mesh.receiveShadow = true;
-      const path = [...(part.joint < 0 ? ["robot"] : paths[part.joint]), "part " + index];
-      viewer.set_object(path, mesh);
-      viewer.set_transform(path, part.placement);
-    });
-    return (positions) => paths.forEach((path, j) => viewer.set_transform(path, jointMatrix(data.joints[j], positions[j]).elements));
-  }
-
-  function flangeAt(data, positions) {
-    const placed = [];
-    data.joints.forEach((joint, j) => {
-      const own = jointMatrix(joint, positions[j]);
-      placed.push(joint.parent < 0 ? own : placed[joint.parent].clone().multiply(own));
-    });
-    return new THREE.Vector3().setFromMatrixPosition(placed[data.flange.joint].clone().multiply(matrix(data.flange.placement)));
-  }
-
-  function buildTrail(viewer, data, run, scale) {
+  function buildTrail(viewer, robot, run, scale) {
     const points = [], colours = [];
     for (let frame = 0; frame < run.count; frame++) {
-      points.push(flangeAt(data, run.positions(run.start + frame * run.step)));
-      const share = scale(run.power[frame]);
-      const colour = share < 0.5 ? LOW.clone().lerp(MIDDLE, 2 * share) : MIDDLE.clone().lerp(HIGH, 2 * share - 1);
+      points.push(robot.flange(run.positions(run.start + frame * run.step)));
+      const colour = shade(2 * scale(run.power[frame]) - 1);
       colours.push(colour.r, colour.g, colour.b);
     }
     const line = new THREE.BufferGeometry().setFromPoints(points);
@@ -97,78 +46,6 @@
       const frames = 1 + Math.floor((time - run.start) / run.step + 1e-6), shown = Math.min(frames, Math.ceil(TRAIL / run.step));
       line.setDrawRange(frames - shown, shown);
     };
-  }
-
-  // ---- the stage: light, floor, camera
-
-  function dress(viewer, view) {
-    const size = view.radius;
-    viewer.set_property(["Axes"], "visible", false);
-    viewer.set_property(["Background"], "top_color", [0.91, 0.94, 0.96]);
-    viewer.set_property(["Background"], "bottom_color", [0.985, 0.99, 0.995]);
-    ["PointLightNegativeX", "PointLightPositiveX", "SpotLight", "FillLight", "AmbientLight"].forEach((name) => viewer.set_property(["Lights", name], "visible", false));
-    const sky = new THREE.HemisphereLight(0xffffff, 0xaab2ba, 0.62);
-    sky.position.set(0, 0, 1);
-    viewer.set_object(["Lights", "Sky"], sky);
-    const sun = new THREE.DirectionalLight(0xffffff, 0.58);
-    sun.position.set(1.6 * size, -1.1 * size, 3 * size);
-    sun.castShadow = true;
-    sun.shadow.mapSize.set(2048, 2048);
-    Object.assign(sun.shadow.camera, { left: -2 * size, right: 2 * size, top: 2 * size, bottom: -2 * size, near: 0.1 * size, far: 8 * size });
-    sun.shadow.bias = -0.0005;
-    sun.shadow.normalBias = 0.01 * size;
-    viewer.set_object(["Lights", "Sun"], sun);
-    const fill = new THREE.DirectionalLight(0xffffff, 0.14);
-    fill.position.set(-2 * size, 2 * size, 1.2 * size);
-    viewer.set_object(["Lights", "Fill"], fill);
-    const floor = new THREE.Mesh(new THREE.PlaneGeometry(8 * size, 8 * size), new THREE.ShadowMaterial({ opacity: 0.16 }));
-    floor.receiveShadow = true;
-    floor.position.z = view.floor - 0.001 * size;
-    viewer.set_object(["Floor"], floor);
-    const cell = size > 0.8 ? 0.25 : size > 0.3 ? 0.1 : 0.05, cells = 2 * Math.ceil((2.2 * size) / cell);
-    const grid = new THREE.GridHelper(cells * cell, cells, 0xb8c3cc, 0xd6dde3);
-    grid.rotateX(Math.PI / 2);
-    grid.position.z = view.floor;
-    viewer.set_object(["Grid"], grid);
-    const [x, y, z] = view.centre, camera = viewer.camera, distance = 3.2 * size;
-    camera.fov = 36;
-    camera.near = 0.02 * size;
-    camera.far = 40 * size;
-    // MeshCat turns the camera's frame: its y is the robot's z, its z the robot's -y
-    viewer.controls.target.set(x, z, -y);
-    camera.position.set(x + 0.66 * distance, z + 0.33 * distance, -y + 0.67 * distance);
-    viewer.controls.minDistance = 0.3 * size;
-    viewer.controls.maxDistance = 8 * size;
-  }
-
-  function makeViewer(pane, view) {
-    const renderer = new THREE.WebGLRenderer({ antialias: true });
-    renderer.shadowMap.enabled = true;
-    renderer.shadowMap.type = THREE.PCFSoftShadowMap;
-    pane.appendChild(renderer.domElement);
-    const onload = window.onload; // MeshCat takes it for itself
-    const viewer = new Viewer(pane, false, renderer);
-    window.onload = onload;
-    viewer.gui.domElement.remove();
-    const resize = viewer.set_3d_pane_size.bind(viewer);
-    viewer.set_3d_pane_size = () => {
-      if (pane.clientWidth && pane.clientHeight) {
-        resize(pane.clientWidth, pane.clientHeight);
-        viewer.render();
-      }
-    };
-    dress(viewer, view);
-    new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
-    let waiting = false;
-    viewer.controls.addEventListener("change", () => {
-      if (!waiting) requestAnimationFrame(() => { waiting = false; viewer.render(); });
-      waiting = true;
-    });
-    // the wheel scrolls the page until the scene was clicked
-    viewer.controls.enableZoom = false;
-    pane.addEventListener("pointerdown", () => { viewer.controls.enableZoom = true; });
-    pane.addEventListener("pointerleave", () => { viewer.controls.enableZoom = false; });
-    return viewer;
   }
 
   // ---- the numbers beside it
@@ -264,8 +141,9 @@
     if (supported()) {
       const power = sampled(run.power), low = Math.min(...power), high = Math.max(...power);
       viewer = makeViewer(pane, data.view);
-      pose = buildRobot(viewer, data);
-      trail = buildTrail(viewer, data, run, (watt) => (high > low ? (watt - low) / (high - low) : 0.5));
+      const robot = build(viewer, data);
+      pose = robot.pose;
+      trail = buildTrail(viewer, robot, run, (watt) => (high > low ? (watt - low) / (high - low) : 0.5));
     } else {
       pane.innerHTML = "<p>This browser cannot draw the robot (no WebGL). Time, power, energy and joints still run.</p>";
     }

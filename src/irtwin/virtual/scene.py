@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import base64
-import json
 from functools import cache
-from importlib.resources import files
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
-import pinocchio as pin
-from markupsafe import Markup
 
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import flange, link_placements
-from irtwin.virtual.skeleton import Part, drawn_parts, joint_axes
+from irtwin.virtual.robot_data import asset, embedded_json, robot_data, viewer_script
 
 _FRAME_RATE = 25.0  # Hz
 _MOST_FRAMES = 12_000  # eight minutes; longer runs are shown at a lower rate
-_VIEWED = 60  # poses that the camera is fitted to
 
 
 def scene_html(
@@ -42,14 +34,15 @@ def scene_html(
     if power is None:
         power = np.gradient(energy, time)
     _check(robot, time, q, energy, power)
-    data = _robot(robot, q) | _run(time, q, energy, power)
+    data = robot_data(robot, q) | _run(time, q, energy, power)
     return _template().render(
         title=title,
         robot=robot.name,
-        data=_json(data),
-        style=_asset("scene.css"),
-        player=_asset("scene.js"),
-        viewer=_viewer(),
+        data=embedded_json(data),
+        style=asset("scene.css"),
+        robot_script=asset("robot.js"),
+        player=asset("scene.js"),
+        viewer=viewer_script(),
     )
 
 
@@ -82,77 +75,8 @@ def _run(time: np.ndarray, q: np.ndarray, energy: np.ndarray, power: np.ndarray)
     }
 
 
-def _robot(robot: Robot, q: np.ndarray) -> dict[str, Any]:
-    """Return joints, visible parts, flange and the ball that the motion fills."""
-    model = robot.model
-    tip = model.frames[model.getFrameId(flange(robot), pin.FrameType.BODY)]
-    return {
-        "joints": [
-            {
-                "name": joint.name,
-                "unit": joint.unit,
-                "parent": int(model.parents[column + 1]) - 1,  # Pinocchio's joint 0 is the base
-                "placement": _column_major(model.jointPlacements[column + 1].homogeneous),
-                "axis": np.round(axis, 9).tolist(),
-                "lower": float(max(joint.lower, q[:, column].min() - 0.1) if joint.lower < -20 else joint.lower),
-                "upper": float(min(joint.upper, q[:, column].max() + 0.1) if joint.upper > 20 else joint.upper),
-            }
-            for column, (joint, axis) in enumerate(zip(robot.joints, joint_axes(robot), strict=True))
-        ],
-        "parts": [_part(part) for part in drawn_parts(robot)],
-        "flange": {"joint": tip.parentJoint - 1, "placement": _column_major(tip.placement.homogeneous)},
-        "view": _view(robot, q),
-    }
-
-
-def _view(robot: Robot, q: np.ndarray) -> dict[str, Any]:
-    """Return centre (m) and radius of what the run fills, and the height of the floor under it."""
-    shown = q[np.unique(np.linspace(0, len(q) - 1, _VIEWED).astype(int))]
-    points = np.array([place[:3, 3] for sample in shown for place in link_placements(robot, sample).values()])
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    return {
-        "centre": np.round(centre, 4).tolist(),
-        "radius": round(max(0.05, float(np.linalg.norm(points - centre, axis=1).max())), 4),
-        "floor": round(float(min(0.0, points[:, 2].min())), 4),
-    }
-
-
-def _part(part: Part) -> dict[str, Any]:
-    return {
-        "joint": part.joint,
-        "kind": part.kind,
-        "size": [round(length, 5) for length in part.size],
-        "placement": _column_major(part.placement),
-        "colour": list(part.colour),
-    }
-
-
-def _column_major(placement: np.ndarray) -> list[float]:
-    return [float(value) for value in np.round(placement.T.ravel(), 7)]
-
-
 def _packed(values: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
-
-
-def _json(data: dict[str, Any]) -> Markup:
-    """Return JSON that no name in it can break out of: without `<`, `>` and `&`."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
-
-
-def _asset(name: str) -> Markup:
-    return Markup(files("irtwin.virtual").joinpath(name).read_text(encoding="utf-8"))
-
-
-@cache
-def _viewer() -> Markup:
-    """Return MeshCat's bundle, which holds three.js. The Python package is not imported: that would start ZeroMQ."""
-    package = find_spec("meshcat")
-    if package is None or package.origin is None:
-        raise ModuleNotFoundError("meshcat is not installed")
-    bundle = Path(package.origin).parent / "viewer" / "dist" / "main.min.js"
-    return Markup(bundle.read_text(encoding="utf-8"))
 
 
 @cache
@@ -160,4 +84,4 @@ def _template() -> jinja2.Template:
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    return environment.from_string(_asset("scene.html.jinja"))
+    return environment.from_string(asset("scene.html.jinja"))
