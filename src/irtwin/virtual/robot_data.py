@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
@@ -70,12 +69,6 @@ def _part(part: Part) -> dict[str, Any]:
 
 def _column_major(placement: np.ndarray) -> list[float]:
     return [float(value) for value in np.round(placement.T.ravel(), 7)]
-
-
-def embedded_json(data: dict[str, Any]) -> Markup:
-    """Return JSON that no name in it can break out of: without `<`, `>` and `&`."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
 def asset(name: str) -> Markup:
