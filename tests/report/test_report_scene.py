@@ -19,7 +19,7 @@ SERIES = {"time": [5.0, 6.0, 7.0], "q_a": [0.0, 0.1, 0.2], "energy_model": [0.0,
 def test_the_scene_performs_the_modelled_series_from_their_start():
     series = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1]}))
     modelled = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1], "tau_a_model": [1.0, 2.0, 3.0]}))
-    data = embedded(draw_scene(parse_urdf(ARM, source="arm"), [("first", series), ("second", modelled)], 1))
+    data = embedded(draw_scene(parse_urdf(ARM, source="arm"), {}, [("first", series), ("second", modelled)], 1))
     assert data["opens"] == 1
     first, second = data["runs"]
     assert (first["name"], first["start"], first["torque"]) == ("first", 0.0, None)
@@ -28,4 +28,4 @@ def test_the_scene_performs_the_modelled_series_from_their_start():
 
 def test_a_series_without_a_joint_is_a_bug():
     with pytest.raises(KeyError, match="q_b"):
-        draw_scene(parse_urdf(ARM, source="arm"), [("run", Columns.of(pa.table(SERIES)))], 0)
+        draw_scene(parse_urdf(ARM, source="arm"), {}, [("run", Columns.of(pa.table(SERIES)))], 0)

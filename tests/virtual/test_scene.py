@@ -1,14 +1,19 @@
+import base64
 import re
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from tests.virtual.scene_data import HOSTILE, bare, embedded, kr6, run
+import trimesh
+from tests import mesh_robots
+from tests.mesh_robots import ARM, HAND, SLIDE
+from tests.virtual.scene_data import HOSTILE, bare, embedded, kr6, run, unpack
 
 from irtwin.packing import Fragment
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements
+from irtwin.robot.meshes import Mesh
 from irtwin.robot.urdf import parse_urdf
 from irtwin.virtual.scene import scene_html
 
@@ -165,3 +170,47 @@ def test_signals_that_do_not_fit_are_refused(change, message: str) -> None:  # t
     shown = run(KR6)
     with pytest.raises(ValueError, match=message):
         scene_html(KR6, [replace(shown, **change(shown))])
+
+
+BOX = Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]]), np.array([[0, 1, 2], [0, 1, 3], [1, 2, 3]]))
+
+
+def test_meshes_are_drawn_and_shapes_stand_in_for_those_that_are_missing() -> None:
+    robot = mesh_robots.robot()
+    fragment = scene_html(robot, [run(robot)], meshes={SLIDE: BOX, ARM: BOX})
+    data = embedded(fragment)
+    kinds = [(part["joint"], part["kind"], part["mesh"]) for part in data["parts"]]
+    assert kinds == [(-1, "box", None), (0, "mesh", 0), (1, "mesh", 1), (2, "cylinder", None), (2, "sphere", None)]
+    slide = data["parts"][1]
+    assert slide["size"] == [0.001] * 3 and slide["colour"] == [0.9, 0.05, 0.05, 1]
+    np.testing.assert_allclose(placed(slide["placement"])[:3, 3], [0, 0, 0.1])
+    drawn = data["meshes"][0]
+    np.testing.assert_allclose(np.column_stack([unpack(axis) for axis in drawn["points"]]), BOX.points, atol=1e-4)
+    assert np.frombuffer(base64.b64decode(drawn["faces"]), "<u4").reshape(-1, 3).tolist() == BOX.faces.tolist()
+    assert "1 of the robot\u2019s meshes is not in its data set" in fragment.html and HAND in fragment.html
+
+
+def test_without_any_of_its_meshes_a_robot_is_seen_by_its_collision_shapes() -> None:
+    robot = mesh_robots.robot()
+    fragment = scene_html(robot, [run(robot)])
+    kinds = [(part["joint"], part["kind"]) for part in embedded(fragment)["parts"]]
+    assert kinds == [(-1, "box"), (1, "box"), (2, "cylinder"), (2, "sphere")]
+    assert "3 of the robot\u2019s meshes are not in its data set" in fragment.html
+
+
+def test_a_robot_whose_meshes_are_missing_and_that_has_no_shapes_gets_a_skeleton() -> None:
+    text = mesh_robots.URDF.replace("<collision>", "<!--").replace("</collision>", "-->")
+    robot = parse_urdf(text)
+    parts = embedded(scene_html(robot, [run(robot)]))["parts"]
+    assert {part["joint"] for part in parts} == {-1, 0, 1, 2} and len(parts) > 5
+    assert "not in its data set" not in scene_html(KR6, [run(KR6)]).html
+
+
+def test_large_meshes_are_drawn_with_few_triangles() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=6)
+    mesh = Mesh(np.array(ball.vertices), np.array(ball.faces))
+    assert len(mesh.faces) > 80_000
+    robot = mesh_robots.robot()
+    fragment = scene_html(robot, [run(robot)], meshes={SLIDE: mesh, ARM: mesh})
+    assert all(len(base64.b64decode(one["faces"])) <= 8_000 * 12 for one in embedded(fragment)["meshes"])
+    assert len(fragment.html) < 1_000_000

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests import mesh_robots
+from tests.mesh_robots import HAND
 from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
+from irtwin.providers.mesh_files import mesh_copies
 from irtwin.report.energy.page import content_policy
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
+from irtwin.robot.meshes import Mesh, read_mesh
 from irtwin.virtual.performance import Performance
 from irtwin.virtual.scene import scene_html
 
@@ -59,10 +63,17 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-def open_page(browser: Any, folder: Path, robot: Robot, *more: Performance, title: str = "") -> tuple[Any, list[str]]:
+def open_page(
+    browser: Any,
+    folder: Path,
+    robot: Robot,
+    *more: Performance,
+    title: str = "",
+    meshes: Mapping[str, Mesh] | None = None,
+) -> tuple[Any, list[str]]:
     """Open the scene of runs as a file; return the page and whatever it complains of or asks for."""
     path = folder / "scene.html"
-    fragment = scene_html(robot, [run(robot), *more], title=title)
+    fragment = scene_html(robot, [run(robot), *more], title=title, meshes=meshes)
     path.write_text(PAGE.format(content_policy(fragment.scripts)) + fragment.html, encoding="utf-8")
     page = browser.new_page(viewport={"width": 1366, "height": 768})
     complaints: list[str] = []
@@ -164,6 +175,23 @@ def test_links_take_the_colour_of_torque_or_power(browser: Any, tmp_path: Path) 
     assert min(np.abs(torque - own).max(), np.abs(pixels(page) - torque).max()) > 50
     page.select_option(".is-colour", "own")
     assert legend.is_hidden() and np.abs(pixels(page) - own).max() < 10
+    assert complaints == []
+
+
+def test_meshes_are_drawn_in_their_colour(browser: Any, tmp_path: Path) -> None:
+    robot = mesh_robots.robot()
+    copies, _ = mesh_copies(mesh_robots.write(tmp_path / "data"))
+    meshes = {name: read_mesh(copy.content, Path(copy.path).suffix, name) for name, copy in copies.items()}
+    page, complaints = open_page(browser, tmp_path, robot, meshes=meshes)
+    drawn = pixels(page)
+    red = (drawn[:, :, 0] > 90) & (drawn[:, :, 1] < 60) & (drawn[:, :, 2] < 60)
+    assert red.mean() > 0.002
+    page.evaluate(SEEK, 7.0)
+    assert np.abs(pixels(page) - drawn).max() > 50
+    assert HAND in page.inner_text(".is-note")
+    page.select_option(".is-colour", "power")
+    after = pixels(page)
+    assert not ((after[:, :, 0] > 90) & (after[:, :, 1] < 40) & (after[:, :, 2] < 40)).any()
     assert complaints == []
 
 

@@ -65,6 +65,7 @@ class DataSet:
     simulated: bool
     notes: Mapping[str, Any]
     repairs: tuple[str, ...] = ()
+    urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
@@ -102,6 +103,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         simulated=table.values.get("simulated") is True or all(run.role == "simulated" for run in runs),
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
         repairs=tuple(repairs),
+        urdf=table.path("urdf", folder) if "urdf" in table.values else None,
     )
 
 

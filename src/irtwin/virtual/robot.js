@@ -32,19 +32,32 @@ window.irtwinRobot = (function () {
     return matrix(joint.placement).multiply(own);
   }
 
-  function geometry(part) {
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+
+  function triangles({ points, faces }) {
+    const [x, y, z] = points.map(({ data, offset, scale }) => Float32Array.from(new Int16Array(bytes(data)), (level) => offset + scale * level));
+    const made = new THREE.BufferGeometry(), places = new Float32Array(3 * x.length);
+    x.forEach((_, i) => places.set([x[i], y[i], z[i]], 3 * i));
+    made.setAttribute("position", new THREE.BufferAttribute(places, 3));
+    made.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes(faces)), 1));
+    return made;
+  }
+
+  function geometry(part, meshes) {
     const [a, b, c] = part.size;
+    if (part.kind === "mesh") return triangles(meshes[part.mesh]).scale(a, b, c);
     if (part.kind === "box") return new THREE.BoxGeometry(a, b, c);
     if (part.kind === "sphere") return new THREE.SphereGeometry(a, 36, 24);
     return new THREE.CylinderGeometry(a, a, b, 48).rotateX(Math.PI / 2); // three.js cylinders stand along y
   }
 
-  function draw(part) {
+  function draw(part, meshes) {
     const [red, green, blue, opacity] = part.colour;
     const material = new THREE.MeshStandardMaterial({
       color: new THREE.Color(red, green, blue), roughness: 0.6, metalness: 0.05, transparent: opacity < 1, opacity: opacity,
     });
-    const mesh = new THREE.Mesh(geometry(part), material);
+    if (part.kind === "mesh") Object.assign(material, { flatShading: true, side: THREE.DoubleSide }); // it may be inside out
+    const mesh = new THREE.Mesh(geometry(part, meshes), material);
     mesh.castShadow = mesh.receiveShadow = true;
     return mesh;
   }
@@ -53,7 +66,7 @@ window.irtwinRobot = (function () {
     const paths = [];
     data.joints.forEach((joint, index) => paths.push([...(joint.parent < 0 ? ["robot"] : paths[joint.parent]), "joint " + index]));
     const drawn = data.parts.map((part, index) => {
-      const mesh = draw(part), path = [...(part.joint < 0 ? ["robot"] : paths[part.joint]), "part " + index];
+      const mesh = draw(part, data.meshes), path = [...(part.joint < 0 ? ["robot"] : paths[part.joint]), "part " + index];
       viewer.set_object(path, mesh);
       viewer.set_transform(path, part.placement);
       return { joint: part.joint, material: mesh.material, own: mesh.material.color.clone() };

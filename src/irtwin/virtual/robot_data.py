@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
@@ -12,18 +13,25 @@ import numpy as np
 import pinocchio as pin
 from markupsafe import Markup
 
+from irtwin.packing import base64_text, pack
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements
+from irtwin.robot.meshes import Mesh, simplified
 from irtwin.virtual.skeleton import Part, drawn_parts, joint_axes
 
 _VIEWED = 60  # poses that the camera is fitted to
+_ALL_TRIANGLES = 40_000  # of all meshes: 0.8 MB of page
+_MOST_TRIANGLES, _FEWEST_TRIANGLES = 8_000, 300  # of a mesh
 
 
-def robot_data(robot: Robot, q: np.ndarray) -> dict[str, Any]:
+def robot_data(robot: Robot, q: np.ndarray, meshes: Mapping[str, Mesh] | None = None) -> dict[str, Any]:
     """Return what robot.js builds a robot of: joints, visible parts, flange, and the ball that the poses fill.
 
-    q: (N, n) rad or m, poses that the camera is fitted to, and joints without limits.
+    q: (N, n) rad or m, poses that the camera is fitted to, and joints without limits; meshes: by the names that the
+    robot's description gives them.
     """
+    parts = drawn_parts(robot, meshes or {})
+    named = list(dict.fromkeys(part.mesh for part in parts if part.mesh is not None))
     model = robot.model
     tip = model.frames[model.getFrameId(flange(robot), pin.FrameType.BODY)]
     return {
@@ -39,7 +47,8 @@ def robot_data(robot: Robot, q: np.ndarray) -> dict[str, Any]:
             }
             for column, (joint, axis) in enumerate(zip(robot.joints, joint_axes(robot), strict=True))
         ],
-        "parts": [_part(part) for part in drawn_parts(robot)],
+        "parts": [_part(part, named) for part in parts],
+        "meshes": [_mesh((meshes or {})[name], len(named)) for name in named],
         "flange": {"joint": tip.parentJoint - 1, "placement": _column_major(tip.placement.homogeneous)},
         "view": _view(robot, q),
     }
@@ -57,14 +66,21 @@ def _view(robot: Robot, q: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _part(part: Part) -> dict[str, Any]:
+def _part(part: Part, meshes: Sequence[str]) -> dict[str, Any]:
     return {
         "joint": part.joint,
         "kind": part.kind,
+        "mesh": None if part.mesh is None else meshes.index(part.mesh),
         "size": [round(length, 5) for length in part.size],
         "placement": _column_major(part.placement),
         "colour": list(part.colour),
     }
+
+
+def _mesh(mesh: Mesh, count: int) -> dict[str, Any]:
+    """Return one of `count` meshes, with few enough triangles for all of them."""
+    few = simplified(mesh, min(_MOST_TRIANGLES, max(_FEWEST_TRIANGLES, _ALL_TRIANGLES // count)))
+    return {"points": [pack(axis) for axis in few.points.T], "faces": base64_text(few.faces.astype("<u4"))}
 
 
 def _column_major(placement: np.ndarray) -> list[float]:

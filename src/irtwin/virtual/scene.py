@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import jinja2
@@ -11,22 +11,33 @@ from markupsafe import Markup
 
 from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.robot.description import Robot
+from irtwin.robot.meshes import Mesh
 from irtwin.virtual.performance import Performance, packed_runs
 from irtwin.virtual.robot_data import asset, robot_data, viewer_script
+from irtwin.virtual.skeleton import meshes_missing
 
 _SCRIPTS = ("robot.js", "curves.js", "scene.js")
 
 
-def scene_html(robot: Robot, runs: Sequence[Performance], *, opens: int = 0, title: str = "") -> Fragment:
+def scene_html(
+    robot: Robot,
+    runs: Sequence[Performance],
+    *,
+    opens: int = 0,
+    title: str = "",
+    meshes: Mapping[str, Mesh] | None = None,
+) -> Fragment:
     """Return an HTML fragment, with its style and scripts, in which the robot performs runs; it loads nothing.
 
     It opens on the run at `opens`. While it plays it dispatches `irtwin:time` on document ({detail: {time, source}}),
-    and `irtwin:run` ({detail: {run, source}}) where another run is chosen; it follows the same from others.
+    and `irtwin:run` ({detail: {run, source}}) where another run is chosen; it follows the same from others. `meshes`
+    are those that the robot's description names; other shapes stand in for the rest, and the fragment says so.
     Raises ValueError where a run's arrays do not fit together or hold values that are not finite.
     """
     for run in runs:
         run.check(len(robot.joints))
-    data = robot_data(robot, np.concatenate([run.q for run in runs])) | {
+    meshes = meshes or {}
+    data = robot_data(robot, np.concatenate([run.q for run in runs]), meshes) | {
         "runs": packed_runs(runs, opens),
         "opens": opens,
     }
@@ -37,6 +48,7 @@ def scene_html(robot: Robot, runs: Sequence[Performance], *, opens: int = 0, tit
         runs=[run.name for run in runs],
         opens=opens,
         torque=any(run.torque is not None for run in runs),
+        missing=meshes_missing(robot, meshes),
         data=embedded_json(data),
         style=asset("scene.css"),
         scripts=scripts.html,

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from irtwin.packing import Fragment
 from irtwin.report.explorer import Columns
 from irtwin.robot.description import Robot
+from irtwin.robot.meshes import Mesh
 from irtwin.signals.channels import CHANNELS
 from irtwin.virtual.performance import Performance
 from irtwin.virtual.scene import scene_html
 
 
-def draw_scene(robot: Robot, runs: Sequence[tuple[str, Columns]], opens: int) -> Fragment:
+def draw_scene(robot: Robot, meshes: Mapping[str, Mesh], runs: Sequence[tuple[str, Columns]], opens: int) -> Fragment:
     """Return the fragment in which the robot performs runs, with torque and energy as its twin models them.
 
-    Their times run from the start of each run, as in the page's charts.
+    meshes: by the names that the robot's description gives them. Times run from the start of each run, as in the page's
+    charts.
     """
-    return scene_html(robot, [_performance(robot, name, series) for name, series in runs], opens=opens)
+    performances = [_performance(robot, name, series) for name, series in runs]
+    return scene_html(robot, performances, opens=opens, meshes=meshes)
 
 
 def _performance(robot: Robot, name: str, series: Columns) -> Performance:
