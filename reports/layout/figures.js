@@ -96,7 +96,7 @@
     }
   }
 
-  // While the 3-D scene plays the run that is shown, a line in each panel says where it is; a click sends it there.
+  // The 3-D scene shows the same run; while it plays, a line in each panel says where it is; a click sends it there.
   function moveCursors(figure, time) {
     const layout = figure._fullLayout;
     let cursors = [...figure.querySelectorAll(".cursor")];
@@ -113,15 +113,21 @@
 
   function followScene(choice) {
     const drawn = ["figure-torque", "figure-power"].map((id) => document.getElementById(id)).filter((figure) => figure);
-    const shown = () => Number(choice.value) === page.explorer.opens;
     let now = -1;
-    const update = () => drawn.forEach((figure) => moveCursors(figure, shown() ? now : -1));
+    const update = () => drawn.forEach((figure) => moveCursors(figure, now));
     document.addEventListener("irtwin:time", (event) => { now = event.detail.time; update(); });
     drawn.forEach(function (figure) {
       figure.on("plotly_afterplot", update);
       figure.on("plotly_click", function (event) {
-        if (shown()) document.dispatchEvent(new CustomEvent("irtwin:time", { detail: { time: event.points[0].x, source: figure } }));
+        document.dispatchEvent(new CustomEvent("irtwin:time", { detail: { time: event.points[0].x, source: figure } }));
       });
+    });
+    choice.addEventListener("change", () => document.dispatchEvent(
+      new CustomEvent("irtwin:run", { detail: { run: Number(choice.value), source: choice } })));
+    document.addEventListener("irtwin:run", function (event) {
+      if (event.detail.source === choice) return;
+      choice.value = event.detail.run;
+      drawRun(event.detail.run);
     });
   }
 

@@ -28,6 +28,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
+from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.planner import populate
 from irtwin.providers.records import check_name, find_robot, identifier, ingest, robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
@@ -219,7 +220,7 @@ def _take_in(place: Workspace, data_set: DataSet, announce: Announce) -> str:
     check_name(place, data_set.robot.name)
     announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
     with staged(place, robot_id) as apart:
-        announce(f"  {ingest(apart, data_set)}")
+        announce(f"  {ingest(apart, data_set, lambda line: announce(f'  {line}'))}")
         announce("Running the data providers")
         try:
             _populate_apart(apart, announce)
@@ -265,7 +266,7 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
 def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
     robot = robot_iri(robot_id)
     out = place.report_path(robot_id)
-    scene = partial(draw_scene, robot_of_graph(graph, robot))
+    scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
     render(graph, robot, place.read_file, out, scene, partial(explain_one, graph))
     return out
 

@@ -143,7 +143,7 @@ def test_the_scene_of_the_graph_is_that_of_the_urdf(tmp_path: Path) -> None:
     robot = kr6()
     again = robot_of_graph(described(robot, tmp_path), robot_iri(robot.name))
     assert again.name == robot.name
-    assert scene_html(again, *run(robot)) == scene_html(robot, *run(robot))
+    assert scene_html(again, [run(robot)]) == scene_html(robot, [run(robot)])
 
 
 def test_a_robot_that_the_graph_does_not_know_is_named() -> None:

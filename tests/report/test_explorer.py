@@ -2,7 +2,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from tests.report.robots import Factory, answers, power_only, six_axis
-from tests.report.test_sampling import unpack
+from tests.virtual.scene_data import unpack
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.explorer import Columns, explorer, opening_run

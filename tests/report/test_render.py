@@ -3,12 +3,14 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from markupsafe import Markup
 from pyoxigraph import NamedNode, Triple
 from tests.report.robots import Factory, PageOf, power_only, six_axis
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.packing import Fragment
 from irtwin.report.energy.page import content_policy, render
 
 pytestmark = pytest.mark.slow
@@ -67,12 +69,12 @@ def test_nothing_is_loaded_from_anywhere(graph: KnowledgeGraph, page_of: PageOf)
 def test_only_the_scripts_of_the_page_may_run(graph: KnowledgeGraph, tmp_path: Path):
     six = six_axis(graph)
     out = tmp_path / "page.html"
-    scene = "<div>scene</div><script>let scene = 1;\r\n</script><script>let more = 2;</script>"
-    render(graph, six.iri, six.read_series, out, draw_scene=lambda columns: scene)
+    scene = Fragment(Markup("<div>scene</div>"), ("let scene = 1;\r\n", "let more = 2;"))
+    render(graph, six.iri, six.read_series, out, draw_scene=lambda runs, opens: scene)
     page = out.read_text(encoding="utf-8")
     policy = next(a["content"] for tag, a in Elements(page).found if a.get("http-equiv") == "Content-Security-Policy")
     assert policy and policy.startswith("default-src 'none'")
-    assert policy.count("'sha256-") == 4
+    assert policy.count("'sha256-") == 5
     assert "unsafe-eval" not in policy and "http" not in policy
     assert content_policy(["let more = 2;"]).split("'")[3] in policy
 
@@ -99,7 +101,12 @@ def test_hostile_names_are_text(graph: KnowledgeGraph, page_of: PageOf):
     factory = Factory("ODD", HOSTILE, joint_name=HOSTILE + "{}").robot(note='{"<script>": "</script><script>alert(2)"}')
     page = page_of(factory.run(HOSTILE.translate({60: "a", 62: "b", 34: "c", 39: "d"})).into(graph))
     elements = Elements(page)
-    assert [a.get("type") for tag, a in elements.found if tag == "script"] == ["application/json", None, None]
+    assert [a.get("type") for tag, a in elements.found if tag == "script"] == [
+        "application/json",
+        "application/gzip",
+        "application/gzip",
+        None,
+    ]
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
 

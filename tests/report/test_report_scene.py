@@ -1,5 +1,7 @@
+import numpy as np
 import pyarrow as pa
 import pytest
+from tests.virtual.scene_data import embedded
 
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.explorer import Columns
@@ -14,11 +16,16 @@ ARM = """<robot name="arm"><link name="base"/><link name="mid"/><link name="tip"
 SERIES = {"time": [5.0, 6.0, 7.0], "q_a": [0.0, 0.1, 0.2], "energy_model": [0.0, 50.0, 99.0], "power_model": [50.0] * 3}
 
 
-def test_the_scene_performs_the_modelled_series_from_its_start():
+def test_the_scene_performs_the_modelled_series_from_their_start():
     series = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1]}))
-    assert '"start":0.0' in draw_scene(parse_urdf(ARM, source="arm"), series)
+    modelled = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1], "tau_a_model": [1.0, 2.0, 3.0]}))
+    data = embedded(draw_scene(parse_urdf(ARM, source="arm"), {}, [("first", series), ("second", modelled)], 1))
+    assert data["opens"] == 1
+    first, second = data["runs"]
+    assert (first["name"], first["start"], first["torque"]) == ("first", 0.0, None)
+    assert second["torque"][-1, 0] == pytest.approx(3.0) and np.isnan(second["torque"][:, 1]).all()
 
 
 def test_a_series_without_a_joint_is_a_bug():
     with pytest.raises(KeyError, match="q_b"):
-        draw_scene(parse_urdf(ARM, source="arm"), Columns.of(pa.table(SERIES)))
+        draw_scene(parse_urdf(ARM, source="arm"), {}, [("run", Columns.of(pa.table(SERIES)))], 0)

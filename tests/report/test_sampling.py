@@ -1,14 +1,7 @@
-import base64
-
 import numpy as np
 import pytest
 
-from irtwin.report.energy.sampling import Packed, extremes, pack
-
-
-def unpack(packed: Packed) -> np.ndarray:
-    levels = np.frombuffer(base64.b64decode(packed["data"]), dtype="<i2").astype(float)
-    return np.where(levels == -32768, np.nan, packed["offset"] + packed["scale"] * levels)
+from irtwin.report.energy.sampling import extremes
 
 
 def test_a_spike_of_one_sample_survives_in_either_signal():
@@ -28,16 +21,3 @@ def test_few_samples_are_all_kept():
 def test_indices_stay_inside_whatever_the_count(count: int):
     kept = extremes([np.sin(np.arange(count)), np.full(count, np.nan)], 10)
     assert kept[0] == 0 and kept[-1] == count - 1 and len(kept) <= 10
-
-
-def test_packed_values_come_back_within_half_a_step_and_absent_ones_stay_absent():
-    values = np.random.default_rng(0).normal(3.0, 50.0, 1_000)
-    values[7] = np.nan
-    back = unpack(pack(values))
-    assert np.isnan(back[7])
-    assert np.nanmax(np.abs(back - values)) <= np.ptp(values[np.isfinite(values)]) / 65_534
-
-
-@pytest.mark.parametrize("values", [[2.5, 2.5], [np.nan, np.nan], []])
-def test_values_without_range_are_packed_too(values: list[float]):
-    np.testing.assert_array_equal(unpack(pack(np.array(values))), values)

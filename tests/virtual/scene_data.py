@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from irtwin import resources
+from irtwin.packing import Fragment, Packed
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf, read_urdf
+from irtwin.virtual.performance import Performance
 
 HOSTILE = "</script><script>window.hacked=1</script>&lt;<img src=x onerror=hacked=1>"
-
-Run = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time, q, energy, power
 
 
 def kr6() -> Robot:
@@ -37,20 +37,27 @@ def bare(first: str = "turn", kind: str = "revolute") -> Robot:
     )
 
 
-def run(robot: Robot, seconds: float = 8.0, rate: float = 100.0) -> Run:
+def run(robot: Robot, seconds: float = 8.0, rate: float = 100.0, name: str = "sweep") -> Performance:
     time = 3.0 + np.arange(round(seconds * rate) + 1) / rate
     phase = np.outer(time - 3.0, 1 + 0.2 * np.arange(len(robot.joints)))
     power = 200 + 150 * np.sin(2 * time) ** 2
     energy = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 / rate)])
-    return time, 0.9 * np.sin(phase), energy, power
+    return Performance(name, time, 0.9 * np.sin(phase), energy, power, 20.0 * np.cos(phase))
 
 
-def embedded(fragment: str) -> dict[str, Any]:
-    """Read the data that the fragment carries, signals decoded."""
-    found = re.search(r'<script type="application/json">(.*?)</script>', fragment, re.DOTALL)
+def unpack(packed: Packed) -> np.ndarray:
+    levels = np.frombuffer(base64.b64decode(packed["data"]), dtype="<i2").astype(float)
+    return np.where(levels == -32768, np.nan, packed["offset"] + packed["scale"] * levels)
+
+
+def embedded(fragment: Fragment) -> dict[str, Any]:
+    """Read the data that the fragment carries, signals decoded: q and torque (frames, n), energy, power (frames,)."""
+    found = re.search(r'<script type="application/json">(.*?)</script>', fragment.html, re.DOTALL)
     assert found is not None
     data: dict[str, Any] = json.loads(found.group(1))
-    for name in ("q", "energy", "power"):
-        data[name] = np.frombuffer(base64.b64decode(data[name]), dtype="<f4")
-    data["q"] = data["q"].reshape(-1, len(data["joints"]))
+    for one in data["runs"]:
+        one["energy"] = np.frombuffer(base64.b64decode(one["energy"]), dtype="<f4")
+        one["power"] = unpack(one["power"])
+        for name in ("q", "torque"):
+            one[name] = None if one[name] is None else np.column_stack([unpack(column) for column in one[name]])
     return data

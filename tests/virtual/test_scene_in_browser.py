@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests import mesh_robots
+from tests.mesh_robots import HAND
 from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
+from irtwin.providers.mesh_files import mesh_copies
+from irtwin.report.energy.page import content_policy
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
+from irtwin.robot.meshes import Mesh, read_mesh
+from irtwin.virtual.performance import Performance
 from irtwin.virtual.scene import scene_html
 
 pytestmark = pytest.mark.system
@@ -23,7 +29,6 @@ ARGUMENTS = [
     "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
-POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 PAGE = '<!DOCTYPE html><html><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{}">'
 SEEK = "time => document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time}}))"
 PLACES = """count => {
@@ -58,16 +63,25 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-def open_page(browser: Any, folder: Path, robot: Robot, title: str = "") -> tuple[Any, list[str]]:
-    """Open the scene of a run as a file; return the page and whatever it complains of or asks for."""
+def open_page(
+    browser: Any,
+    folder: Path,
+    robot: Robot,
+    *more: Performance,
+    title: str = "",
+    meshes: Mapping[str, Mesh] | None = None,
+) -> tuple[Any, list[str]]:
+    """Open the scene of runs as a file; return the page and whatever it complains of or asks for."""
     path = folder / "scene.html"
-    path.write_text(PAGE.format(POLICY) + scene_html(robot, *run(robot), title=title), encoding="utf-8")
+    fragment = scene_html(robot, [run(robot), *more], title=title, meshes=meshes)
+    path.write_text(PAGE.format(content_policy(fragment.scripts)) + fragment.html, encoding="utf-8")
     page = browser.new_page(viewport={"width": 1366, "height": 768})
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: complaints.append(request.url))
     page.goto(path.as_uri())
+    page.wait_for_function("document.querySelector('.irtwin-scene').irtwinScene")
     assert complaints == [path.as_uri()]
     complaints.clear()
     return page, complaints
@@ -83,7 +97,8 @@ def test_the_robot_is_drawn_and_moves_and_its_numbers_are_right(browser: Any, tm
     first = pixels(page)
     orange = (first[:, :, 0] > 150) & (first[:, :, 2] < 90)
     assert orange.mean() > 0.01
-    time, _, energy, power = run(robot)
+    shown = run(robot)
+    time, energy, power = shown.time, shown.energy, shown.power
     page.evaluate(SEEK, 6.5)
     assert np.abs(pixels(page) - first).max() > 50
     assert page.inner_text(".is-time") == "6.5"
@@ -97,7 +112,7 @@ def test_the_robot_is_drawn_and_moves_and_its_numbers_are_right(browser: Any, tm
 @pytest.mark.parametrize("robot", [kr6(), bare(kind="prismatic")])
 def test_the_joints_stand_where_the_kinematics_say(browser: Any, tmp_path: Path, robot: Robot) -> None:
     page, _ = open_page(browser, tmp_path, robot)
-    time, q, *_ = run(robot)
+    time, q = run(robot).time, run(robot).q
     for sample in (0, 360, 800):
         page.evaluate(SEEK, float(time[sample]))
         answer = page.evaluate(PLACES, len(robot.joints))
@@ -105,17 +120,99 @@ def test_the_joints_stand_where_the_kinematics_say(browser: Any, tmp_path: Path,
         known = link_placements(robot, q[sample])
         links = [robot.links[1 + joint].name for joint in range(len(robot.joints))]
         for place, link in zip(answer["places"], links, strict=True):
-            np.testing.assert_allclose(np.linalg.solve(world, np.array(place).reshape(4, 4).T), known[link], atol=1e-5)
+            np.testing.assert_allclose(np.linalg.solve(world, np.array(place).reshape(4, 4).T), known[link], atol=2e-4)
 
 
 def test_a_joint_beyond_its_limits_is_marked(browser: Any, tmp_path: Path) -> None:
     robot = bare()
     narrow = replace(robot, joints=(robot.joints[0], replace(robot.joints[1], lower=-0.5, upper=0.5)))
     page, _ = open_page(browser, tmp_path, narrow)
-    outside = "Array.from(document.querySelectorAll('.is-range i'), (dot) => dot.classList.contains('is-outside'))"
+    outside = "Array.from(document.querySelectorAll('.is-joints tr'), (row) => row.classList.contains('is-outside'))"
     assert page.evaluate(outside) == [False, False]
     page.evaluate(SEEK, 4.0)
     assert page.evaluate(outside) == [False, True]
+
+
+def test_a_curve_of_each_joint_follows_the_time(browser: Any, tmp_path: Path) -> None:
+    robot = bare(kind="prismatic")
+    page, complaints = open_page(browser, tmp_path, robot)
+    shown = run(robot)
+    page.evaluate(SEEK, 7.0)
+    places = "cursors => cursors.map((cursor) => Number(cursor.getAttribute('x1')))"
+    assert page.eval_on_selector_all(".is-joints .is-now", places) == [50, 50]
+
+    def values() -> list[str]:
+        return [text.replace("\u2212", "-") for text in page.locator(".is-joints td:last-child").all_inner_texts()]
+
+    at = [np.interp(7.0, shown.time, column) for column in shown.q.T]
+    assert values() == [f"{at[0]:.3f} m", f"{np.degrees(at[1]):.1f}°"]
+    before = page.eval_on_selector(".is-joints path", "path => path.getAttribute('d')")
+    page.select_option(".is-quantity", "torque")
+    assert shown.torque is not None
+    at = [np.interp(7.0, shown.time, column) for column in shown.torque.T]
+    assert values() == [f"{at[0]:.1f} N", f"{at[1]:.1f} N m"]
+    assert page.eval_on_selector(".is-joints path", "path => path.getAttribute('d')") != before
+    page.select_option(".is-quantity", "velocity")
+    speed = np.interp(7.0, shown.time, np.gradient(shown.q[:, 0], shown.time))
+    assert float(values()[0].removesuffix(" m/s")) == pytest.approx(speed, abs=2e-3)
+    page.select_option(".is-quantity", "power")
+    at_first = np.interp(7.0, shown.time, shown.torque[:, 0]) * speed
+    assert float(values()[0].removesuffix(" W")) == pytest.approx(at_first, abs=0.6)
+    assert complaints == []
+
+
+def test_links_take_the_colour_of_torque_or_power(browser: Any, tmp_path: Path) -> None:
+    robot = kr6()
+    page, complaints = open_page(browser, tmp_path, robot)
+    page.evaluate(SEEK, 6.5)
+    own, legend = pixels(page), page.locator(".is-legend")
+    assert legend.is_hidden()
+    page.select_option(".is-colour", "torque")
+    assert "torque of their joint: 0" in legend.inner_text() and "20 N m" in legend.inner_text()
+    torque = pixels(page)
+    page.select_option(".is-colour", "power")
+    assert "brakes" in legend.inner_text() and "W drives" in legend.inner_text()
+    assert min(np.abs(torque - own).max(), np.abs(pixels(page) - torque).max()) > 50
+    page.select_option(".is-colour", "own")
+    assert legend.is_hidden() and np.abs(pixels(page) - own).max() < 10
+    assert complaints == []
+
+
+def test_meshes_are_drawn_in_their_colour(browser: Any, tmp_path: Path) -> None:
+    robot = mesh_robots.robot()
+    copies, _ = mesh_copies(mesh_robots.write(tmp_path / "data"))
+    meshes = {name: read_mesh(copy.content, Path(copy.path).suffix, name) for name, copy in copies.items()}
+    page, complaints = open_page(browser, tmp_path, robot, meshes=meshes)
+    drawn = pixels(page)
+    red = (drawn[:, :, 0] > 90) & (drawn[:, :, 1] < 60) & (drawn[:, :, 2] < 60)
+    assert red.mean() > 0.002
+    page.evaluate(SEEK, 7.0)
+    assert np.abs(pixels(page) - drawn).max() > 50
+    assert HAND in page.inner_text(".is-note")
+    page.select_option(".is-colour", "power")
+    after = pixels(page)
+    assert not ((after[:, :, 0] > 90) & (after[:, :, 1] < 40) & (after[:, :, 2] < 40)).any()
+    assert complaints == []
+
+
+def test_another_run_can_be_chosen_here_or_elsewhere(browser: Any, tmp_path: Path) -> None:
+    robot = kr6()
+    longer, bare_run = run(robot, seconds=12.0, name="longer"), replace(run(robot, name="bare"), torque=None)
+    page, complaints = open_page(browser, tmp_path, robot, longer, bare_run)
+    page.evaluate("document.addEventListener('irtwin:run', (event) => { window.heard = event.detail.run; })")
+    page.select_option(".is-run", label="longer")
+    assert page.evaluate("window.heard") == 1
+    page.evaluate(SEEK, 1e9)
+    assert page.inner_text(".is-time") == "15.0"
+    assert float(page.inner_text(".is-energy")) == pytest.approx(longer.energy[-1], abs=0.6)
+    page.select_option(".is-colour", "power")
+    page.select_option(".is-quantity", "torque")
+    page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:run', {detail: {run: 2, source: null}}))")
+    assert page.locator(".is-run").input_value() == "2"
+    assert page.inner_text(".is-time") == "3.0"
+    assert page.locator(".is-quantity").input_value() == "position"  # no torque was modelled
+    assert page.locator(".is-colour").input_value() == "own" and page.locator(".is-legend").is_hidden()
+    assert complaints == []
 
 
 def test_it_plays_tells_the_time_and_stops_at_the_end(browser: Any, tmp_path: Path) -> None:
@@ -140,8 +237,9 @@ def test_a_print_shows_a_picture(browser: Any, tmp_path: Path) -> None:
 
 
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
-    page, complaints = open_page(browser, tmp_path, bare(HOSTILE), title=HOSTILE)
+    page, complaints = open_page(browser, tmp_path, bare(HOSTILE), run(bare(), name=HOSTILE), title=HOSTILE)
     assert page.inner_text(".is-title") == HOSTILE
-    assert page.inner_text(".is-joints tr:first-child th") == HOSTILE
+    assert page.inner_text(".is-joints tr:first-child th span") == HOSTILE
+    assert page.locator(".is-run option").all_inner_texts() == ["sweep", HOSTILE]
     assert page.evaluate("window.hacked === undefined")
     assert complaints == []

@@ -8,6 +8,7 @@ import json
 import math
 import re
 import unicodedata
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +18,7 @@ import pyarrow as pa
 from sqlalchemy import select
 
 from irtwin.errors import InputError
+from irtwin.providers.mesh_files import mesh_copies
 from irtwin.providers.structure_rows import device_rows, structure_rows
 from irtwin.robot import description
 from irtwin.robot.urdf import parse_urdf
@@ -30,8 +32,11 @@ _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for th
 _READABLE = 40  # characters of a name that is not plain
 
 
-def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
-    """Take a data set into the workspace, all of it or nothing; say whether it was new."""
+def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str], None] = lambda line: None) -> Outcome:
+    """Take a data set into the workspace, all of it or nothing; say whether it was new.
+
+    `announce` is told of each mesh that cannot be drawn.
+    """
     robot_id = identifier(data_set.robot.name)
     now = datetime.now(UTC)
     runs = [_run_row(robot_id, run, now) for run in data_set.runs]
@@ -42,12 +47,16 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
         row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
         for row, run in zip(runs, data_set.runs, strict=True)
     }
+    meshes, undrawn = mesh_copies(data_set)
+    for line in undrawn:
+        announce(line)
     parts: list[Base] = [
         *(_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)),
-        *structure_rows(robot_id, data_set.robot),
+        *structure_rows(robot_id, data_set.robot, meshes),
         *device_rows(robot_id, data_set),
     ]
-    return workspace.ingest(_robot_row(robot_id, data_set), parts, runs, series)
+    documents = {mesh.path: mesh.content for mesh in meshes.values()}
+    return workspace.ingest(_robot_row(robot_id, data_set), parts, runs, series, documents)
 
 
 def identifier(name: str) -> str:

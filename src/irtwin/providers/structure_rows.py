@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pinocchio as pin
 
 from irtwin.errors import InputError
+from irtwin.providers.mesh_files import MeshCopy
 from irtwin.robot.chain_table import deviation, table_of
 from irtwin.robot.denavit_hartenberg import CONVENTIONS
 from irtwin.robot.description import Robot
@@ -22,8 +23,11 @@ from irtwin.storage.structure_schema import Device, DeviceChannel, DHRow, DHTabl
 _MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
-def structure_rows(robot_id: str, robot: Robot) -> Iterator[Base]:
-    """Yield the rows of a robot's links, joints, shapes and Denavit-Hartenberg tables. Raises InputError."""
+def structure_rows(robot_id: str, robot: Robot, meshes: Mapping[str, MeshCopy] | None = None) -> Iterator[Base]:
+    """Yield the rows of a robot's links, joints, shapes and Denavit-Hartenberg tables; `meshes` by their names.
+
+    Raises InputError.
+    """
     structure = structure_of(robot)
     for number, body in enumerate(structure.bodies):
         yield _link(robot_id, number, body)
@@ -33,7 +37,7 @@ def structure_rows(robot_id: str, robot: Robot) -> Iterator[Base]:
     for solid in structure.solids:
         key = (solid.link, solid.purpose)
         counted[key] = counted.get(key, 0) + 1
-        yield _shape(robot_id, counted[key], solid)
+        yield _shape(robot_id, counted[key], solid, (meshes or {}).get(solid.file or ""))
     for convention in CONVENTIONS:
         yield from _dh_table(robot_id, robot, convention)
 
@@ -99,7 +103,7 @@ def _joint(robot_id: str, connection: Connection) -> LinkJoint:
     )
 
 
-def _shape(robot_id: str, number: int, solid: Solid) -> LinkShape:
+def _shape(robot_id: str, number: int, solid: Solid, mesh: MeshCopy | None) -> LinkShape:
     names = {
         "box": ("size_x_m", "size_y_m", "size_z_m"),
         "cylinder": ("radius_m", "length_m"),
@@ -113,6 +117,8 @@ def _shape(robot_id: str, number: int, solid: Solid) -> LinkShape:
         number=number,
         kind=solid.kind,
         mesh=solid.file,
+        mesh_file=None if mesh is None else mesh.path,
+        mesh_sha256=None if mesh is None else mesh.sha256,
         colour=None if solid.colour is None else " ".join(map(repr, solid.colour)),
         **dict(zip(names, solid.size, strict=True)),
         **_place("origin", solid.origin),

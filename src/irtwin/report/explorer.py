@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from irtwin.report.energy.sampling import Samples, extremes, pack
+from irtwin.packing import pack
+from irtwin.report.energy.sampling import Samples, extremes
 from irtwin.report.questions import Answers, Row
 from irtwin.signals.channels import CHANNELS
 

@@ -67,6 +67,7 @@ class DataSet:
     notes: Mapping[str, Any]
     repairs: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
@@ -106,6 +107,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
         repairs=tuple(repairs),
         findings=tuple(findings),
+        urdf=table.path("urdf", folder) if "urdf" in table.values else None,
     )
 
 

@@ -15,21 +15,22 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
-from irtwin.storage import structure_schema as _structure_schema  # noqa: F401  likewise
+from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
 from irtwin.storage.files import inside
-from irtwin.storage.gap_schema import GapDiagnosis
 from irtwin.storage.rows import (
     drop_activities,
     drop_data_set,
     drop_robot,
     facts,
     insert_rows,
+    named_files,
     part_tables,
     values,
     with_dependents,
 )
-from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Robot, Run, Series, Twin
+from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Robot, Run, Series
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
+from irtwin.storage.structure_schema import LinkShape
 
 Outcome = Literal["new", "unchanged", "replaced"]
 _DATABASE = "irtwin.db"
@@ -37,11 +38,12 @@ _FROM_A_BACKUP = (
     "`irtwin restore ARCHIVE --workspace NEW` makes another workspace of a backup; without one, run the data sets "
     "again into a new one (where a server keeps the database, give --database)"
 )
-TWINS, DIAGNOSES = "twins", "diagnoses"
+TWINS, DIAGNOSES, MESHES = "twins", "diagnoses", "meshes"
+_FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES)  # of files that rows name
 
 
 class Workspace:
-    """A folder with `irtwin.db` (or a database elsewhere, by URL), `series/`, `twins/`, `graph/` and `reports/`.
+    """A folder: `irtwin.db` (or a database elsewhere, by URL), `series/`, `twins/`, `meshes/`, `graph/` and `reports/`.
 
     Every change is one transaction: files are written first, under the database's lock, rows that name
     them are committed last, and files that no row names are removed afterwards.
@@ -103,13 +105,19 @@ class Workspace:
             yield session
 
     def ingest(
-        self, robot: Robot, parts: Sequence[Base], runs: Sequence[Run], series: Mapping[str, pa.Table]
+        self,
+        robot: Robot,
+        parts: Sequence[Base],
+        runs: Sequence[Run],
+        series: Mapping[str, pa.Table],
+        documents: Mapping[str, bytes] | None = None,
     ) -> Outcome:
         """Take in a robot's data set, all of it or nothing.
 
         `parts` are the rows of joints, links, shapes and devices; `series` holds the measured samples of each run, by
-        `run_id`. The data set that is there already changes nothing; another one of the same robot replaces it, and all
-        that was derived from it is dropped. Runs that were watched live are no part of a data set and stay.
+        `run_id`; `documents` the files that parts name, by their path in the workspace. The data set that is there
+        already changes nothing; another one of the same robot replaces it, and all that was derived from it is dropped.
+        Runs that were watched live are no part of a data set and stay.
         """
         missing = {run.run_id for run in runs} ^ set(series)
         if missing:
@@ -122,6 +130,8 @@ class Workspace:
             if known:
                 drop_data_set(session, robot.robot_id)
                 session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(values(robot)))
+            for path, content in (documents or {}).items():
+                files.write(inside(self.folder, path), content)
             insert_rows(session, [*rows[1 if known else 0 :], *self._store(series, "measured", None)])
         self.remove_orphans()
         return "replaced" if known else "new"
@@ -197,10 +207,8 @@ class Workspace:
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""
         with self._writing() as session:
-            named = {*session.scalars(select(Series.path)), *session.scalars(select(Twin.file))}
-            for column in (GapDiagnosis.file, GapDiagnosis.evidence_file, GapDiagnosis.twin_file):
-                named |= {path for path in session.scalars(select(column)) if path is not None}
-            for file in [*self._files(FOLDER), *self._files(TWINS), *self._files(DIAGNOSES)]:
+            named = {file.path for file in named_files(session.connection())}
+            for file in (file for folder in _FOLDERS for file in self._files(folder)):
                 if file.relative_to(self.folder).as_posix() not in named:
                     file.unlink()
 
@@ -241,7 +249,7 @@ class Workspace:
         return rows
 
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
-        """Whether exactly these source rows are stored already, with their series undamaged."""
+        """Whether exactly these source rows are stored already, with their series and meshes undamaged."""
         runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
         stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
         for table in part_tables():
@@ -249,7 +257,10 @@ class Workspace:
             stored |= {(table.name, *row) for row in found}
         measured = select(Series.path, Series.series_id).join(Run)
         measured = measured.where(Run.robot_id == robot_id, Series.kind == "measured")
-        whole = all(is_whole(self.folder, path, checksum) for path, checksum in session.execute(measured))
+        named = [(row.path, row.series_id) for row in session.execute(measured)]
+        shapes = select(LinkShape.mesh_file, LinkShape.mesh_sha256).where(LinkShape.robot_id == robot_id)
+        named += [(row.mesh_file, row.mesh_sha256) for row in session.execute(shapes) if row.mesh_file is not None]
+        whole = all(is_whole(self.folder, path, checksum) for path, checksum in named)
         return whole and stored == {facts(row) for row in rows}
 
     def _make_tables(self) -> None:
@@ -279,6 +290,6 @@ def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missi
     """Raise InputError where files lie in a workspace that only a database could have named."""
     if what.startswith(_DATABASE) and (folder / _DATABASE).exists():
         return
-    for name in ("graph", FOLDER, TWINS, DIAGNOSES):
+    for name in ("graph", *_FOLDERS):
         if next((folder / name).glob("[!.]*"), None) is not None:
             raise InputError(f"{folder}: {what}, though {name}/ is full; {_FROM_A_BACKUP}")

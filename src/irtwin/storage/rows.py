@@ -17,6 +17,7 @@ Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 _FILES = {
     "series": [("path", "series_id")],
     "twin": [("file", "sha256")],
+    "link_shape": [("mesh_file", "mesh_sha256")],
     "gap_diagnosis": [("file", "sha256"), ("evidence_file", "evidence_sha256"), ("twin_file", "twin_sha256")],
 }
 

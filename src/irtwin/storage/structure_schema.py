@@ -65,6 +65,8 @@ class LinkShape(Base):
     radius_m: Mapped[float | None]
     length_m: Mapped[float | None]
     mesh: Mapped[str | None]  # its path, as the robot description writes it
+    mesh_file: Mapped[str | None]  # its copy in the workspace; none where the data set lacks it
+    mesh_sha256: Mapped[str | None]
     scale_x: Mapped[float | None]
     scale_y: Mapped[float | None]
     scale_z: Mapped[float | None]

@@ -1,14 +1,17 @@
-"""What of a robot can be seen: its own shapes, or tubes and joint housings made from its kinematics."""
+"""What of a robot can be seen: its meshes and shapes, or tubes and joint housings made from its kinematics."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from irtwin.robot.description import Robot
+from irtwin.robot.structure import PURPOSES, Solid, structure_of
 
+_GREY = (0.7, 0.7, 0.72, 1.0)
 _TUBE = (0.86, 0.88, 0.90, 1.0)
 _HOUSING = (0.16, 0.38, 0.58, 1.0)
 _FOOT = (0.35, 0.38, 0.42, 1.0)
@@ -16,21 +19,27 @@ _FOOT = (0.35, 0.38, 0.42, 1.0)
 
 @dataclass(frozen=True)
 class Part:
-    """A box, cylinder (along z) or sphere, fixed to a joint's frame; `joint` is its column, -1 for the base.
+    """A box, cylinder (along z), sphere or mesh, fixed to a joint's frame; `joint` is its column, -1 for the base.
 
-    size in m as in robot.description.Shape; placement: (4, 4), in the joint's frame; colour: RGBA in 0..1.
+    size in m as in robot.description.Shape; of a mesh, named by `mesh`, the factors that it is stretched by. placement:
+    (4, 4), in the joint's frame; colour: RGBA in 0..1.
     """
 
     joint: int
     kind: str
     size: tuple[float, ...]
     placement: np.ndarray
-    colour: tuple[float, float, float, float]
+    colour: tuple[float, ...]
+    mesh: str | None = None
 
 
-def drawn_parts(robot: Robot) -> list[Part]:
-    """Return the robot's visual shapes; a skeleton where less than half of its moving bodies have any."""
-    parts = _own_shapes(robot)
+def drawn_parts(robot: Robot, meshes: Collection[str] = ()) -> list[Part]:
+    """Return the robot's visual shapes, with those of its meshes whose names are given.
+
+    A link that lacks one is seen by its shapes against collisions, if it has any; a robot of which less than half of
+    the moving bodies can be seen, by a skeleton.
+    """
+    parts = _own_shapes(robot, meshes)
     seen = {part.joint for part in parts if part.joint >= 0}
     return parts if 2 * len(seen) >= len(robot.joints) else _skeleton(robot)
 
@@ -47,14 +56,29 @@ def joint_axes(robot: Robot) -> np.ndarray:
     return axes
 
 
-def _own_shapes(robot: Robot) -> list[Part]:
+def meshes_missing(robot: Robot, meshes: Collection[str]) -> list[str]:
+    """Return the names of the meshes that the robot would be seen by, other than those given."""
+    named = (solid.file for solid in structure_of(robot).solids if solid.purpose == "visual")
+    return [name for name in dict.fromkeys(named) if name is not None and name not in meshes]
+
+
+def _own_shapes(robot: Robot, meshes: Collection[str]) -> list[Part]:
     parts = []
+    solids = structure_of(robot).solids
     for link in robot.links:
+        visual, collision = ([s for s in solids if s.link == link.name and s.purpose == one] for one in PURPOSES)
+        whole = bool(visual) and all(_can_be_drawn(solid, meshes) for solid in visual)
+        stand_in = [] if whole else [solid for solid in collision if _can_be_drawn(solid, meshes)]
         frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
-        for shape in link.shapes:
-            placement = frame.placement.homogeneous @ shape.placement
-            parts.append(Part(frame.parentJoint - 1, shape.kind, shape.size, placement, shape.colour))
+        for solid in stand_in or [solid for solid in visual if _can_be_drawn(solid, meshes)]:
+            placement = frame.placement.homogeneous @ solid.origin.transform
+            colour = solid.colour or _GREY
+            parts.append(Part(frame.parentJoint - 1, solid.kind, solid.size, placement, colour, solid.file))
     return parts
+
+
+def _can_be_drawn(solid: Solid, meshes: Collection[str]) -> bool:
+    return solid.file is None or solid.file in meshes
 
 
 def _skeleton(robot: Robot) -> list[Part]:

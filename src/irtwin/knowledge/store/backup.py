@@ -26,12 +26,12 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE
 from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
-from irtwin.storage.database import DIAGNOSES, TWINS, Workspace
+from irtwin.storage.database import DIAGNOSES, MESHES, TWINS, Workspace
 from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
 from irtwin.storage.series import FOLDER
 
-_FOLDERS = (FOLDER, TWINS, DIAGNOSES, LIVE, "reports")
+_FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
 _NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*")
 _AT_ONCE = 5000  # rows

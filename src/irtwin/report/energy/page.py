@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
-import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +16,15 @@ from plotly.offline import get_plotlyjs
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.java import HOW_TO_GET
+from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.report import wording
 from irtwin.report.energy import tables, verdict
 from irtwin.report.energy.figures import figures
-from irtwin.report.explorer import Columns, ReadSeries, explorer, opening_run
+from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.questions import Answers, Graph, Question, ask, read_questions
 from irtwin.storage.files import write
 
-DrawScene = Callable[[Columns], str]  # a run's modelled series -> an HTML fragment with its scripts
-
-_SCRIPT = re.compile(r"<script(?![^>]*application/json)[^>]*>(.*?)</script>", re.DOTALL | re.IGNORECASE)
+DrawScene = Callable[[Sequence[tuple[str, Columns]], int], Fragment]  # runs with their modelled series, the first shown
 
 
 def render(
@@ -40,18 +38,21 @@ def render(
     """Write the energy report of a robot to `out`.
 
     Every number comes from the questions in `reports/energy`; samples come from the series that they name.
-    `draw_scene` gets the series of the run that the page opens on, and returns its 3-D scene. `explain` says how a
-    conclusion is known.
+    `draw_scene` gets the name and modelled series of every run, and the place of that which the page opens on; it
+    returns their 3-D scene. `explain` says how a conclusion is known.
     """
     bindings = _bindings(graph, robot_iri)
     answers = ask(graph, _questions(), bindings)
     if answers["robot"].first is None:
         raise InputError(f"{robot_iri}: this robot is not in the graph; ingest its data set first")
-    opens = opening_run(answers)
+    read = cache(read_series)
+    curves = explorer(answers, read)
     scene = None
-    if draw_scene is not None and opens is not None:
-        scene = draw_scene(Columns.of(read_series(opens["file"], opens["checksum"])))
-    page = _page(answers, bindings, explorer(answers, read_series), scene, explain)
+    if draw_scene is not None and curves is not None:
+        rows = answers["modelled_series"].rows
+        runs = [(row["run_name"], Columns.of(read(row["file"], row["checksum"]))) for row in rows]
+        scene = draw_scene(runs, curves["opens"])
+    page = _page(answers, bindings, curves, scene, explain)
     write(out, page.encode())
 
 
@@ -69,15 +70,12 @@ def _page(
     answers: Answers,
     bindings: Mapping[str, str],
     curves: Mapping[str, Any] | None,
-    scene: str | None,
+    scene: Fragment | None,
     explain: tables.Explain | None,
 ) -> str:
     folder = resources.folder("reports")
     drawn = figures(answers)
-    scripts = {
-        "plotly": get_plotlyjs(),
-        "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
-    }
+    scripts = figure_scripts()
     return environment(folder).get_template("energy/page.html.jinja").render(
         answers=answers,
         bindings=bindings,
@@ -94,12 +92,17 @@ def _page(
         drawn=drawn,
         curves=curves,
         data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),
-        scene=None if scene is None else Markup(scene),
-        scene_run=curves["runs"][curves["opens"]]["name"] if curves else None,
+        scene=None if scene is None else scene.html,
         style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
-        scripts={name: Markup(text) for name, text in scripts.items()},
-        policy=content_policy([*scripts.values(), *_SCRIPT.findall(scene or "")]),
+        scripts=scripts.html,
+        policy=content_policy([*scripts.scripts, *(scene.scripts if scene else ())]),
     )  # fmt: skip
+
+
+def figure_scripts() -> Fragment:
+    """Return the scripts that draw a page's figures."""
+    drawing = resources.folder("reports") / "layout" / "figures.js"
+    return packed_scripts([get_plotlyjs(), drawing.read_text(encoding="utf-8")])
 
 
 def content_policy(scripts: Iterable[str]) -> str:
@@ -115,12 +118,6 @@ def _digest(script: str) -> str:
     # A browser hashes what its parser made of the text, which reads \r\n as \n.
     normal = script.replace("\r\n", "\n").replace("\r", "\n")
     return base64.b64encode(hashlib.sha256(normal.encode("utf-8")).digest()).decode("ascii")
-
-
-def embedded_json(data: object) -> Markup:
-    """Return JSON that is safe inside a script element: no `<` that could end it."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return Markup(text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))
 
 
 def environment(folder: Path) -> jinja2.Environment:

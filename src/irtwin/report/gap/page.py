@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from irtwin import resources
 from irtwin.errors import InputError
@@ -20,10 +19,11 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl import rules as shacl_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.packing import embedded_json
 from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
 from irtwin.report import wording
-from irtwin.report.energy.page import content_policy, embedded_json, environment
+from irtwin.report.energy.page import content_policy, environment, figure_scripts
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
@@ -75,10 +75,7 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
     folder = resources.folder("reports")
     follows = gap_figures.foremost_curves(curves.follows, answers)
     drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
-    scripts = {
-        "plotly": get_plotlyjs(),
-        "figures": (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
-    }
+    scripts = figure_scripts()
     return environment(folder).get_template("gap/page.html.jinja").render(
         answers=answers,
         bindings=bindings,
@@ -93,8 +90,8 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
         drawn=drawn,
         data=embedded_json({"figures": drawn, "explorer": None}),
         style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
-        scripts={name: Markup(text) for name, text in scripts.items()},
-        policy=content_policy(scripts.values()),
+        scripts=scripts.html,
+        policy=content_policy(scripts.scripts),
     )  # fmt: skip
 
 

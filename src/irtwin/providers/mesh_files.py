@@ -1,0 +1,58 @@
+"""The meshes of a robot: copied from its data set into the workspace, and read again as the graph names them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.robot.meshes import Mesh, find_mesh, read_mesh, read_mesh_file
+from irtwin.robot.structure import structure_of
+from irtwin.signals.log import DataSet
+from irtwin.storage.database import MESHES
+
+_MESHES = """SELECT DISTINCT ?mesh ?file ?checksum {
+  ?shape irt:shape_of / irt:link_of ?arm ; irt:Mesh ?mesh ; irt:File ?file ; irt:Checksum ?checksum .
+}"""
+
+
+@dataclass(frozen=True)
+class MeshCopy:
+    """A mesh's file in the workspace: path, SHA-256, content."""
+
+    path: str
+    sha256: str
+    content: bytes
+
+
+def mesh_copies(data_set: DataSet) -> tuple[dict[str, MeshCopy], list[str]]:
+    """Return the meshes that a data set's robot names, by that name, and a line for each that cannot be drawn."""
+    copies: dict[str, MeshCopy] = {}
+    said = []
+    beside = data_set.folder if data_set.urdf is None else data_set.urdf.parent
+    for name in dict.fromkeys(solid.file for solid in structure_of(data_set.robot).solids if solid.file is not None):
+        try:
+            file = find_mesh(name, data_set.folder, beside)
+            content = read_mesh_file(file)
+        except InputError as error:
+            said.append(f"{error}; shapes stand in for it")
+            continue
+        sha256 = hashlib.sha256(content).hexdigest()
+        copies[name] = MeshCopy(f"{MESHES}/{sha256}{file.suffix.lower()}", sha256, content)
+    return copies, said
+
+
+def meshes_of_graph(
+    graph: KnowledgeGraph, robot_iri: str, read_document: Callable[[str, str], bytes]
+) -> Mapping[str, Mesh]:
+    """Return a robot's meshes by the names that its description gives them, from the files that the graph names.
+
+    `read_document` returns a file of the workspace by path and checksum.
+    """
+    meshes = {}
+    for row in graph.query(_MESHES, {"arm": robot_iri}).rows:
+        path = row["file"]
+        meshes[row["mesh"]] = read_mesh(read_document(path, row["checksum"]), path[path.rfind(".") :], path)
+    return meshes
