@@ -22,9 +22,6 @@ from irtwin.live import live_twin
 from irtwin.live.joint_stream import STREAMED, State
 from irtwin.live.live_run import columns, journal_rows
 from irtwin.live.live_twin import LiveTwin
-from irtwin.providers import live_energy
-from irtwin.providers.planner import declarations
-from irtwin.providers.planner import lacking as planner_lacking
 from irtwin.signals.log import Run as LoggedRun
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
@@ -186,19 +183,22 @@ def test_what_a_crash_left_gets_its_energy_too(place: Workspace, graph: Knowledg
             twin.receive(said[5])
 
 
-def test_the_provider_of_energy_would_make_the_same_and_lacks_nothing(place: Workspace, graph: KnowledgeGraph) -> None:
-    with LiveTwin(place, graph) as twin:
+def test_a_new_twin_gives_live_runs_their_energy_anew(place: Workspace, tmp_path: Path) -> None:
+    with KnowledgeGraph.of_workspace(place) as graph, LiveTwin(place, graph) as twin:
         for state in states(log()):
             twin.receive(state)
-    run_id = live_run(place).run_id
     with place.reading() as session:
-        activities = session.scalars(select(schema.Activity.activity_id).where(schema.Activity.provider == "energy"))
-        assert f"energy.{run_id}" in set(activities)
-    made = live_energy.provide(place, run_id)
-    (energy,) = [row for row in made.rows if isinstance(row, schema.RunEnergy)]
-    assert energy.energy_consumption_j == pytest.approx(graph.query(ENERGY)[0]["energy"])
-    lacking = [one for one in declarations(graph) if one.name == "energy"]
-    assert planner_lacking(graph, lacking[0]) == []
+        old = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.role == "live")).one()
+    run_all(small_robots.data_set(tmp_path / "data", "arm"), place.folder)  # the same once more
+    run_all(small_robots.data_set(tmp_path / "other", "arm", seed=4), place.folder)
+    with place.reading() as session:
+        new = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.role == "live")).one()
+    assert new.twin_id != old.twin_id
+    assert new.energy_consumption_j == pytest.approx(old.energy_consumption_j, rel=1e-3)  # as measured
+    assert new.modelled_energy_j != old.modelled_energy_j
+    with KnowledgeGraph.of_workspace(place) as graph:
+        assert len(graph.query(ENERGY)) == 1
+        assert validate(graph) == ()
 
 
 def test_a_stream_that_stops_is_marked_and_its_last_state_kept(

@@ -9,7 +9,7 @@ from irtwin.errors import InputError
 from irtwin.live import live_run
 from irtwin.live.live_run import Tables, Values
 from irtwin.providers import live_energy
-from irtwin.providers.live_energy import LiveEnergy
+from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import DamagedJournal, Header, Rows, left_behind, read_journal
 from irtwin.storage.rows import values
@@ -25,17 +25,17 @@ def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announ
     after a crash. Where its twin's file is gone, the run is kept without, and that is announced.
     """
     tables, series = live_run.closed_rows(header, samples, counts)
+    twin = _twin(place, header, announce)
+    if twin is None:  # what was measured depends on no twin: it is part of the watching
+        tables = live_run.together(tables, _measured(header, samples))
     with place.reading() as session:
         kept = session.get(Run, header.run_id) is not None
         known = session.get(RunEnergy, header.run_id) is not None
     if not kept:  # else a crash came right here
         run, activity, made = live_run.records(tables)
         place.keep_live_run(run, series, activity, made)
-    if not known:
-        try:
-            tables = live_run.together(tables, _keep_energy(place, header, tables["activity"][0]))
-        except InputError as error:
-            announce(f"{header.run_id}: kept without its energy: {error}")
+    if twin is not None and not known:
+        tables = live_run.together(tables, _keep_energy(place, header, tables["activity"][0]))
     return tables
 
 
@@ -62,6 +62,8 @@ def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[Path, Header
 def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float | None = None) -> Tables:
     """Return the rows of a run's energy with their activity, which was from `began` on, s since 1970."""
     activity_id = live_run.activities(header.run_id)[1]
+    if energy.known is None:
+        return energy.tables(live_run.activities(header.run_id)[0])
     made = energy.tables(activity_id)
     if not made:
         return {}
@@ -72,6 +74,20 @@ def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float
         "activity_use": [{"activity_id": activity_id, "entity": entity} for entity in uses],
         **made,
     }
+
+
+def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | None:
+    try:
+        return live_energy.known_twin(place, header.robot_id)
+    except InputError as error:
+        announce(f"{header.run_id}: kept without what its twin says: {error}")
+        return None
+
+
+def _measured(header: Header, samples: Rows) -> Tables:
+    energy = LiveEnergy(header.run_id, header.robot_id, live_run.joints_of(header.columns), None)
+    energy.feed(dict(zip(header.columns, samples.T, strict=True)), last=True)
+    return energy_tables(energy, header, float(samples[0, 0]))
 
 
 def _keep_energy(place: Workspace, header: Header, watched: Values) -> Tables:

@@ -18,9 +18,14 @@ from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.storage.journal import Header, Rows
-from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunState
+from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunEnergy, RunState
 
-_MADE: dict[str, type[Base]] = {"run_state": RunState, "joint_state": JointState, "live_state": LiveState}
+_MADE: dict[str, type[Base]] = {
+    "run_state": RunState,
+    "joint_state": JointState,
+    "live_state": LiveState,
+    "run_energy": RunEnergy,
+}
 Values = dict[str, Any]
 Tables = dict[str, list[Values]]  # table -> rows, by column
 _COM = tuple(f"payload_com_{axis}_m" for axis in "xyz")
@@ -41,6 +46,12 @@ class Newest:
 def columns(joints: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of a journal."""
     return ("time", *(column for channel in STREAMED.values() for column in channel.columns(joints)))
+
+
+def joints_of(columns: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the joints, base to flange, by the columns of a journal."""
+    prefix = f"{CHANNELS['q'].prefix}_"
+    return tuple(name.removeprefix(prefix) for name in columns if name.startswith(prefix))
 
 
 def journal_rows(states: Sequence[State]) -> Rows:
@@ -90,8 +101,7 @@ def rows(
 
 def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa.Table]:
     """Return the rows of a run that is over, and its series: a channel that was never said is left out."""
-    prefix = f"{CHANNELS['q'].prefix}_"
-    joints = [name.removeprefix(prefix) for name in header.columns if name.startswith(prefix)]
+    joints = joints_of(header.columns)
     columns = dict(zip(header.columns, samples.T, strict=True))
     signals = from_columns(columns, joints)
     time, began = signals.time, float(signals.time[0])
@@ -140,7 +150,7 @@ def together(*parts: Tables) -> Tables:
 
 def records(tables: Tables) -> tuple[Run, Activity, list[Base]]:
     """Return the rows as the database takes them: the run, the activity that watched it, and what that made."""
-    made = [kind(**values) for name, kind in _MADE.items() for values in tables[name]]
+    made = [kind(**values) for name, kind in _MADE.items() for values in tables.get(name, ())]
     return Run(**tables["run"][0]), Activity(**tables["activity"][0]), made
 
 
