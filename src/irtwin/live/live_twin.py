@@ -23,6 +23,7 @@ from sqlalchemy import select
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live import live_run
+from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State
 from irtwin.live.kept_run import energy_tables, keep, left_by_a_crash
 from irtwin.live.shown import ShownRuns
@@ -37,6 +38,7 @@ BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
 AHEAD = 3600.0  # s by which a state's time may be ahead of the clock: clocks differ, years do not
 SHOWN_EVERY = 1.0  # s between two energies of a run in the graph
+FLUSH = 1.0  # s between two flushes of the graph: readers replay its log, of 60 kB a state
 MOST_WAITING = 200_000  # samples held for storage; beyond, the source waits
 
 
@@ -48,10 +50,14 @@ class LiveTwin:
     """
 
     def __init__(
-        self, place: Workspace, graph: KnowledgeGraph, announce: Callable[[str], None] = lambda line: None
+        self,
+        place: Workspace,
+        graph: KnowledgeGraph,
+        announce: Callable[[str], None] = lambda line: None,
+        broadcast: Broadcast | None = None,
     ) -> None:
-        """Begin to watch, after the runs that a crash left were put in order."""
-        self._place, self._announce = place, announce
+        """Begin to watch, after the runs that a crash left were put in order; `broadcast` is told of each state."""
+        self._place, self._announce, self._broadcast = place, announce, broadcast
         self._folder = place.folder / LIVE
         self._shown = ShownRuns(place, graph)
         self._twins: dict[str, KnownTwin | None] = {}
@@ -127,6 +133,8 @@ class LiveTwin:
         if run.health.stale_since is not None:
             self._announce(f"{self.names[state.robot_id]}: the stream flows again")
         run.take(state)
+        if self._broadcast is not None:
+            self._broadcast.state(state)
         self._waiting += 1
         if run.due:
             run.superseded += 1
@@ -162,6 +170,10 @@ class LiveTwin:
         for thread in self._threads:
             thread.join()
         self.check()
+
+    def stored_until(self, robot_id: str) -> float:
+        """Return the time from which on a robot has no stored run, s since 1970; 0 where it has none at all."""
+        return self._times.end(robot_id)
 
     def check(self) -> None:
         """Raise what ended the background work, if something did."""
@@ -230,7 +242,9 @@ class LiveTwin:
                 self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; the last good state is kept")
                 self._make_due(run)
         if states:
-            run.work_out(states, self._twin_of(robot_id))
+            stretches = run.work_out(states, self._twin_of(robot_id))
+            if self._broadcast is not None:
+                self._broadcast.stretches(robot_id, stretches)
         now = time.monotonic()
         if run.energy is not None and now - run.worked_at > SHOWN_EVERY:
             tables = energy_tables(run.energy, run.header, run.began)
@@ -281,12 +295,15 @@ class LiveTwin:
     def _close_runs(self) -> None:
         while True:
             with self._over:
-                while not self._ended:
+                if not self._ended:
                     if self._failure is not None or (self._stop.is_set() and not (self._runs or self._left)):
                         return
-                    self._over.wait(1.0)
+                    self._over.wait(FLUSH)
                 ended = list(self._ended)
                 self._ended.clear()
+            if not ended:
+                self._shown.flush()
+                continue
             for run in ended:
                 with self._showing:
                     run.over = True

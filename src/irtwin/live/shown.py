@@ -31,12 +31,20 @@ class ShownRuns:
         self.mapper = RowMapper(place.engine, self._documents)
         self._rules = read_rules(Path(resources.folder("rules")) / "live_rules.ttl")
         self._beside: set[Triple] | None = None
+        self._changed = False  # since the last flush
+
+    def flush(self) -> None:
+        """Make what was shown quick to open, if something was."""
+        if self._changed:
+            self._changed = False
+            self._graph.flush()
 
     def show(self, run_id: str, shown: set[Quad] | None, quads: set[Quad]) -> None:
         """Bring the graph from what it shows of a run, None where that is unknown, to the quads."""
         if shown is None:
             shown = self._quads_of(run_id)
         self._graph.change(shown - quads, quads - shown)
+        self._changed = True
 
     def mapped(self, tables: Tables) -> set[Quad]:
         """Return the quads of rows, and of the alarms that follow from them."""
