@@ -169,8 +169,8 @@ def _run(
     }  # fmt: skip
     for (effect, joint), value in ledger.items():
         yield "energy_share", {
-            "twin_id": twin_id, "run_id": run_id, "effect": effect, "joint": joint, "robot_id": robot_id,
-            "energy_j": value, "activity_id": energy,
+            "twin_id": twin_id, "run_id": run_id, "effect": effect, "place": joint or "robot", "joint": joint or None,
+            "robot_id": robot_id, "energy_j": value, "activity_id": energy,
         }  # fmt: skip
     for joint in JOINTS:
         yield "joint_energy", {

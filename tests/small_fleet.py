@@ -214,7 +214,8 @@ def _energies() -> Iterator[Base]:
         entries = [entry.split() for entry in f"standby_power - {standby}, {LEDGER[run_id]}".split(", ")]
         for effect, joint, joules in entries:
             yield schema.EnergyShare(
-                twin_id=f"{robot}.t1", run_id=run_id, effect=effect, joint=joint.replace("-", ""), robot_id=robot,
+                twin_id=f"{robot}.t1", run_id=run_id, effect=effect, robot_id=robot,
+                place=joint.replace("-", "robot"), joint=None if joint == "-" else joint,
                 energy_j=float(joules), activity_id=made,
             )  # fmt: skip
         for joint in JOINTS[robot]:

@@ -14,7 +14,19 @@ from irtwin.resources import folder
 IRT = rdflib.Namespace("https://w3id.org/irtwin#")
 EFFECT = "https://w3id.org/irtwin/effect/"
 QUDT = rdflib.Namespace("http://qudt.org/schema/qudt/")
-MODULES = ["irtwin", "units", "robot", "structure", "energy", "effects", "gap", "providers", "totals", "alignment"]
+MODULES = [
+    "irtwin",
+    "units",
+    "robot",
+    "structure",
+    "energy",
+    "effects",
+    "gap",
+    "providers",
+    "totals",
+    "live",
+    "alignment",
+]
 KINDS = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.AnnotationProperty, OWL.NamedIndividual]
 SHARED = Path(__file__).parents[2] / "../shared"
 

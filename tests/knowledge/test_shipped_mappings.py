@@ -105,8 +105,8 @@ def twin_parts() -> list[Base]:
 def ledger() -> list[Base]:
     share = {"twin_id": TWIN, "run_id": WORK, "robot_id": rows.ROBOT}
     return [
-        EnergyShare(**share, effect="coulomb_friction", joint="joint_a1", energy_j=5.0),
-        EnergyShare(**share, effect="standby_power", joint="", energy_j=80.0),
+        EnergyShare(**share, effect="coulomb_friction", place="joint_a1", joint="joint_a1", energy_j=5.0),
+        EnergyShare(**share, effect="standby_power", place="robot", energy_j=80.0),
         JointEnergy(run_id=WORK, **JOINT, energy_j=18.0),
     ]
 

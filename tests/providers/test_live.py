@@ -121,6 +121,11 @@ def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: Knowledg
     assert (run.sample_count, run.sample_rate_hz) == (500, pytest.approx(100.0))
     assert quads(graph) == mapped(place)
     assert shown <= quads(graph)  # what was shown last is what the run ended with
+    (taken,) = graph.query(
+        "SELECT ?e ?from { ?run irt:Energy_Consumption ?e ; irt:Energy_From ?from ; irt:State_Time ?at }"
+    )
+    assert taken["from"] == "measured"  # it has no twin
+    assert taken["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
     energy = graph.query(f"SELECT (series:integral(id:run\\/{run.run_id}, 'power', 0, 10) AS ?e) {{}}")
     assert energy[0]["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
     assert not list((place.folder / "live").iterdir())

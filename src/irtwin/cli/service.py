@@ -41,13 +41,37 @@ def _announce(address: str) -> None:
 @database_option
 @graph_option
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
-def live(workspace: Path, database: str | None, graph_url: str | None, port: int | None) -> None:
-    """Watch robots: store their samples and keep the graph up to date.
+@click.option("--replay", type=click.Path(path_type=Path, dir_okay=False), help="Play this log of a robot instead.")
+@click.option("--robot", metavar="NAME", help="Whose log it is.")
+@click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")
+def live(
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+    port: int | None,
+    replay: Path | None,
+    robot: str | None,
+    speed: float,
+) -> None:
+    """Watch robots: store their samples and keep the graph up to date, with power, energy, gap and alarms.
 
     Reads one JSON object per line from standard input. The fields are those of ROS' JointState: robot, time (s since
     1970), position, velocity, effort, and optionally temperature, power and name. Ctrl-C stops; every sample that was
-    read is stored.
+    read is stored. While it runs, `irtwin serve` shows the robots at /live.
     """
     from irtwin.live.watch import watch
 
-    watch(workspace, database=database, graph_url=graph_url, port=port, announce=say)
+    if replay is None and (robot is not None or speed != 1.0):
+        raise click.UsageError("--robot and --speed are for a log: name it by --replay.")
+    if replay is not None and port is not None:
+        raise click.UsageError("give --port or --replay, not both.")
+    watch(
+        workspace,
+        database=database,
+        graph_url=graph_url,
+        port=port,
+        replayed=replay,
+        robot=robot,
+        speed=speed,
+        announce=say,
+    )

@@ -4,8 +4,9 @@
  "temperature": [...], "power": 512.0}
 
 `robot` is its name, or its identifier; `time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must,
-the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg,
-counts where a run begins. The keys of values are those of the table of channels.
+the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg, and
+`payload_com`, [x, y, z] m in the frame of the flange, count where a run begins. The keys of values are those of the
+table of channels.
 """
 
 from __future__ import annotations
@@ -37,13 +38,15 @@ _LATEST = 253402300799.0  # s: the end of the year 9999
 class State:
     """A robot at one moment: `time` in s since 1970; `values` of each streamed channel, in the order of `STREAMED`.
 
-    A channel has a value for each joint, or one; NaN for what was not said. payload kg, None where it was not said.
+    A channel has a value for each joint, or one; NaN for what was not said. payload kg and its centre of mass,
+    m in the frame of the flange; None where it was not said.
     """
 
     robot_id: str
     time: float
     values: tuple[tuple[float, ...], ...]
     payload: float | None = None
+    payload_com: tuple[float, float, float] | None = None
 
     def of(self, field: str) -> tuple[float, ...]:
         """Return the values of a channel, by its field of `Signals`."""
@@ -89,7 +92,8 @@ class StateReader:
             if field in STREAMED and STREAMED[field].streamed not in said:
                 raise InputError(f"`{STREAMED[field].streamed}` is missing")
         payload = _number(said, "payload") if "payload" in said else None
-        return State(robot, time, tuple([_values(said, channel, order) for channel in STREAMED.values()]), payload)
+        values = tuple([_values(said, channel, order) for channel in STREAMED.values()])
+        return State(robot, time, values, payload, _centre(said) if "payload_com" in said else None)
 
     @property
     def _known(self) -> str:
@@ -173,6 +177,14 @@ def _number(said: Mapping[str, Any], name: str) -> float:
     if not _is_number(value, _GREATEST[name]):
         raise InputError(f"`{name}` is not a number within {_GREATEST[name]:g}")
     return float(value)
+
+
+def _centre(said: Mapping[str, Any]) -> tuple[float, float, float]:
+    centre = said["payload_com"]
+    if not isinstance(centre, list) or len(centre) != 3 or not all(_is_number(it, 100.0) for it in centre):
+        raise InputError("`payload_com` must have 3 numbers within 100: m in the frame of the flange")
+    x, y, z = map(float, centre)
+    return x, y, z
 
 
 def _is_number(value: Any, most: float) -> TypeGuard[int | float]:

@@ -18,11 +18,17 @@ from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.storage.journal import Header, Rows
-from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunState
+from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunEnergy, RunState
 
-_MADE: dict[str, type[Base]] = {"run_state": RunState, "joint_state": JointState, "live_state": LiveState}
+_MADE: dict[str, type[Base]] = {
+    "run_state": RunState,
+    "joint_state": JointState,
+    "live_state": LiveState,
+    "run_energy": RunEnergy,
+}
 Values = dict[str, Any]
 Tables = dict[str, list[Values]]  # table -> rows, by column
+_COM = tuple(f"payload_com_{axis}_m" for axis in "xyz")
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,12 @@ class Newest:
 def columns(joints: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of a journal."""
     return ("time", *(column for channel in STREAMED.values() for column in channel.columns(joints)))
+
+
+def joints_of(columns: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the joints, base to flange, by the columns of a journal."""
+    prefix = f"{CHANNELS['q'].prefix}_"
+    return tuple(name.removeprefix(prefix) for name in columns if name.startswith(prefix))
 
 
 def journal_rows(states: Sequence[State]) -> Rows:
@@ -64,30 +76,23 @@ def rows(
     header: Header, joints: Sequence[str], began: float, count: int, at: Newest, current_state: str, live: Values
 ) -> Tables:
     """Return the rows of a run: `began` and `at.time` in s since 1970, `live` what else its live_state says."""
-    activity_id = f"{LIVE}.{header.run_id}"
+    activity_id = activities(header.run_id)[0]
     run = {
         "run_id": header.run_id,
         "robot_id": header.robot_id,
         "name": header.run_id.removeprefix(f"{header.robot_id}."),
         "role": LIVE,
         "payload_kg": header.payload_kg,
+        **dict(zip(_COM, header.payload_com, strict=True)),
         "start_time": _moment(began),
         "start_time_from": "log",
         "run_time_s": at.time - began,
         "sample_count": count,
     }
-    activity = {
-        "activity_id": activity_id,
-        "robot_id": header.robot_id,
-        "provider": LIVE,
-        "subject": run_iri(header.run_id),
-        "started": _moment(began),
-        "software": f"irtwin {version('irtwin')}",
-    }
     made = {"run_id": header.run_id, "activity_id": activity_id}
     return {
         "run": [run],
-        "activity": [activity],
+        "activity": [activity(header, activity_id, LIVE, began)],
         "run_state": [{**made, "current_state": current_state}],
         "joint_state": [{**made, **joint} for joint in _joint_states(header.robot_id, joints, at)],
         "live_state": [{**made, "state_time": _moment(at.time), **live}],
@@ -96,8 +101,7 @@ def rows(
 
 def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa.Table]:
     """Return the rows of a run that is over, and its series: a channel that was never said is left out."""
-    prefix = f"{CHANNELS['q'].prefix}_"
-    joints = [name.removeprefix(prefix) for name in header.columns if name.startswith(prefix)]
+    joints = joints_of(header.columns)
     columns = dict(zip(header.columns, samples.T, strict=True))
     signals = from_columns(columns, joints)
     time, began = signals.time, float(signals.time[0])
@@ -111,16 +115,42 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
     tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
     length = at.time - began
     tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else 0.0}
-    tables["run"][0] |= {f"payload_com_{axis}_m": 0.0 for axis in "xyz"}
     tables["activity"][0] |= {"ended": _moment(at.time)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
     table = columns | {"time": time - began}
     return tables, pa.table({name: values for name, values in table.items() if not np.isnan(values).all()})
 
 
+def activities(run_id: str) -> tuple[str, str]:
+    """Return the ids of the two activities of a live run: who watched it, and who worked out its energy."""
+    return f"{LIVE}.{run_id}", f"energy.{run_id}"
+
+
+def activity(header: Header, activity_id: str, provider: str, began: float, ended: float | None = None) -> Values:
+    """Return the row of an activity on a run; times in s since 1970."""
+    row = {
+        "activity_id": activity_id,
+        "robot_id": header.robot_id,
+        "provider": provider,
+        "subject": run_iri(header.run_id),
+        "started": _moment(began),
+        "software": f"irtwin {version('irtwin')}",
+    }
+    return row if ended is None else row | {"ended": _moment(ended)}
+
+
+def together(*parts: Tables) -> Tables:
+    """Return the rows of several parts, table by table."""
+    tables: Tables = {}
+    for part in parts:
+        for name, some in part.items():
+            tables[name] = [*tables.get(name, ()), *some]
+    return tables
+
+
 def records(tables: Tables) -> tuple[Run, Activity, list[Base]]:
-    """Return the rows as the database takes them: the run, its activity, and what that made."""
-    made = [kind(**values) for name, kind in _MADE.items() for values in tables[name]]
+    """Return the rows as the database takes them: the run, the activity that watched it, and what that made."""
+    made = [kind(**values) for name, kind in _MADE.items() for values in tables.get(name, ())]
     return Run(**tables["run"][0]), Activity(**tables["activity"][0]), made
 
 

@@ -3,8 +3,8 @@
 A state goes two ways. All are written to the robot's journal, a batch every 0.1 s. The newest of each robot is mapped
 by the R2RML documents, and what changed goes into the graph in one transaction; where states come faster than the graph
 takes them, the newest wins and the others are counted. Where storage cannot keep up, the source waits, and that too is
-counted. A run ends when the watching does, after a minute without a state,
-or after an hour, and is then a run like any other.
+counted. Beside that, energy and gap are worked out from all samples, some four times a second, and shown once a second.
+A run ends when the watching does, after a minute without a state, or after an hour, and is then a run like any other.
 """
 
 from __future__ import annotations
@@ -15,28 +15,30 @@ from collections import deque
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Self, cast
+from typing import Self
 
-from pyoxigraph import NamedNode, Quad, QuerySolutions
+from pyoxigraph import Quad
 from sqlalchemy import select
 
-from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import RowMapper, refresh
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.live import live_run
+from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State
+from irtwin.live.kept_run import energy_tables, keep, left_by_a_crash
+from irtwin.live.shown import ShownRuns
 from irtwin.live.stored_times import StoredTimes
 from irtwin.live.watched_run import HOLE, WatchedRun
-from irtwin.providers.records import run_iri
+from irtwin.providers.live_energy import KnownTwin, known_twin
 from irtwin.storage.database import Workspace
-from irtwin.storage.journal import DamagedJournal, Header, Journal, left_behind, read_journal
-from irtwin.storage.schema import LIVE, Joint, Robot, Run
+from irtwin.storage.journal import Header, Journal, Rows, read_journal
+from irtwin.storage.schema import LIVE, Joint, Robot
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
 AHEAD = 3600.0  # s by which a state's time may be ahead of the clock: clocks differ, years do not
+SHOWN_EVERY = 1.0  # s between two energies of a run in the graph
+FLUSH = 1.0  # s between two flushes of the graph: readers replay its log, of 60 kB a state
 MOST_WAITING = 200_000  # samples held for storage; beyond, the source waits
 
 
@@ -48,13 +50,17 @@ class LiveTwin:
     """
 
     def __init__(
-        self, place: Workspace, graph: KnowledgeGraph, announce: Callable[[str], None] = lambda line: None
+        self,
+        place: Workspace,
+        graph: KnowledgeGraph,
+        announce: Callable[[str], None] = lambda line: None,
+        broadcast: Broadcast | None = None,
     ) -> None:
-        """Begin to watch, after the runs that a crash left were put in order."""
-        self._place, self._graph, self._announce = place, graph, announce
+        """Begin to watch, after the runs that a crash left were put in order; `broadcast` is told of each state."""
+        self._place, self._announce, self._broadcast = place, announce, broadcast
         self._folder = place.folder / LIVE
-        self._documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-        self._mapper = RowMapper(place.engine, self._documents)
+        self._shown = ShownRuns(place, graph)
+        self._twins: dict[str, KnownTwin | None] = {}
         self.joints, self.names = _joints(place), _names(place)
         self.stored = self.superseded = 0
         self.waited = 0.0
@@ -71,9 +77,10 @@ class LiveTwin:
         self._over = threading.Condition(self._lock)
         self._showing = threading.Lock()  # of the graph's view of runs
         self._times = StoredTimes(place)
-        self._recover()
+        for path, header, samples in left_by_a_crash(self._folder, announce):
+            self._close(path, header, samples, {}, None)
         self._refresh()
-        work = (self._show_states, self._store_samples, self._close_runs)
+        work = (self._show_states, self._store_samples, self._work_out, self._close_runs)
         self._threads = [threading.Thread(target=self._guarded, args=(task,), daemon=True) for task in work]
         for thread in self._threads:
             thread.start()
@@ -117,16 +124,25 @@ class LiveTwin:
                 return
             else:
                 run.doubted = state
+                if run.newest is not None:
+                    run.health.leaps(state.time - run.newest.time)
             if doubted is not None:
                 raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours; not stored")
 
     def _take(self, run: WatchedRun, state: State) -> None:
+        if run.health.stale_since is not None:
+            self._announce(f"{self.names[state.robot_id]}: the stream flows again")
         run.take(state)
+        if self._broadcast is not None:
+            self._broadcast.state(state)
         self._waiting += 1
         if run.due:
             run.superseded += 1
             self.superseded += 1
-        else:
+        self._make_due(run)
+
+    def _make_due(self, run: WatchedRun) -> None:
+        if not run.due:
             run.due = True
             self._due.append(run)
             self._news.notify()
@@ -155,6 +171,10 @@ class LiveTwin:
             thread.join()
         self.check()
 
+    def stored_until(self, robot_id: str) -> float:
+        """Return the time from which on a robot has no stored run, s since 1970; 0 where it has none at all."""
+        return self._times.end(robot_id)
+
     def check(self) -> None:
         """Raise what ended the background work, if something did."""
         if self._failure is not None:
@@ -164,7 +184,9 @@ class LiveTwin:
         robot_id, joints = state.robot_id, self.joints[state.robot_id]
         began = datetime.fromtimestamp(state.time, UTC)
         run_id = f"{robot_id}.{LIVE}_{began:%Y%m%dT%H%M%S%f}"
-        header = Header(run_id, robot_id, state.payload or 0.0, live_run.columns(joints))
+        header = Header(
+            run_id, robot_id, state.payload or 0.0, live_run.columns(joints), state.payload_com or (0.0, 0.0, 0.0)
+        )
         try:
             journal = Journal(self._folder, header)
         except FileExistsError:
@@ -194,26 +216,50 @@ class LiveTwin:
                 tables = run.tables(self.waited)
             with self._showing:
                 if not run.over:
-                    quads = run.mapped(tables, self._mapper)
-                    self._show(run.header.run_id, run.shown, quads)
+                    quads = run.mapped(tables, self._shown)
+                    self._shown.show(run.header.run_id, run.shown, quads)
                     run.shown = quads
+                    for line in run.alarms.news(quads):
+                        self._announce(f"{self.names[run.header.robot_id]}: {line}")
 
-    def _show(self, run_id: str, shown: set[Quad] | None, quads: set[Quad]) -> None:
-        """Bring the graph from what it shows of a run, None where that is unknown, to the quads."""
-        if shown is None:
-            shown = self._quads_of(run_id)
-        self._graph.change(shown - quads, quads - shown)
+    # Energy and gap
 
-    def _quads_of(self, run_id: str) -> set[Quad]:
-        """Return what the graph says of a live run."""
-        run, activity = NamedNode(run_iri(run_id)), NamedNode(f"{GRAPH_ACTIVITY}{LIVE}.{run_id}")
-        found = self._graph.answer(
-            f"""SELECT ?g ?s ?p ?o {{
-              {{ BIND({activity} AS ?g) GRAPH {activity} {{ ?s ?p ?o }} }} UNION
-              {{ GRAPH ?g {{ {run} ?p ?o }} BIND({run} AS ?s)
-                 FILTER(STRSTARTS(STR(?g), "{GRAPH_SOURCE}") && ?p != irt:has_Series) }} }}"""
-        )
-        return {Quad(row["s"], row["p"], row["o"], row["g"]) for row in cast(QuerySolutions, found)}
+    def _work_out(self) -> None:
+        pause = BATCH
+        while not self._stop.wait(pause):
+            began = time.monotonic()
+            with self._lock:
+                runs = list(self._runs.values())
+            for run in runs:
+                self._look_at(run)
+            pause = max(BATCH, time.monotonic() - began)  # at most half of a core: samples wait, and go faster together
+
+    def _look_at(self, run: WatchedRun) -> None:
+        robot_id = run.header.robot_id
+        with self._lock:
+            states, run.unworked = run.unworked, []
+            if run.health.look():
+                self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; the last good state is kept")
+                self._make_due(run)
+        if states:
+            stretches = run.work_out(states, self._twin_of(robot_id))
+            if self._broadcast is not None:
+                self._broadcast.stretches(robot_id, stretches)
+        now = time.monotonic()
+        if run.energy is not None and now - run.worked_at > SHOWN_EVERY:
+            tables = energy_tables(run.energy, run.header, run.began)
+            with self._lock:
+                run.worked_at, run.energy_tables = now, tables
+                self._make_due(run)
+
+    def _twin_of(self, robot_id: str) -> KnownTwin | None:
+        if robot_id not in self._twins:
+            try:
+                self._twins[robot_id] = known_twin(self._place, robot_id)
+            except InputError as error:
+                self._announce(f"{self.names[robot_id]}: watched without its twin: {error}")
+                self._twins[robot_id] = None
+        return self._twins[robot_id]
 
     # To storage
 
@@ -249,53 +295,37 @@ class LiveTwin:
     def _close_runs(self) -> None:
         while True:
             with self._over:
-                while not self._ended:
+                if not self._ended:
                     if self._failure is not None or (self._stop.is_set() and not (self._runs or self._left)):
                         return
-                    self._over.wait(1.0)
+                    self._over.wait(FLUSH)
                 ended = list(self._ended)
                 self._ended.clear()
+            if not ended:
+                self._shown.flush()
+                continue
             for run in ended:
                 with self._showing:
                     run.over = True
                 run.journal.close()
-                self._close(run.journal.path, run.counts(self.waited), run.shown)
+                counts = {"superseded_states": run.superseded, "waited_s": self.waited}
+                self._close(run.journal.path, *read_journal(run.journal.path), counts, run.shown)
             self._refresh()
 
-    def _close(self, path: Path, counts: live_run.Values, shown: set[Quad] | None) -> None:
+    def _close(
+        self, path: Path, header: Header, samples: Rows, counts: live_run.Values, shown: set[Quad] | None
+    ) -> None:
         """Make a run of a journal, in the database and in the graph, and drop the journal."""
-        header, samples = read_journal(path)
         if len(samples):
-            tables, series = live_run.closed_rows(header, samples, counts)
-            with self._place.reading() as session:
-                kept = session.get(Run, header.run_id) is not None
-            if not kept:  # else the crash came right here
-                run, activity, made = live_run.records(tables)
-                self._place.keep_live_run(run, series, activity, made)
-                with self._lock:
-                    self._times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
-            self._show(header.run_id, shown, {quad for it in tables.items() for quad in self._mapper.quads(*it)})
+            with self._lock:
+                self._times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
+            tables = keep(self._place, header, samples, {**counts, "stream_state": "ended"}, self._announce)
+            self._shown.show(header.run_id, shown, self._shown.mapped(tables))
         path.unlink()
-
-    def _recover(self) -> None:
-        for path in left_behind(self._folder):
-            try:
-                header, samples = read_journal(path)
-            except DamagedJournal as error:
-                aside = path.with_suffix(".damaged")
-                path.rename(aside)
-                self._announce(f"{error}; its samples are not in the graph; the file is kept as {aside}")
-                continue
-            except ValueError:
-                self._announce(f"{path}: a crash ended this journal before its first sample; it is deleted")
-                path.unlink()
-                continue
-            self._announce(f"{header.run_id}: a crash ended this run; its {len(samples)} samples on disk are kept")
-            self._close(path, {}, None)
 
     def _refresh(self) -> None:
         """Bring the graph up to date with the database; runs that last look again what it shows of them."""
-        refresh(self._graph, self._place.engine, self._documents, self._place.mapped_rows)
+        self._shown.refresh()
         with self._showing, self._lock:
             for run in [*self._left, *self._runs.values()]:
                 run.shown = None

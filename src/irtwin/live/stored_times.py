@@ -30,6 +30,10 @@ class StoredTimes:
         """Note one more run."""
         insort(self._runs[robot_id], (start - _STEP, end + _STEP, run_id))
 
+    def end(self, robot_id: str) -> float:
+        """Return the end of the last run of a robot; 0 where there is none."""
+        return max((end for _, end, _ in self._runs[robot_id]), default=0.0)
+
     def run_at(self, robot_id: str, time: float) -> str | None:
         """Return the run that covers a time; None where none does."""
         runs = self._runs[robot_id]

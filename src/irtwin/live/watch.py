@@ -10,11 +10,16 @@ from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from pathlib import Path
 
+from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.live.joint_stream import StateReader, feed, lines_of, listening
-from irtwin.live.live_twin import LiveTwin
+from irtwin.live.broadcast import Broadcast
+from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
+from irtwin.live.live_twin import AHEAD, LiveTwin
+from irtwin.live.replay import Replay
+from irtwin.providers.records import find_robot, load_robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
+from irtwin.storage.schema import LIVE
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 _MOST_REASONS = 20  # said of refused lines
@@ -26,11 +31,15 @@ def watch(
     database: str | None = None,
     graph_url: str | None = None,
     port: int | None = None,
+    replayed: Path | None = None,
+    robot: str | None = None,
+    speed: float = 1.0,
     announce: Callable[[str], None] = lambda line: None,
 ) -> None:
     """Watch a workspace's robots until the stream on standard input ends, or SIGINT or SIGTERM comes.
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
+    With `replayed`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
     """
     sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
@@ -47,8 +56,10 @@ def watch(
         told_when_full(workspace),
         Workspace.existing(workspace, database) as place,
         KnowledgeGraph.of_workspace(place, graph_url) as graph,
-        LiveTwin(place, graph, announce) as twin,
+        Broadcast(place.folder / LIVE) as broadcast,
+        LiveTwin(place, graph, announce, broadcast) as twin,
     ):
+        replay = None if replayed is None else _replay(place, replayed, robot, speed)
         reader = StateReader(twin.joints, twin.names)
 
         def take(lines: Iterable[bytes]) -> None:
@@ -58,11 +69,35 @@ def watch(
             take(lines_of(sys.stdin.buffer))
             done.set()
 
-        if port is None:
-            threading.Thread(target=take_standard_input, daemon=True).start()
-        with nullcontext() if port is None else listening(port, take) as actual:
-            announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
-            while not done.wait(0.2):
-                twin.check()
+        if replay is not None:
+            announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
+            after = twin.stored_until(replay.robot_id)
+            replay.play(_refusing(twin.receive, refuse), done, after=after, ahead=AHEAD)
+        else:
+            if port is None:
+                threading.Thread(target=take_standard_input, daemon=True).start()
+            with nullcontext() if port is None else listening(port, take) as actual:
+                announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
+                while not done.wait(0.2):
+                    twin.check()
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
+
+
+def _replay(place: Workspace, log: Path, robot: str | None, speed: float) -> Replay:
+    if robot is None:
+        raise InputError(f"{log}: whose log is it? Name its robot by --robot")
+    robot_id = find_robot(place, robot)
+    return Replay(log, load_robot(place, robot_id), robot_id, speed)
+
+
+def _refusing(take: Callable[[State], None], refuse: Callable[[str], None]) -> Callable[[State], None]:
+    """Return what takes a state, and refuses one that cannot be taken, by its reason."""
+
+    def take_or_refuse(state: State) -> None:
+        try:
+            take(state)
+        except InputError as error:
+            refuse(str(error))
+
+    return take_or_refuse

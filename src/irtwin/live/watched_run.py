@@ -9,11 +9,15 @@ from dataclasses import dataclass, field
 from pyoxigraph import Quad
 
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import RowMapper
 from irtwin.live import live_run
 from irtwin.live.joint_stream import State
+from irtwin.live.shown import AlarmNews, ShownRuns
+from irtwin.live.stream_health import StreamHealth
+from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.journal import Header, Journal
+from irtwin.twin.so_far import Stretch
 
+LEAST = 0.2  # s of samples that are worked out at once
 HOLE = 60.0  # s without a state: the run is over, and the next begins
 
 
@@ -37,6 +41,12 @@ class WatchedRun:
     due: bool = False  # the graph lacks the newest state
     over: bool = False
     waiting: list[State] = field(default_factory=list)
+    unworked: list[State] = field(default_factory=list)
+    energy: LiveEnergy | None = None
+    energy_tables: live_run.Tables = field(default_factory=dict)
+    worked_at: float = -math.inf  # by the monotonic clock: when the energy was shown last
+    health: StreamHealth = field(default_factory=StreamHealth)
+    alarms: AlarmNews = field(default_factory=AlarmNews)
     shown: set[Quad] | None = field(default_factory=set)
     doubted: State | None = None
     _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
@@ -51,6 +61,7 @@ class WatchedRun:
         if self.newest is None:
             return True
         if -HOLE < state.time - self.newest.time <= 0:
+            self.health.late(state.time, self.newest.time)
             raise InputError(f"{state.robot_id}: a state that is not later than the one before; not stored")
         return 0 < state.time - self.newest.time <= HOLE
 
@@ -67,6 +78,8 @@ class WatchedRun:
         self.newest = state
         self.count += 1
         self.waiting.append(state)
+        self.unworked.append(state)
+        self.health.good()
 
     def tables(self, waited: float) -> live_run.Tables:
         """Return the rows of the run as it is now."""
@@ -76,15 +89,27 @@ class WatchedRun:
             now.time, now.of("q"), self.speed, self.acceleration, now.of("torque"), now.of("temperature")
         )
         current = "moving" if live_run.moving(self.speed, self.fastest) else "standstill"
-        return live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
+        tables = live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
+        return live_run.together(tables, self.energy_tables)
 
-    def mapped(self, tables: live_run.Tables, mapper: RowMapper) -> set[Quad]:
-        """Return the quads of the rows; those of tables that are as before are not made again."""
+    def mapped(self, tables: live_run.Tables, shown: ShownRuns) -> set[Quad]:
+        """Return the quads of the rows and their alarms; those of tables that are as before are not made again."""
         for table, rows in tables.items():
             if table not in self._mapped or self._mapped[table][0] != rows:
-                self._mapped[table] = rows, set(mapper.quads(table, rows))
+                quads = set(shown.mapper.quads(table, rows))
+                if table == "gap_excursion":
+                    quads |= shown.alarms(quads) if rows else set()
+                self._mapped[table] = rows, quads
         return set().union(*(quads for _, quads in self._mapped.values()))
+
+    def work_out(self, states: Sequence[State], known: KnownTwin | None) -> list[Stretch]:
+        """Work out energy and gap from the next states, as far as they go."""
+        if self.energy is None:
+            of = (self.header.run_id, self.header.robot_id, tuple(self.joints), known)
+            self.energy = LiveEnergy(*of, self.header.payload_kg, self.header.payload_com)
+        rows = live_run.journal_rows(states)
+        return self.energy.feed(dict(zip(self.header.columns, rows.T, strict=True)), least=LEAST)
 
     def counts(self, waited: float) -> live_run.Values:
         """Return what the graph says of how well it kept up."""
-        return {"superseded_states": self.superseded, "waited_s": waited}
+        return {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}

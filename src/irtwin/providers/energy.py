@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 from sqlalchemy import select
 
 from irtwin.identification.validation import APART
+from irtwin.providers import live_energy
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
 from irtwin.providers.records import run_iri, twin_iri
@@ -24,9 +25,13 @@ from irtwin.twin.validate import validate
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
-    """Make a run's energy, its ledger, and its modelled series."""
+    """Make a run's energy, its ledger, and its modelled series; of a live run its gap as well."""
     with workspace.reading() as session:
-        robot_id = session.get_one(schema.Run, run_id).robot_id
+        run = session.get_one(schema.Run, run_id)
+    if run.role == schema.LIVE:
+        return live_energy.provide(workspace, run_id)
+    robot_id = run.robot_id
+    with workspace.reading() as session:
         row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one()
         role = session.get_one(schema.TwinRun, (row.twin_id, run_id))
     document = workspace.read_document(row.file, row.sha256).decode()
@@ -43,7 +48,8 @@ def provide(workspace: Workspace, run_id: str) -> Made:
                     twin_id=row.twin_id,
                     run_id=run_id,
                     effect=entry.effect,
-                    joint=entry.joint or "",
+                    place=entry.joint or "robot",
+                    joint=entry.joint,
                     robot_id=robot_id,
                     energy_j=entry.energy,
                 )

@@ -129,8 +129,7 @@ def in_order(declared: Sequence[Declaration]) -> list[Declaration]:
 def lacking(graph: KnowledgeGraph, declaration: Declaration) -> list[str]:
     """Return the IRIs of individuals that have what the provider requires and nothing of what it populates.
 
-    A requirement may be met by the individual itself, by its robot, or by a run of it. What is known of a live run
-    comes from who watched it.
+    A requirement may be met by the individual itself, by its robot, or by a run of it.
     """
     required = "".join(
         f"FILTER EXISTS {{ ?subject (irt:run_of|irt:has_RunProcess)? / <{iri}> ?value{place} }}\n"
@@ -142,7 +141,6 @@ def lacking(graph: KnowledgeGraph, declaration: Declaration) -> list[str]:
         SELECT ?subject WHERE {{
           ?subject a <{declaration.applies_to}> .
           {required}
-          FILTER NOT EXISTS {{ ?subject irt:Run_Role "live" }}
           FILTER NOT EXISTS {{ VALUES ?property {{ {populated} }} ?subject ?property ?there }}
         }} ORDER BY ?subject"""
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import gzip
 import json
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 from starlette.requests import Request
@@ -13,24 +14,35 @@ from starlette.responses import Response
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve.protocol import Refusal
+from irtwin.virtual.robot_data import asset as scene_asset
+from irtwin.virtual.robot_data import viewer_script
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-_FOLDER = Path(__file__).parent / "assets"
+FOLDER = Path(__file__).parent / "assets"
 _TYPES = {
+    "live.css": "text/css",
+    "live.js": "text/javascript",
+    "live_list.js": "text/javascript",
+    "meshcat.js": "text/javascript",
     "page.css": "text/css",
+    "robot.js": "text/javascript",
     "page.js": "text/javascript",
     "yasgui.min.css": "text/css",
     "yasgui.min.js": "text/javascript",
+}
+_OF_THE_SCENE: dict[str, Callable[[], str]] = {
+    "meshcat.js": viewer_script,
+    "robot.js": partial(scene_asset, "robot.js"),
 }
 
 
 def response() -> Response:
     """Return the page."""
     headers = {"Content-Security-Policy": POLICY, "Vary": "Accept"}
-    return Response((_FOLDER / "page.html").read_bytes(), media_type="text/html", headers=headers)
+    return Response((FOLDER / "page.html").read_bytes(), media_type="text/html", headers=headers)
 
 
 def asset(request: Request) -> Response:
@@ -53,8 +65,10 @@ def questions(request: Request) -> Response:
 
 @cache
 def _packed(name: str) -> bytes:
-    packed = _FOLDER / f"{name}.gz"
-    return packed.read_bytes() if packed.exists() else gzip.compress((_FOLDER / name).read_bytes(), mtime=0)
+    if name in _OF_THE_SCENE:
+        return gzip.compress(_OF_THE_SCENE[name]().encode("utf-8"), mtime=0)
+    packed = FOLDER / f"{name}.gz"
+    return packed.read_bytes() if packed.exists() else gzip.compress((FOLDER / name).read_bytes(), mtime=0)
 
 
 def _read(name: str) -> bytes:

@@ -23,6 +23,7 @@ from irtwin.serve import ontology, page
 from irtwin.serve.connections import Connection
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
+from irtwin.serve.live_page import LivePages
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.updates import Updates
@@ -85,6 +86,7 @@ def application(
     """Return the ASGI application; its workers live between its start-up and its shutdown."""
     pool = Pool(graph, 1 + max(2, os.cpu_count() or 2), limits)
     updates = Updates(graph, token, limits)
+    live = LivePages(graph)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -93,6 +95,7 @@ def application(
             opened()
             yield
         finally:
+            live.samples.close()
             await pool.close()
 
     return Starlette(
@@ -100,6 +103,7 @@ def application(
             Route("/", lambda request: page.response(), methods=["GET"]),
             Route("/sparql", Endpoint(pool, updates, limits)),
             Route("/questions.json", page.questions, methods=["GET"]),
+            *live.routes(),
             Route("/assets/{name}", page.asset, methods=["GET"]),
             Route("/irtwin{rest:path}", ontology.module, methods=["GET"]),
         ],

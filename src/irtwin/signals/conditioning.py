@@ -26,12 +26,13 @@ _AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this 
 STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
-def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
+def condition(run: Run, robot: Robot, cutoff: float | None = None, time: np.ndarray | None = None) -> Motion:
     """Return the run's signals at an even rate (the sampling's), low-pass filtered without phase shift.
 
     Speeds and accelerations are derivatives of the filtered positions; speeds that were logged are taken instead
-    where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`. Raises InputError on a cutoff
-    that is no positive number, or on a run of fewer than 20 samples or with a hole in time.
+    where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`. `time`: even times, (N,) s within
+    the run, to be returned instead of all of it. Raises InputError on a cutoff that is no positive number, or on a run
+    of fewer than 20 samples or, unless `time` is given, with a hole in time.
     """
     signals = run.signals
     if len(signals.time) < FEWEST:
@@ -40,7 +41,7 @@ def condition(run: Run, robot: Robot, cutoff: float | None = None) -> Motion:
         cutoff = choose_cutoff([run])
     if not (np.isfinite(cutoff) and cutoff > 0):
         raise InputError(f"a cutoff of {cutoff:g} Hz filters everything away; give a positive frequency")
-    time = _even_time(run)
+    time = _even_time(run) if time is None else time
     rate = 1 / (time[1] - time[0])
 
     def clean(values: np.ndarray, order: int = 1) -> np.ndarray:

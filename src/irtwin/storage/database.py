@@ -16,6 +16,7 @@ from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
+from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.files import inside
 from irtwin.storage.rows import (
     drop_activities,

@@ -29,6 +29,7 @@ class Header:
     robot_id: str
     payload_kg: float
     columns: tuple[str, ...]
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, in the flange's frame
 
 
 class DamagedJournal(ValueError):
@@ -79,10 +80,17 @@ def read_journal(path: Path) -> tuple[Header, Rows]:
 
 def _header(said: Any) -> Header:
     header = Header(**{**said, "columns": tuple(said["columns"])})
+    com = tuple(map(float, header.payload_com))
     texts = (header.run_id, header.robot_id, *header.columns)
-    if not all(isinstance(text, str) for text in texts) or header.columns[:1] != ("time",):
+    if not all(isinstance(text, str) for text in texts) or header.columns[:1] != ("time",) or len(com) != 3:
         raise TypeError
-    return Header(header.run_id, header.robot_id, float(header.payload_kg), header.columns)
+    return Header(
+        header.run_id,
+        header.robot_id,
+        float(header.payload_kg),
+        header.columns,
+        com,
+    )
 
 
 def of_robot(folder: Path, robot_id: str) -> list[Path]:

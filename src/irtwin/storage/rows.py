@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, RowMapping, Select, Table, delete, insert, select
 from sqlalchemy.orm import Session
 
-from irtwin.storage.schema import LIVE, Activity, Base, Robot, Run, Series, in_utc
+from irtwin.storage.schema import LIVE, Activity, Base, Robot, Run, RunEnergy, Series, in_utc
 
 Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 
@@ -99,7 +99,10 @@ def files_of(rows: Rows) -> dict[str, str]:
 
 
 def drop_data_set(session: Session, robot_id: str) -> None:
-    """Drop what a data set said and what was derived from it; the robot stays, and so do its live runs."""
+    """Drop what a data set said and what was derived from it; the robot stays, and so do its live runs.
+
+    What a twin says of live runs goes with the twin.
+    """
     made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
     drop_activities(session, set(session.scalars(made)))
     runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
@@ -155,7 +158,10 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
 def _data_set(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
     """Yield each table with the query of a robot's rows in it, without its live runs'."""
     runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
-    made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
+    of_live = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.role == LIVE)
+    made = select(Activity.activity_id).where(
+        Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(of_live)
+    )
     for table in Base.metadata.sorted_tables:
         rows = select(table)
         if table.name == Run.__tablename__ or table.name == Series.__tablename__:

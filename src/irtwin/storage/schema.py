@@ -186,6 +186,9 @@ class LiveState(Base):
     state_time: Mapped[datetime]  # of the joint states that the graph shows
     superseded_states: Mapped[int | None]  # never shown, as a newer one was there; none where a crash forgot them
     waited_s: Mapped[float | None]  # that the source was made to wait for storage; likewise
+    stream_state: Mapped[str]  # "flowing", "stale" or "ended"
+    stale_since: Mapped[datetime | None]  # by this machine's clock, as are the next: of the last good state
+    stale_reason: Mapped[str | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -282,19 +285,19 @@ class RunEnergy(Base):
     __tablename__ = "run_energy"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
-    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
-    part: Mapped[str]  # the run's part in the twin; one "apart" is not judged by it
+    twin_id: Mapped[str | None] = mapped_column(ForeignKey("twin.twin_id"))  # none of a live run of a robot without one
+    part: Mapped[str | None]  # the run's part in the twin; one "apart" is not judged by it
     energy_consumption_j: Mapped[float]
     energy_from: Mapped[str]  # "measured", "modelled", or "mechanical": modelled without the electrical losses
     run_power_w: Mapped[float]  # its mean
     peak_power_w: Mapped[float]
     measured_energy_j: Mapped[float | None]
-    modelled_energy_j: Mapped[float]
+    modelled_energy_j: Mapped[float | None]
     energy_error_percent: Mapped[float | None]  # the seed's (15); of the part held out, where the run was cut
     power_rmse_w: Mapped[float | None]  # likewise
     standby_energy_j: Mapped[float | None]
     standby_share: Mapped[float | None]  # of the modelled energy, 0 to 1
-    returned_energy_j: Mapped[float]  # mechanical energy that the joints gave back while they braked, positive
+    returned_energy_j: Mapped[float | None]  # mechanical energy that the joints gave back while they braked, positive
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -306,7 +309,8 @@ class EnergyShare(Base):
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
-    joint: Mapped[str] = mapped_column(primary_key=True)  # "" for an effect of the whole robot
+    place: Mapped[str] = mapped_column(primary_key=True)  # the joint, or "robot" for an effect of the whole robot
+    joint: Mapped[str | None]
     robot_id: Mapped[str]
     energy_j: Mapped[float]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

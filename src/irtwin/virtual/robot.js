@@ -1,7 +1,9 @@
 "use strict";
 // Builds a robot in MeshCat's viewer, poses it, and colours its links. Needs MeshCat, fetches nothing.
 //   irtwinRobot.supported()           whether this browser draws in three dimensions
-//   irtwinRobot.makeViewer(pane, view) a viewer in an element, its camera on `data.view`
+//   irtwinRobot.makeViewer(pane, view) a viewer in an element, its camera on `data.view`; `plain` draws fast, without
+//                                     shadows and smooth edges
+//   irtwinRobot.bySoftware()          whether the processor draws, which takes ten times as long
 //   irtwinRobot.build(viewer, data)   the robot of virtual/robot_data.py in it, which has
 //     .pose(q)         stand at the joint positions, rad or m
 //     .colour(shares)  colour what each joint moves by a share of -1 to 1; null gives it its own colours again
@@ -132,9 +134,15 @@ window.irtwinRobot = (function () {
     viewer.controls.maxDistance = 8 * size;
   }
 
-  function makeViewer(pane, view) {
-    const renderer = new THREE.WebGLRenderer({ antialias: true });
-    renderer.shadowMap.enabled = true;
+  function bySoftware() {
+    const probe = document.createElement("canvas"), gl = probe.getContext("webgl2") || probe.getContext("webgl");
+    const told = gl && gl.getExtension("WEBGL_debug_renderer_info");
+    return Boolean(gl) && /swiftshader|llvmpipe|software/i.test(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  }
+
+  function makeViewer(pane, view, plain = false) {
+    const renderer = new THREE.WebGLRenderer({ antialias: !plain });
+    renderer.shadowMap.enabled = !plain;
     renderer.shadowMap.type = THREE.PCFSoftShadowMap;
     pane.appendChild(renderer.domElement);
     const onload = window.onload; // MeshCat takes it for itself
@@ -161,5 +169,5 @@ window.irtwinRobot = (function () {
     pane.addEventListener("pointerleave", () => { viewer.controls.enableZoom = false; });
     return viewer;
   }
-  return { supported, makeViewer, build, shade };
+  return { supported, bySoftware, makeViewer, build, shade };
 })();

@@ -152,6 +152,10 @@ class KnowledgeGraph:
                 f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
             )
 
+    def flush(self) -> None:
+        """Put what `change` wrote into the store's files: who opens the graph to read replays the store's log."""
+        self._store.flush()
+
     def _holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
         """Yield the quads of named graphs that say one of the triples."""
         if isinstance(self._store, SparqlServer):

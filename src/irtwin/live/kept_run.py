@@ -1,0 +1,108 @@
+"""A live run that is over: from its journal into the database, with its energy; after a crash as well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from irtwin.errors import InputError
+from irtwin.live import live_run
+from irtwin.live.live_run import Tables, Values
+from irtwin.providers import live_energy
+from irtwin.providers.live_energy import KnownTwin, LiveEnergy
+from irtwin.storage.database import Workspace
+from irtwin.storage.journal import DamagedJournal, Header, Rows, left_behind, read_journal
+from irtwin.storage.rows import values
+from irtwin.storage.schema import Activity, Base, Run, RunEnergy
+
+Announce = Callable[[str], None]
+
+
+def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announce: Announce) -> Tables:
+    """Put a run into the database, unless it is there; return its rows.
+
+    counts: what its live_state says beside. Its energy is worked out from all samples once more, so it is the same
+    after a crash. Where its twin's file is gone, the run is kept without, and that is announced.
+    """
+    tables, series = live_run.closed_rows(header, samples, counts)
+    twin = _twin(place, header, announce)
+    if twin is None:  # what was measured depends on no twin: it is part of the watching
+        tables = live_run.together(tables, _measured(header, samples))
+    with place.reading() as session:
+        kept = session.get(Run, header.run_id) is not None
+        known = session.get(RunEnergy, header.run_id) is not None
+    if not kept:  # else a crash came right here
+        run, activity, made = live_run.records(tables)
+        place.keep_live_run(run, series, activity, made)
+    if twin is not None and not known:
+        tables = live_run.together(tables, _keep_energy(place, header, tables["activity"][0]))
+    return tables
+
+
+def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[Path, Header, Rows]]:
+    """Return the journals of runs that a crash ended; what cannot be read is put aside and announced."""
+    found = []
+    for path in left_behind(folder):
+        try:
+            header, samples = read_journal(path)
+        except DamagedJournal as error:
+            aside = path.with_suffix(".damaged")
+            path.rename(aside)
+            announce(f"{error}; its samples are not in the graph; the file is kept as {aside}")
+            continue
+        except ValueError:
+            announce(f"{path}: a crash ended this journal before its first sample; it is deleted")
+            path.unlink()
+            continue
+        announce(f"{header.run_id}: a crash ended this run; its {len(samples)} samples on disk are kept")
+        found.append((path, header, samples))
+    return found
+
+
+def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float | None = None) -> Tables:
+    """Return the rows of a run's energy with their activity, which was from `began` on, s since 1970."""
+    activity_id = live_run.activities(header.run_id)[1]
+    if energy.known is None:
+        return energy.tables(live_run.activities(header.run_id)[0])
+    made = energy.tables(activity_id)
+    if not made:
+        return {}
+    activity = live_run.activity(header, activity_id, "energy", began, ended)
+    uses = live_energy.used(header.run_id, energy.known)
+    return {
+        "activity": [activity],
+        "activity_use": [{"activity_id": activity_id, "entity": entity} for entity in uses],
+        **made,
+    }
+
+
+def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | None:
+    try:
+        return live_energy.known_twin(place, header.robot_id)
+    except InputError as error:
+        announce(f"{header.run_id}: kept without what its twin says: {error}")
+        return None
+
+
+def _measured(header: Header, samples: Rows) -> Tables:
+    energy = LiveEnergy(header.run_id, header.robot_id, live_run.joints_of(header.columns), None)
+    energy.feed(dict(zip(header.columns, samples.T, strict=True)), last=True)
+    return energy_tables(energy, header, float(samples[0, 0]))
+
+
+def _keep_energy(place: Workspace, header: Header, watched: Values) -> Tables:
+    made = live_energy.provide(place, header.run_id)
+    if not made.rows:
+        return {}
+    activity_id = live_run.activities(header.run_id)[1]
+    about = {**watched, "activity_id": activity_id, "provider": "energy"}
+    place.replace_activity(Activity(**about), made.used, made.rows, made.series)
+    tables: Tables = {"activity": [about]}
+    tables["activity_use"] = [{"activity_id": activity_id, "entity": entity} for entity in sorted(set(made.used))]
+    for row in made.rows:
+        tables.setdefault(row.__tablename__, []).append(_values(row))
+    return tables
+
+
+def _values(row: Base) -> Values:
+    return {name: value for name, value in values(row).items() if value is not None}

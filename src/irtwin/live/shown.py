@@ -1,0 +1,96 @@
+"""What the graph shows of live runs: their rows by the shipped mapping, and the alarms that rules raise of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import cast
+
+from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
+
+from irtwin import resources
+from irtwin.knowledge.mapping import RowMapper, refresh
+from irtwin.knowledge.shacl.rules import conclusions, graph_of, read_rules
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SHACL, GRAPH_SOURCE, term
+from irtwin.live.live_run import Tables, activities
+from irtwin.providers.records import run_iri
+from irtwin.storage.database import Workspace
+
+_STATE, _REASON = term("Alarm_State"), term("Alarm_Reason")
+_BESIDE = """CONSTRUCT { ?s ?p ?o } WHERE {
+  { VALUES ?p { irt:Joint_Name } ?s ?p ?o } UNION { ?s a irt:Judgement_Limits ; ?p ?o } }"""
+
+
+class ShownRuns:
+    """Brings live runs into a workspace's graph and keeps them current there."""
+
+    def __init__(self, place: Workspace, graph: KnowledgeGraph) -> None:
+        self._place, self._graph = place, graph
+        self._documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+        self.mapper = RowMapper(place.engine, self._documents)
+        self._rules = read_rules(Path(resources.folder("rules")) / "live_rules.ttl")
+        self._beside: set[Triple] | None = None
+        self._changed = False  # since the last flush
+
+    def flush(self) -> None:
+        """Make what was shown quick to open, if something was."""
+        if self._changed:
+            self._changed = False
+            self._graph.flush()
+
+    def show(self, run_id: str, shown: set[Quad] | None, quads: set[Quad]) -> None:
+        """Bring the graph from what it shows of a run, None where that is unknown, to the quads."""
+        if shown is None:
+            shown = self._quads_of(run_id)
+        self._graph.change(shown - quads, quads - shown)
+        self._changed = True
+
+    def mapped(self, tables: Tables) -> set[Quad]:
+        """Return the quads of rows, and of the alarms that follow from them."""
+        quads = {quad for it in tables.items() for quad in self.mapper.quads(*it)}
+        return quads | self.alarms(quads)
+
+    def alarms(self, quads: Iterable[Quad]) -> set[Quad]:
+        """Return what the rules of `rules/live_rules.ttl` conclude from excursions among the quads."""
+        if self._beside is None:
+            self._beside = self._graph.construct(_BESIDE)
+        found = conclusions(self._beside | {quad.triple for quad in quads}, self._rules)
+        return {quad for name, triples in found.items() for quad in in_graph(triples, graph_of(name))}
+
+    def refresh(self) -> None:
+        """Bring the graph up to date with the database."""
+        refresh(self._graph, self._place.engine, self._documents, self._place.mapped_rows)
+
+    def _quads_of(self, run_id: str) -> set[Quad]:
+        """Return what the graph says of a live run."""
+        run = NamedNode(run_iri(run_id))
+        graphs = " ".join(f"<{GRAPH_ACTIVITY}{activity}>" for activity in activities(run_id))
+        found = self._graph.answer(
+            f"""SELECT ?g ?s ?p ?o {{
+              {{ VALUES ?g {{ {graphs} }} GRAPH ?g {{ ?s ?p ?o }} }} UNION
+              {{ GRAPH ?g {{ {run} ?p ?o }} BIND({run} AS ?s)
+                 FILTER(STRSTARTS(STR(?g), "{GRAPH_SOURCE}") && ?p != irt:has_Series) }} UNION
+              {{ GRAPH ?g {{ ?s a irt:Gap_Alarm ; irt:gap_of_Run {run} ; ?p ?o }}
+                 FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }}"""
+        )
+        return {Quad(row["s"], row["p"], row["o"], row["g"]) for row in cast(QuerySolutions, found)}
+
+
+class AlarmNews:
+    """Tells once of each alarm that was raised, and once that it is cleared."""
+
+    def __init__(self) -> None:
+        self._states: dict[str, str] = {}
+
+    def news(self, quads: Iterable[Quad]) -> list[str]:
+        """Return a line for each alarm among the quads whose state is new."""
+        said: dict[str, dict[str, str]] = {}
+        for quad in quads:
+            if quad.predicate.value in (_STATE, _REASON) and isinstance(quad.object, Literal):
+                said.setdefault(str(quad.subject), {})[quad.predicate.value] = quad.object.value
+        lines = [
+            f"alarm {of[_STATE]}: {of[_REASON]}" for alarm, of in said.items() if self._states.get(alarm) != of[_STATE]
+        ]
+        self._states = {alarm: of[_STATE] for alarm, of in said.items()}
+        return lines

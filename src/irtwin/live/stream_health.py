@@ -1,0 +1,54 @@
+"""How the stream of a live run goes: whether good states come, and if not, why not, in words."""
+
+from __future__ import annotations
+
+import time
+from datetime import UTC, datetime
+from typing import Any
+
+STALE = 2.0  # s without a good state; of a slow source five times its usual pause
+_PAUSES = 5.0
+
+
+class StreamHealth:
+    """Told of good states and of late ones; `stale_since` is when the last good one came, None while they come."""
+
+    def __init__(self) -> None:
+        self.stale_since: datetime | None = None
+        self.reason: str | None = None
+        self._heard = self._began = time.monotonic()
+        self._count = 0
+        self._late: str | None = None
+
+    def good(self) -> None:
+        """Note a state that was taken."""
+        self._heard = time.monotonic()
+        self._count += 1
+        self._late = self.stale_since = self.reason = None
+
+    def late(self, said: float, newest: float) -> None:
+        """Note a state that is not later than the newest, times in s since 1970."""
+        if said == newest:
+            self._late = "the stream repeats the state that was taken last"
+        else:
+            self._late = f"the stream went back in time, by {newest - said:.3g} s"
+
+    def leaps(self, by: float) -> None:
+        """Note a state whose time is so many seconds away that nobody trusts it yet."""
+        self._late = f"the stream's time leaps by {by:.3g} s"
+
+    def look(self) -> bool:
+        """Note whether the stream is stale now; return whether that is news."""
+        silence = time.monotonic() - self._heard
+        usual = (self._heard - self._began) / max(self._count - 1, 1)
+        if self.stale_since is not None or not self._count or silence < max(STALE, _PAUSES * usual):
+            return False
+        self.stale_since = datetime.fromtimestamp(time.time() - silence, UTC).replace(tzinfo=None)
+        self.reason = self._late or f"no state came for {silence:.1f} s"
+        return True
+
+    def said(self) -> dict[str, Any]:
+        """Return what a row says of the stream."""
+        if self.stale_since is None:
+            return {"stream_state": "flowing"}
+        return {"stream_state": "stale", "stale_since": self.stale_since, "stale_reason": self.reason}

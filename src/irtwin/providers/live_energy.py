@@ -1,0 +1,281 @@
+"""Energy and gap of a live run: while it lasts as far as its samples go, and of one that is stored, all of it.
+
+Energies are those that other runs have, in the same tables; the gap beside the twin's band is a live run's alone.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from scipy.integrate import cumulative_trapezoid
+from sqlalchemy import select
+
+from irtwin.errors import InputError
+from irtwin.identification.validation import APART, energy_error
+from irtwin.providers.provider import Made
+from irtwin.providers.records import run_iri, twin_iri
+from irtwin.signals.channels import CHANNELS, Signals, columns_of
+from irtwin.storage import live_schema, schema
+from irtwin.storage.database import Workspace
+from irtwin.storage.files import inside
+from irtwin.twin.files import from_json
+from irtwin.twin.gap_watch import ROBOT, GapWatch, PlaceState, Windows, band
+from irtwin.twin.so_far import EnergySoFar, Stretch
+from irtwin.twin.twin import Twin
+
+Values = dict[str, Any]
+Tables = dict[str, list[Values]]
+_KINDS: Mapping[str, type[schema.Base]] = {
+    "run_energy": schema.RunEnergy,
+    "energy_share": schema.EnergyShare,
+    "joint_energy": schema.JointEnergy,
+    "gap_state": live_schema.GapState,
+    "gap_excursion": live_schema.GapExcursion,
+}
+_AT_ONCE = 4096  # samples of a stored run
+_MOST_RUNS = 40  # that a twin knows tell its band
+
+
+@dataclass(frozen=True)
+class KnownTwin:
+    """A robot's twin, and the band of its gap by place."""
+
+    twin_id: str
+    twin: Twin
+    bands: Mapping[str, float]
+
+
+def known_twin(workspace: Workspace, robot_id: str) -> KnownTwin | None:
+    """Return a robot's twin; None where it has none. Raises InputError where its file is gone or another."""
+    with workspace.reading() as session:
+        row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
+    if row is None:
+        return None
+    document = workspace.read_document(row.file, row.sha256).decode()
+    twin = from_json(document, inside(workspace.folder, row.file))
+    return KnownTwin(row.twin_id, twin, _bands(workspace, row.twin_id, twin.robot.joint_names))
+
+
+class LiveEnergy:
+    """Energy and gap of a run, fed with its samples; `stretches` are given on to who shows them."""
+
+    def __init__(
+        self,
+        run_id: str,
+        robot_id: str,
+        joints: tuple[str, ...],
+        known: KnownTwin | None,
+        payload: float = 0.0,
+        payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Begin a run of a robot by its twin, with what its flange carries: kg, and m in the flange's frame."""
+        self.known = known
+        self._run_id, self._robot_id = run_id, robot_id
+        twin = None if known is None else known.twin
+        self.so_far = EnergySoFar(joints, twin, name=run_id, payload=payload, payload_com=payload_com)
+        self.watch = GapWatch(joints, {} if known is None else known.bands)
+
+    def feed(self, columns: dict[str, np.ndarray], *, last: bool = False, least: float = 0.0) -> list[Stretch]:
+        """Take samples, columns as of a log by name; return what could be worked out, as `EnergySoFar.feed`."""
+        stretches = list(self.so_far.feed(columns, last=last, least=least))
+        for stretch in stretches:
+            self.watch.take(stretch)
+        if last:
+            self.watch.end()
+        return stretches
+
+    def tables(self, activity_id: str) -> Tables:
+        """Return all that is known as rows of the database; none before there is an energy."""
+        so_far = self.so_far
+        energy = self._run_energy()
+        if energy is None:
+            return {}
+        made = {"run_id": self._run_id, "activity_id": activity_id}
+        if self.known is None:
+            return {"run_energy": [made | energy]}
+        of = {**made, "robot_id": self._robot_id}
+        by_twin = {**of, "twin_id": self.known.twin_id}
+        shares = [
+            {**by_twin, "effect": effect, "place": joint or ROBOT, "joint": joint, "energy_j": value}
+            for (effect, joint), value in so_far.ledger.items()
+        ]
+        joints: defaultdict[str, float] = defaultdict(float)
+        for (_, joint), value in so_far.ledger.items():
+            if joint is not None:
+                joints[joint] += value
+        return {
+            "run_energy": [made | energy],
+            "energy_share": shares,
+            "joint_energy": [{**of, "joint": joint, "energy_j": value} for joint, value in joints.items()],
+            "gap_state": [by_twin | row for row in self._gap_states()],
+            "gap_excursion": [by_twin | row for row in self._excursions()],
+        }
+
+    def _run_energy(self) -> Values | None:
+        so_far, known = self.so_far, self.known
+        measured = so_far.measured
+        if not so_far.seconds or (known is None and measured is None):
+            return None
+        row: Values = {}
+        if known is not None:
+            at_rest = self._drawn_at_rest
+            standby = sum(value for (effect, _), value in so_far.ledger.items() if effect in at_rest)
+            row = {
+                "twin_id": known.twin_id,
+                "part": "held_out",
+                "modelled_energy_j": so_far.modelled,
+                "energy_error_percent": energy_error(measured, so_far.modelled) if measured else None,
+                "standby_energy_j": standby if at_rest else None,
+                "standby_share": standby / so_far.modelled if at_rest and so_far.modelled > 0 else None,
+                "returned_energy_j": so_far.returned,
+            }
+        taken = so_far.modelled if measured is None else measured
+        return row | {
+            "energy_consumption_j": taken,
+            "energy_from": "measured" if measured is not None else self._modelled_as,
+            "run_power_w": taken / so_far.seconds,
+            "peak_power_w": so_far.peak_power,
+            "measured_energy_j": measured,
+        }
+
+    @cached_property
+    def _drawn_at_rest(self) -> frozenset[str]:
+        assert self.known is not None
+        return frozenset(effect.id for effect in self.known.twin.stack.effects if effect.drawn_at_rest)
+
+    @cached_property
+    def _modelled_as(self) -> str:
+        assert self.known is not None
+        electrical = any(effect.electrical_loss for effect in self.known.twin.stack.effects)
+        return "modelled" if electrical else "mechanical"
+
+    def _gap_states(self) -> Iterator[Values]:
+        for place, now in self.watch.places.items():
+            yield self._place(place) | {
+                "residual": now.residual,
+                "band": now.band,
+                "ratio": now.ratio,
+                "state": now.state,
+                "since": _moment(now.since),
+            }
+
+    def _excursions(self) -> Iterator[Values]:
+        for place, now in self.watch.places.items():
+            yield from self._of_place(place, now)
+
+    def _of_place(self, place: str, now: PlaceState) -> Iterator[Values]:
+        for number, one in enumerate(now.excursions, start=1):
+            yield self._place(place) | {
+                "number": number,
+                "began": _moment(one.began),
+                "ended": None if one.ended is None else _moment(one.ended),
+                "lasted_s": one.until - one.began,
+                "peak_residual": one.peak_residual,
+                "peak_ratio": one.peak_ratio,
+            }
+
+    def _place(self, place: str) -> Values:
+        assert self.known is not None
+        if place == ROBOT:
+            return {"place": place, "channel": "power", "joint": None, "unit": CHANNELS["power"].unit}
+        kind = next(joint.kind for joint in self.known.twin.robot.joints if joint.name == place)
+        return {"place": place, "channel": "torque", "joint": place, "unit": CHANNELS["torque"].unit_of(kind)}
+
+
+def used(run_id: str, known: KnownTwin | None) -> list[str]:
+    """Return the IRIs of what the energy of a run is worked out from."""
+    return [run_iri(run_id), *([] if known is None else [twin_iri(known.twin_id)])]
+
+
+def provide(workspace: Workspace, run_id: str) -> Made:
+    """Make the energy, the ledger, the gap and the modelled series of a live run that is stored."""
+    with workspace.reading() as session:
+        run = session.get_one(schema.Run, run_id)
+        in_order = (
+            select(schema.Joint.name).where(schema.Joint.robot_id == run.robot_id).order_by(schema.Joint.position)
+        )
+        joints = tuple(session.scalars(in_order))
+    known = known_twin(workspace, run.robot_id)
+    com = (run.payload_com_x_m, run.payload_com_y_m, run.payload_com_z_m)
+    energy = LiveEnergy(run_id, run.robot_id, joints, known, run.payload_kg, com)
+    table = workspace.read_series(run_id)
+    columns = {name: np.array(table.column(name), dtype=float) for name in table.column_names}
+    columns["time"] = columns["time"] + run.start_time.timestamp()
+    stretches: list[Stretch] = []
+    for start in range(0, table.num_rows, _AT_ONCE):
+        piece = {name: values[start : start + _AT_ONCE] for name, values in columns.items()}
+        stretches += energy.feed(piece, last=start + _AT_ONCE >= table.num_rows)
+    rows = [_KINDS[name](**values) for name, some in energy.tables("").items() for values in some]
+    series = {} if not stretches else {run_id: _modelled_series(joints, stretches, run.start_time.timestamp())}
+    return Made(run.robot_id, used(run_id, known), rows, series)
+
+
+def _modelled_series(joints: tuple[str, ...], stretches: list[Stretch], began: float) -> pa.Table:
+    """Return measured (filtered) and modelled signals side by side, columns as in `providers.energy`."""
+    parts: defaultdict[str, list[np.ndarray]] = defaultdict(list)
+    energies = {"energy": 0.0, "energy_model": 0.0}
+    metered = all(stretch.motion.power is not None for stretch in stretches)
+    shown = all(stretch.torque_residual is not None for stretch in stretches)
+    for stretch in stretches:
+        motion = stretch.motion
+        torque = stretch.torque + stretch.torque_residual if shown and stretch.torque_residual is not None else None
+        columns = dict(columns_of(Signals(motion.time - began, motion.q, torque=torque), joints))
+        modelled = zip(joints, stretch.torque.T, strict=True)
+        columns |= {f"{CHANNELS['torque'].column(name)}_model": of for name, of in modelled}
+        powers = {"energy_model": stretch.power} | (
+            {"energy": motion.power} if metered and motion.power is not None else {}
+        )
+        columns |= {name.replace("energy", "power"): power for name, power in powers.items()}
+        for name, power in powers.items():
+            columns[name] = energies[name] + cumulative_trapezoid(power, motion.time, initial=0.0)
+            energies[name] = float(columns[name][-1])
+        new = slice(0 if stretch.begins else 1, None)
+        for name, values in columns.items():
+            parts[name].append(values[new])
+    table = {name: np.concatenate(values) for name, values in parts.items()}
+    held_out = {"time": table.pop("time"), "held_out": np.ones(len(table["q_" + joints[0]]), dtype=bool)}
+    return pa.table(held_out | table)
+
+
+def _bands(workspace: Workspace, twin_id: str, joints: tuple[str, ...]) -> dict[str, float]:
+    """Return the band of each place: the widest of the newest runs that the twin knows, fitted or held out."""
+    newest = (
+        select(schema.TwinRun.run_id)
+        .join(schema.Run, schema.Run.run_id == schema.TwinRun.run_id)
+        .where(schema.TwinRun.twin_id == twin_id, schema.TwinRun.part != APART)
+        .order_by(schema.Run.start_time.desc())
+        .limit(_MOST_RUNS)
+    )
+    with workspace.reading() as session:
+        runs = session.scalars(newest).all()
+    of_runs = [band(windows) for run_id in runs if len(windows := _windows(workspace, run_id, joints))]
+    if not of_runs:
+        return {}
+    widest = np.fmax.reduce(np.array(of_runs))
+    return {place: float(value) for place, value in zip((*joints, ROBOT), widest, strict=True) if not np.isnan(value)}
+
+
+def _windows(workspace: Workspace, run_id: str, joints: tuple[str, ...]) -> np.ndarray:
+    """Return the root mean squares of a run's residuals, window by window, (M, n + 1); NaN where not measured."""
+    try:
+        table = workspace.read_series(run_id, "modelled")
+    except InputError:  # its energy was not worked out yet
+        return np.empty((0, len(joints) + 1))
+    names = [*(CHANNELS["torque"].column(joint) for joint in joints), "power"]
+    missing = np.full(table.num_rows, np.nan)
+    there = set(table.column_names)
+    columns = [np.array(table[name]) - np.array(table[f"{name}_model"]) if name in there else missing for name in names]
+    found = Windows().take(np.array(table["time"]), np.column_stack(columns), begins=True)
+    return np.array([root for _, root in found]).reshape(-1, len(names))
+
+
+def _moment(seconds: float) -> datetime:
+    """Return a time as the database keeps it: UTC without its zone."""
+    return datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)

@@ -1,0 +1,116 @@
+"""/live and /live/ROBOT: robots as they move. Numbers come from /sparql, samples as events, shapes from the graph."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
+
+from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.providers.mesh_files import meshes_of_graph
+from irtwin.providers.records import robot_iri
+from irtwin.providers.robot_of_graph import robot_of_graph
+from irtwin.serve.page import FOLDER, POLICY
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.samples import Page, Samples
+from irtwin.storage.files import inside
+from irtwin.virtual.robot_data import robot_data
+
+_MOST_ROBOTS = 64  # that are remembered as drawn
+_POSES = """SELECT ?run ?name ?q {
+  { SELECT ?run { ?run irt:run_of ?arm ; irt:Start_Time ?start ; irt:has_Joint_State ?any } GROUP BY ?run ?start
+    ORDER BY DESC(?start) LIMIT 60 }
+  ?run irt:has_Joint_State ?state . ?state irt:of_Joint / irt:Joint_Name ?name ; irt:Joint_Position ?q }"""
+
+
+class LivePages:
+    """The pages of a workspace whose graph lies in `graph`."""
+
+    def __init__(self, graph: Path) -> None:
+        self._graph = graph
+        self.samples = Samples(graph.parent)
+        self._robots: dict[str, bytes] = {}
+        self._drawing = asyncio.Lock()
+
+    def routes(self) -> list[Route]:
+        """Return where they are."""
+        return [
+            Route("/live", lambda request: _page("live_list.html"), methods=["GET"]),
+            Route("/live/{robot}", lambda request: _page("live.html"), methods=["GET"]),
+            Route("/live/{robot}/robot.json", self._robot, methods=["GET"]),
+            Route("/live/{robot}/events", self._events, methods=["GET"]),
+        ]
+
+    async def _events(self, request: Request) -> Response:
+        return _Events(self.samples, self.samples.page(request.path_params["robot"]))
+
+    async def _robot(self, request: Request) -> Response:
+        robot_id = request.path_params["robot"]
+        async with self._drawing:  # one at a time: it takes a moment of the processor
+            if robot_id not in self._robots:
+                if len(self._robots) >= _MOST_ROBOTS:
+                    self._robots.clear()
+                try:
+                    self._robots[robot_id] = await asyncio.to_thread(_drawn, self._graph, robot_id)
+                except InputError as error:
+                    raise Refusal(404, str(error)) from None
+        return Response(self._robots[robot_id], media_type="application/json", headers={"Cache-Control": "no-cache"})
+
+
+class _Events(StreamingResponse):
+    """Server-sent events for one page, which is let go when its client is."""
+
+    def __init__(self, samples: Samples, page: Page) -> None:
+        headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+        super().__init__(page.events(), media_type="text/event-stream", headers=headers)
+        self._samples, self._page = samples, page
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._samples.leave(self._page)
+
+
+def _page(name: str) -> Response:
+    return Response((FOLDER / name).read_bytes(), media_type="text/html", headers={"Content-Security-Policy": POLICY})
+
+
+def _drawn(folder: Path, robot_id: str) -> bytes:
+    """Return what robot.js builds a robot of, made of what the graph says of it, as JSON. Raises InputError."""
+    workspace = folder.parent
+    iri = robot_iri(robot_id)
+
+    def read(path: str, checksum: str) -> bytes:
+        content = inside(workspace, path).read_bytes()
+        if hashlib.sha256(content).hexdigest() != checksum:
+            raise InputError(f"{path}: was changed after it was written")
+        return content
+
+    with Snapshot(folder) as snapshot:
+        graph = snapshot.current(False)
+        if any(sign in iri for sign in '<>"{}|\\^` '):
+            raise InputError(f"no robot {robot_id!r} here")
+        robot = robot_of_graph(graph, iri)
+        meshes = meshes_of_graph(graph, iri, read)
+        poses = _poses(graph, iri, robot.joint_names)
+    return json.dumps(robot_data(robot, poses, meshes) | {"name": robot.name}, allow_nan=False).encode()
+
+
+def _poses(graph: KnowledgeGraph, iri: str, joints: tuple[str, ...]) -> np.ndarray:
+    """Return poses in which runs left the robot, (N, n) rad or m: what a camera should have in sight."""
+    ends: dict[Any, dict[str, float]] = {}
+    for row in graph.query(_POSES, {"arm": iri}).rows:
+        ends.setdefault(row["run"], {})[row["name"]] = row["q"]
+    poses = [[end[joint] for joint in joints] for end in ends.values() if end.keys() >= set(joints)]
+    return np.array(poses or [[0.0] * len(joints)], dtype=float)

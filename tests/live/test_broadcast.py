@@ -1,0 +1,80 @@
+"""Who looks on gets each sample; who reads too slowly is let go, and watching waits for nobody."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from irtwin.live import broadcast
+from irtwin.live.broadcast import SOCKET, Broadcast, reachable
+from irtwin.live.joint_stream import STREAMED, State
+
+
+def state(at: float, power: float = 400.0) -> State:
+    values = {"q": (0.5, -0.25), "power": (power,)}
+    unsaid = [(math.nan,) * (2 if channel.per_joint else 1) for channel in STREAMED.values()]
+    return State("r", at, tuple(values.get(field, no) for field, no in zip(STREAMED, unsaid, strict=True)))
+
+
+def connect(folder: Path, to: Broadcast, count: int = 1) -> socket.socket:
+    client = socket.socket(socket.AF_UNIX)
+    client.settimeout(30)
+    with reachable(folder / SOCKET) as address:
+        client.connect(address)
+    wait_for(lambda: len(to._clients) >= count)
+    return client
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    until = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < until, "it never came"
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("folder", ["live", "/".join(["a-folder-with-a-long-name"] * 6)])
+def test_states_and_what_the_twin_says_arrive_as_lines(tmp_path: Path, folder: str) -> None:
+    place = tmp_path / folder
+    with Broadcast(place) as told:
+        told.state(state(1.0))  # nobody looks on
+        with connect(place, told) as client, client.makefile() as lines:
+            told.state(state(2.0))
+            told.state(state(3.0, math.nan))
+            motion = SimpleNamespace(time=np.array([1.0, 2.0, 3.0]))
+            told.stretches("r", [SimpleNamespace(motion=motion, power=np.array([5.0, 6.0, 7.0]), begins=False)])
+            assert json.loads(lines.readline()) == {"robot": "r", "time": 2.0, "q": [0.5, -0.25], "power": 400.0}
+            assert json.loads(lines.readline())["power"] is None
+            assert json.loads(lines.readline()) == {"robot": "r", "modelled": {"time": [2.0, 3.0], "power": [6.0, 7.0]}}
+    assert not (place / SOCKET).exists()
+
+
+def test_one_that_does_not_read_is_let_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(broadcast, "_BUFFER", 4096)
+    with Broadcast(tmp_path) as told, connect(tmp_path, told):
+        began = time.monotonic()
+        while told._clients:
+            told.state(state(time.monotonic()))
+            assert time.monotonic() - began < 30
+
+
+def test_more_than_a_few_are_turned_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(broadcast, "_MOST", 1)
+    with Broadcast(tmp_path) as told, connect(tmp_path, told), connect(tmp_path, told) as second:
+        assert second.recv(1) == b""
+
+
+def test_a_socket_that_a_crash_left_is_taken_over(tmp_path: Path) -> None:
+    left = socket.socket(socket.AF_UNIX)
+    left.bind(str(tmp_path / SOCKET))
+    left.close()
+    with Broadcast(tmp_path) as told, connect(tmp_path, told) as client:
+        told.state(state(1.0))
+        assert client.recv(1) == b"{"

@@ -1,0 +1,133 @@
+"""/live and /live/ROBOT: what they are made of, and in a browser that they follow a log that is played."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from tests import small_robots
+from tests.endpoint import Server, serving
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.workflow import run as run_all
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+ARGUMENTS = [
+    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-sync",
+    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+]  # fmt: skip
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("live_page")
+
+
+@pytest.fixture(scope="module")
+def robot(folder: Path) -> Iterator[Server]:
+    """A server of a workspace in which a small robot has a twin."""
+    run_all(small_robots.data_set(folder / "data", "arm"), folder / "w")
+    with serving(folder / "w" / "graph", token=None) as running:
+        yield running
+
+
+@pytest.mark.parametrize("path", ["/live", "/live/arm"])
+def test_pages_take_everything_from_here(robot: Server, path: str) -> None:
+    page = httpx.get(robot.url + path)
+    assert page.status_code == 200
+    assert "default-src 'none'; script-src 'self'" in page.headers["Content-Security-Policy"]
+    for asset in ("live.css", "live.js", "live_list.js", "meshcat.js", "robot.js"):
+        assert httpx.get(f"{robot.url}/assets/{asset}").status_code == 200
+        assert "http://" not in page.text and "https://" not in page.text
+
+
+def test_the_robot_is_made_of_the_graph(robot: Server) -> None:
+    said = httpx.get(f"{robot.url}/live/arm/robot.json", timeout=60).json()
+    assert said["name"] == "arm"
+    assert len(said["joints"]) == 2
+    assert said["parts"]
+
+
+@pytest.mark.parametrize("name", ["nobody", "a%3E%20b", "..%2F..%2Fetc"])
+def test_a_robot_that_is_not_there(robot: Server, name: str) -> None:
+    assert httpx.get(f"{robot.url}/live/{name}/robot.json", timeout=60).status_code == 404
+
+
+def test_too_many_pages_are_refused_and_those_that_leave_make_room(robot: Server) -> None:
+    with httpx.Client(timeout=30) as client:
+        streams = [client.stream("GET", f"{robot.url}/live/arm/events") for _ in range(17)]
+        answers = [stream.__enter__() for stream in streams]
+        assert [answer.status_code for answer in answers] == [200] * 16 + [503]
+        assert answers[0].headers["Content-Type"].startswith("text/event-stream")
+        for stream in streams:
+            stream.__exit__(None, None, None)
+
+        def there_is_room() -> bool:
+            with client.stream("GET", f"{robot.url}/live/arm/events") as answer:
+                return bool(answer.status_code == 200)
+
+        wait_for(there_is_room)
+
+
+def wait_for(condition: Callable[[], Any]) -> None:
+    until = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < until, "it never came"
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("Chromium is not installed")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as session:
+        chromium = session.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.mark.system
+def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, browser: Any) -> None:
+    complaints: list[str] = []
+    page = browser.new_page(viewport={"width": 900, "height": 700})
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on(
+        "request", lambda it: None if it.url.startswith((robot.url, "data:", "blob:")) else complaints.append(it.url)
+    )
+    page.goto(f"{robot.url}/live/arm")
+    wait_for(lambda: page.inner_text("#stream") == "not watched yet")
+    log = next((folder / "data").rglob("*.parquet"))
+    command = [sys.executable, "-m", "irtwin", "live", "--workspace", folder / "w", "--replay", log, "--robot", "arm"]
+    with subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True) as live:
+        wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
+        wait_for(lambda: page.inner_text("#stream") == "flowing")
+        wait_for(lambda: page.inner_text("#energy") not in ("–", "0.0"))
+        assert page.evaluate("irtwinLive.time") == pytest.approx(time.time(), abs=5)
+        _, said = live.communicate(timeout=120)
+    assert "800 samples stored" in said or "801 samples stored" in said, said
+    wait_for(lambda: page.inner_text("#stream") == "run ended")
+    assert page.evaluate("irtwinLive.states") > 400
+    with KnowledgeGraph.as_it_stands(folder / "w" / "graph") as graph:
+        (row,) = graph.query("SELECT ?energy { ?run irt:Run_Role 'live' ; irt:Energy_Consumption ?energy }")
+    wait_for(lambda: page.inner_text("#energy") == written(row["energy"]))
+    assert page.locator("#by-joint .bar").count() == 2
+    assert page.locator("#gaps .bar").count() == 3
+    page.goto(f"{robot.url}/live")
+    wait_for(lambda: page.locator("#robots tr").count() == 1)
+    assert page.inner_text("#robots a") == "arm"
+    page.click("#robots a")
+    wait_for(lambda: page.inner_text("#name") == "arm")
+    assert complaints == []
+
+
+def written(joules: float) -> str:
+    return f"{joules:.1f}" if abs(joules) < 100 else f"{joules:.0f}"

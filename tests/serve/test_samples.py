@@ -1,0 +1,114 @@
+"""Samples reach the pages of their robot; a page that does not take them is let go."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+
+from irtwin.live.broadcast import SOCKET
+from irtwin.serve import samples as room
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.samples import Page, Samples
+
+
+async def taken(page: Page, count: int) -> list[dict]:
+    found: list[dict] = []
+    async for piece in page.events():
+        found += [json.loads(line[6:]) for line in piece.decode().splitlines() if line.startswith("data: ")]
+        if len(found) >= count:
+            break
+    return found
+
+
+def test_lines_go_to_the_pages_of_their_robot(tmp_path: Path) -> None:
+    async def play() -> None:
+        async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            for number in range(3):
+                for robot in ("a", "b"):
+                    writer.write(json.dumps({"robot": robot, "time": number}).encode() + b"\n")
+            await writer.drain()
+
+        (tmp_path / "live").mkdir()
+        async with await asyncio.start_unix_server(send, tmp_path / "live" / SOCKET):
+            samples = Samples(tmp_path)
+            pages = [samples.page("a"), samples.page("b"), samples.page("b")]
+            found = await asyncio.wait_for(asyncio.gather(*(taken(page, 3) for page in pages)), 30)
+            samples.close()
+        assert [[one["time"] for one in each] for each in found] == [[0, 1, 2]] * 3
+        assert [each[0]["robot"] for each in found] == ["a", "b", "b"]
+
+    asyncio.run(play())
+
+
+def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "_AGAIN", 0.01)
+
+    async def play() -> None:
+        samples = Samples(tmp_path)
+        page = samples.page("a")
+        reading = asyncio.create_task(taken(page, 1))
+        await asyncio.sleep(0.1)
+        (tmp_path / "live").mkdir()
+
+        async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(b"not a line\n")
+            writer.close()
+
+        async def send_well(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(b'{"robot": "a", "time": 1}\n')
+            await writer.drain()
+
+        address = tmp_path / "live" / SOCKET
+        async with await asyncio.start_unix_server(send, address):
+            await asyncio.sleep(0.1)
+        address.unlink(missing_ok=True)
+        async with await asyncio.start_unix_server(send_well, address):
+            assert await asyncio.wait_for(reading, 30) == [{"robot": "a", "time": 1}]
+            samples.close()
+
+    asyncio.run(play())
+
+
+def test_a_page_that_takes_nothing_is_let_go() -> None:
+    page = Page("a")
+    for _ in range(401):
+        page.put(b"{}\n")
+    assert page.lost
+
+    async def play() -> list[bytes]:
+        return [piece async for piece in page.events()]
+
+    assert asyncio.run(play()) == [b"retry: 1000\n\n"]
+
+
+def test_more_pages_than_may_look_on_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "MOST", 2)
+
+    async def play() -> None:
+        samples = Samples(tmp_path)
+        first = samples.page("a")
+        samples.page("a")
+        with pytest.raises(Refusal, match="2 pages look on already"):
+            samples.page("a")
+        samples.leave(first)
+        samples.page("a")
+        samples.close()
+
+    asyncio.run(play())
+
+
+def test_a_page_without_samples_gets_a_word_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "_QUIET", 0.01)
+
+    async def play() -> list[bytes]:
+        page, found = Page("a"), []
+        async for piece in page.events():
+            found.append(piece)
+            if len(found) == 3:
+                page.let_go()
+        return found
+
+    assert asyncio.run(play())[1:] == [b": nothing new\n\n"] * 2
