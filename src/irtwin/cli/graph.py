@@ -124,16 +124,31 @@ def reason(
 @click.command()
 @workspace_option
 @graph_option
-@click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
-def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
-    """Write the whole graph as one OWL file for Protégé.
+@click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), help="RDF/XML file to write.")
+@click.option("--ros", type=click.Path(path_type=Path, file_okay=False), help="Folder of a ROS package to write.")
+@click.option("--robot", metavar="NAME", help="The robot to write; not needed where there is one alone.")
+def export(workspace: Path, graph_url: str | None, owl: Path | None, ros: Path | None, robot: str | None) -> None:
+    """Write the whole graph for Protégé, or a robot for ROS.
 
-    The file holds ontology, individuals and inferences in RDF/XML.
+    --owl writes ontology, individuals and inferences as one RDF/XML file.
+
+    --ros writes a package for ROS 1 and 2 made of what the graph says of a robot: URDF, SRDF, limits, kinematics,
+    RViz and launch files. MoveIt's setup needs nothing added to it. `irtwin robot ros` makes it of a URDF.
     """
-    from irtwin import asking
+    if (owl is None) == (ros is None):
+        raise click.UsageError("Give --owl or --ros.")
+    if owl is not None:
+        from irtwin import asking
 
-    asking.export(owl, workspace, graph_url=graph_url)
-    click.echo(owl)
+        if robot is not None:
+            raise click.UsageError("--owl writes the whole graph; leave --robot out.")
+        asking.export(owl, workspace, graph_url=graph_url)
+    elif ros is not None:
+        from irtwin.ros.export import export_package
+
+        for line in export_package(ros, workspace, robot, graph_url):
+            say(f"irtwin: {line}")
+    click.echo(owl or ros)
 
 
 @click.command("map")
