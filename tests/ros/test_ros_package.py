@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 import runpy
+import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from tests.providers.test_robot_of_graph import BRANCHED
 from tests.ros.test_description import ODD
 from tests.virtual.scene_data import kr6
 
@@ -87,8 +90,6 @@ def test_moveit_finds_group_home_and_pairs(package: Path) -> None:
 
 
 def test_limits_of_acceleration_are_said_where_they_are_known(tmp_path: Path) -> None:
-    from dataclasses import replace
-
     robot = kr6()
     first, *others = robot.joints
     write_package(replace(robot, joints=(replace(first, acceleration=12.5), *others)), tmp_path)
@@ -99,8 +100,6 @@ def test_limits_of_acceleration_are_said_where_they_are_known(tmp_path: Path) ->
 
 
 def test_a_branched_robot_has_a_group_of_all_joints(tmp_path: Path) -> None:
-    from tests.providers.test_robot_of_graph import BRANCHED
-
     write_package(parse_urdf(BRANCHED), tmp_path)
     semantics = xml(tmp_path / "config" / "two_hands.srdf")
     joints = [joint.get("name") for joint in semantics.iterfind("group[@name='all_joints']/joint")]
@@ -115,6 +114,17 @@ def test_a_robot_with_odd_names_and_no_shapes_is_written_and_told(tmp_path: Path
         "no link has collision shapes of boxes, cylinders or spheres: MoveIt checks nothing against the robot"
     )
     assert "disable_collisions" not in (tmp_path / "config" / "Zelle_1_b.srdf").read_text()
+
+
+@pytest.mark.parametrize("urdf", [ODD, BRANCHED, kr6().urdf])
+def test_ros_own_parser_takes_the_urdf(urdf: str, tmp_path: Path) -> None:
+    write_package(parse_urdf(urdf), tmp_path)
+    (file,) = (tmp_path / "urdf").iterdir()
+    program = Path(sys.executable).with_name("check_urdf")  # comes with Pinocchio
+    done = subprocess.run([program, file], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Successfully Parsed XML" in done.stdout
+    assert "rror" not in done.stderr
 
 
 def test_a_title_cannot_break_out_of_the_manifest(tmp_path: Path) -> None:
