@@ -64,7 +64,7 @@ def test_its_manifest_serves_both(package: Path) -> None:
     assert manifest.findtext("name") == NAME
     kinds = {element.get("condition"): element.text for element in manifest.iter("build_type")}
     assert kinds == {"$ROS_VERSION == 1": "catkin", "$ROS_VERSION == 2": "ament_cmake"}
-    assert f"project({NAME} NONE)" in (package / "CMakeLists.txt").read_text()
+    assert f"project({NAME})" in (package / "CMakeLists.txt").read_text()
 
 
 def test_its_urdf_is_the_robot(package: Path) -> None:

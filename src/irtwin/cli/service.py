@@ -41,7 +41,16 @@ def _announce(address: str) -> None:
 @database_option
 @graph_option
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
-def live(workspace: Path, database: str | None, graph_url: str | None, port: int | None) -> None:
+@click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
+@click.option("--robot", metavar="NAME", help="Whose controller it is.")
+def live(
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+    port: int | None,
+    rtde: str | None,
+    robot: str | None,
+) -> None:
     """Watch robots: store their samples and keep the graph up to date.
 
     Reads one JSON object per line from standard input. The fields are those of ROS' JointState: robot, time (s since
@@ -50,4 +59,8 @@ def live(workspace: Path, database: str | None, graph_url: str | None, port: int
     """
     from irtwin.live.watch import watch
 
-    watch(workspace, database=database, graph_url=graph_url, port=port, announce=say)
+    if (rtde is None) != (robot is None):
+        raise click.UsageError("--rtde and --robot go together.")
+    if rtde is not None and port is not None:
+        raise click.UsageError("Give --port or --rtde, not both.")
+    watch(workspace, database=database, graph_url=graph_url, port=port, rtde=rtde, robot=robot, announce=say)

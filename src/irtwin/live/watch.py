@@ -10,9 +10,12 @@ from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from pathlib import Path
 
+from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.joint_stream import StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import LiveTwin
+from irtwin.live.rtde import Rtde
+from irtwin.providers.records import find_robot, load_robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 
@@ -26,11 +29,14 @@ def watch(
     database: str | None = None,
     graph_url: str | None = None,
     port: int | None = None,
+    rtde: str | None = None,
+    robot: str | None = None,
     announce: Callable[[str], None] = lambda line: None,
 ) -> None:
     """Watch a workspace's robots until the stream on standard input ends, or SIGINT or SIGTERM comes.
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
+    With `rtde`: what the controller there says of the robot of this name, until a signal comes.
     """
     sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
@@ -58,11 +64,27 @@ def watch(
             take(lines_of(sys.stdin.buffer))
             done.set()
 
-        if port is None:
-            threading.Thread(target=take_standard_input, daemon=True).start()
-        with nullcontext() if port is None else listening(port, take) as actual:
-            announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
-            while not done.wait(0.2):
-                twin.check()
+        def refuse_of_arm(reason: str) -> None:
+            refuse(reason)
+            twin.check()  # whether it was refused as nothing can be stored any more
+
+        if rtde is not None:
+            arm = _arm(place, rtde, robot)
+            announce(f"Following {arm.address}: {arm.what}")
+            arm.follow(twin.receive, refuse_of_arm, done, announce)
+        else:
+            if port is None:
+                threading.Thread(target=take_standard_input, daemon=True).start()
+            with nullcontext() if port is None else listening(port, take) as actual:
+                announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
+                while not done.wait(0.2):
+                    twin.check()
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
+
+
+def _arm(place: Workspace, address: str, robot: str | None) -> Rtde:
+    if robot is None:
+        raise InputError(f"{address}: whose controller is it? Name its robot by --robot")
+    robot_id = find_robot(place, robot)
+    return Rtde(address, load_robot(place, robot_id), robot_id)
