@@ -92,11 +92,23 @@ class CollisionModel:
         """The pairs of the robot's own links that are checked, by name."""
         return frozenset(frozenset(self._pair(pair)) for pair in range(self._own))
 
-    def meetings(self, q: np.ndarray) -> set[frozenset[str]]:
-        """Return all pairs that touch at the joint positions `q`: (n,), by name."""
-        pin.computeCollisions(self._model, self._data, self._geometry, self._results, q, False)
-        results = self._results.collisionResults
-        return {frozenset(self._pair(pair)) for pair in range(len(self._pairs)) if results[pair].isCollision()}
+    def ever_meeting(self, poses: np.ndarray) -> set[frozenset[str]]:
+        """Return the pairs that touch at any of the joint positions, (N, n), by name."""
+        results = pin.GeometryData(self._geometry)
+        left: dict[frozenset[str], list[int]] = {}
+        for pair in range(len(self._pairs)):
+            left.setdefault(frozenset(self._pair(pair)), []).append(pair)
+        met: set[frozenset[str]] = set()
+        for q in poses:
+            if not pin.computeCollisions(self._model, self._data, self._geometry, results, q, False):
+                continue
+            touching = {
+                name for name, own in left.items() if any(results.collisionResults[k].isCollision() for k in own)
+            }
+            for pair in (pair for name in touching for pair in left.pop(name)):
+                results.deactivateCollisionPair(pair)  # known: the next poses are searched for the others
+            met |= touching
+        return met
 
     def meeting(self, q: np.ndarray) -> tuple[str, str] | None:
         """Return the first pair that touches at the joint positions `q`: (n,); None where none does."""

@@ -11,7 +11,6 @@ import pinocchio as pin
 
 from irtwin.robot.collision import CollisionModel, joined
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import ranges
 from irtwin.robot.structure import Solid
 
 _POSES = 10_000  # drawn at random, as many as MoveIt's setup takes
@@ -35,7 +34,7 @@ def free_pairs(robot: Robot, model: CollisionModel, solids: Sequence[Solid]) -> 
     shaped = dict.fromkeys(solid.link for solid in solids if solid.purpose == "collision")
     unknown = {solid.link for solid in solids if solid.purpose == "collision" and solid.kind == "mesh"}
     carried = {name: _joint(robot, name) for name in shaped}
-    checked, met = model.own_pairs, _met(robot, model)
+    checked, met = model.own_pairs, model.ever_meeting(_drawn(robot))
     for first, second in combinations(shaped, 2):
         pair = frozenset((first, second))
         if joined(robot.model.parents, carried[first], carried[second]):
@@ -49,22 +48,22 @@ def home(robot: Robot, model: CollisionModel) -> np.ndarray:
 
     Random ones are tried where zero, put within the limits, is not clear; where none is, zero is returned.
     """
-    lower, upper = ranges(robot)
+    lower, upper = _limits(robot)
     zero = np.clip(0.0, lower, upper)
     drawn = _drawn(robot)
     nearest = drawn[np.argsort(np.linalg.norm(drawn - zero, axis=1))]
     return next((q for q in (zero, *nearest) if not model.touches(q)), zero)
 
 
-def _met(robot: Robot, model: CollisionModel) -> set[frozenset[str]]:
-    met: set[frozenset[str]] = set()
-    for q in _drawn(robot) if model.checks_itself else ():
-        met |= model.meetings(q)
-    return met
+def _limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return the joints' limits, (n,) rad or m; a half turn, or half a metre, either way where there are none."""
+    lower, upper = (np.array([getattr(joint, side) for joint in robot.joints]) for side in ("lower", "upper"))
+    free = np.array([0.5 if joint.kind == "prismatic" else np.pi for joint in robot.joints])
+    return np.where(np.isfinite(lower), lower, -free), np.where(np.isfinite(upper), upper, free)
 
 
 def _drawn(robot: Robot) -> np.ndarray:
-    lower, upper = ranges(robot)
+    lower, upper = _limits(robot)
     return np.asarray(np.random.default_rng(0).uniform(lower, upper, (_POSES, len(lower))))
 
 
