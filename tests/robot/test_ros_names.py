@@ -15,6 +15,10 @@ def test_a_valid_name_stays_and_any_other_is_made_valid() -> None:
     assert list(made.values()) == ["joint_1", "Achse_2", "Hohe", "joint_3rd", "joint", "a_b", "a_b_2"]
 
 
+def test_a_long_name_is_cut() -> None:
+    assert ros_names(["n" * 250, "n" * 251], "joint") == {"n" * 250: "n" * 100, "n" * 251: "n" * 100 + "_2"}
+
+
 def test_a_made_name_is_none_that_another_has() -> None:
     assert ros_names(["a b", "a_b", "a-b"], "joint") == {"a b": "a_b_2", "a_b": "a_b", "a-b": "a_b_3"}
 

@@ -6,6 +6,7 @@ import re
 import runpy
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from hypothesis import given, settings
+from tests.fuzz.drawn_robots import RobotPlan, robots, urdf
 from tests.providers.test_robot_of_graph import BRANCHED
 from tests.ros.test_description import ODD
 from tests.virtual.scene_data import kr6
@@ -116,15 +119,35 @@ def test_a_robot_with_odd_names_and_no_shapes_is_written_and_told(tmp_path: Path
     assert "disable_collisions" not in (tmp_path / "config" / "Zelle_1_b.srdf").read_text()
 
 
-@pytest.mark.parametrize("urdf", [ODD, BRANCHED, kr6().urdf])
-def test_ros_own_parser_takes_the_urdf(urdf: str, tmp_path: Path) -> None:
-    write_package(parse_urdf(urdf), tmp_path)
-    (file,) = (tmp_path / "urdf").iterdir()
+def check_urdf(package: Path) -> None:
+    """Check that ROS' own parser takes a package's URDF, and that its other files are well-formed."""
+    for file in [*package.glob("*/*.srdf"), *package.glob("*/*.launch"), package / "package.xml"]:
+        xml(file)
+    (file,) = (package / "urdf").iterdir()
     program = Path(sys.executable).with_name("check_urdf")  # comes with Pinocchio
     done = subprocess.run([program, file], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Successfully Parsed XML" in done.stdout
     assert "rror" not in done.stderr
+
+
+@pytest.mark.parametrize("text", [ODD, BRANCHED, kr6().urdf])
+def test_ros_own_parser_takes_the_urdf(text: str, tmp_path: Path) -> None:
+    write_package(parse_urdf(text), tmp_path)
+    check_urdf(tmp_path)
+
+
+@pytest.mark.slow
+@settings(max_examples=15, deadline=None)
+@given(plan=robots(large=False))
+def test_ros_own_parser_takes_any_robot_that_we_take(plan: RobotPlan) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            robot = parse_urdf(urdf(plan))
+        except InputError:
+            return
+        write_package(robot, Path(folder) / "package")
+        check_urdf(Path(folder) / "package")
 
 
 def test_a_title_cannot_break_out_of_the_manifest(tmp_path: Path) -> None:

@@ -8,15 +8,15 @@ from collections.abc import Iterable
 
 from irtwin.robot.description import Robot
 
-_VALID = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_LONGEST = 100  # characters of a name that has to be made valid
+_LONGEST = 100  # characters: files are named so too
+_VALID = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{_LONGEST - 1}}}")
 
 
 def ros_names(names: Iterable[str], otherwise: str) -> dict[str, str]:
     """Return each name as ROS takes it: an ASCII letter, then letters, digits and "_"; no two become one.
 
-    A valid name stays. In any other, accents go and what is no letter becomes "_"; before a digit, or where nothing
-    is left, comes `otherwise`.
+    A valid name stays. Any other is cut at 100 characters, accents go and what is no letter becomes "_"; before a
+    digit, or where nothing is left, comes `otherwise`.
     """
     given = list(dict.fromkeys(names))
     taken = {name for name in given if _VALID.fullmatch(name)}
