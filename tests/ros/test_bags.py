@@ -31,6 +31,7 @@ def run(**channels: Any) -> Signals:
     return Signals(**{"time": time, "q": q, "torque": 10.0 * q, "power": 300.0 + time / 3.0, **channels})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 @settings(
     max_examples=5,

@@ -131,6 +131,7 @@ def check_urdf(package: Path) -> None:
     assert "rror" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [ODD, BRANCHED, kr6().urdf])
 def test_ros_own_parser_takes_the_urdf(text: str, tmp_path: Path) -> None:
     write_package(parse_urdf(text), tmp_path)
@@ -155,6 +156,7 @@ def test_a_title_cannot_break_out_of_the_manifest(tmp_path: Path) -> None:
     assert str(xml(tmp_path / "package.xml").findtext("description")).startswith("</description>&: ")
 
 
+@pytest.mark.slow
 def test_a_package_is_written_again_but_no_other_folder(package: Path, tmp_path: Path) -> None:
     write_package(kr6(), package)
     (tmp_path / "thesis.tex").touch()
