@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import runpy
 import subprocess
@@ -22,6 +23,7 @@ from tests.ros.test_description import ODD
 from tests.virtual.scene_data import kr6
 
 from irtwin.errors import InputError
+from irtwin.identification.motion_limits import JointLimits
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf, read_urdf
 from irtwin.ros.ros_package import write_package
@@ -92,14 +94,24 @@ def test_moveit_finds_group_home_and_pairs(package: Path) -> None:
     assert ("base_link", "link_5") not in pairs
 
 
-def test_limits_of_acceleration_are_said_where_they_are_known(tmp_path: Path) -> None:
+def test_limits_of_acceleration_are_those_that_plans_keep_to(tmp_path: Path) -> None:
     robot = kr6()
-    first, *others = robot.joints
-    write_package(replace(robot, joints=(replace(first, acceleration=12.5), *others)), tmp_path)
+    first, second, *others = robot.joints
+    given = replace(first, acceleration=12.5), replace(second, velocity=math.inf)
+    last = replace(others.pop(), velocity=1e-5)
+    write_package(replace(robot, joints=(*given, *others, last)), tmp_path)
     text = (tmp_path / "config" / "joint_limits.yaml").read_text()
-    one, two = text.index("  joint_a1:"), text.index("  joint_a2:")
-    assert "max_velocity: 6.283185\n    has_acceleration_limits: true\n    max_acceleration: 12.5" in text[one:two]
-    assert "has_acceleration_limits: false\n    max_acceleration: 0.0" in text[two:]
+    one, two, three = (text[text.index(f"  joint_a{number}:") :].splitlines()[1:5] for number in (1, 2, 3))
+    assert one[1:] == ["    max_velocity: 6.283185", "    has_acceleration_limits: true", "    max_acceleration: 12.5"]
+    assert two == [
+        "    has_velocity_limits: false",
+        "    max_velocity: 0.0",
+        "    has_acceleration_limits: false",
+        "    max_acceleration: 0.0",
+    ]
+    limits = JointLimits.of(robot)
+    assert "    max_velocity: 0.000010000000" in text  # with an exponent YAML takes it for text
+    assert three[3] == f"    max_acceleration: {limits.acceleration[2]}"
 
 
 def test_a_branched_robot_has_a_group_of_all_joints(tmp_path: Path) -> None:

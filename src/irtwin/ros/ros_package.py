@@ -12,6 +12,7 @@ import jinja2
 import numpy as np
 
 from irtwin.errors import InputError
+from irtwin.identification.motion_limits import FULL_SPEED_AFTER
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements, ranges
@@ -40,6 +41,7 @@ def write_package(robot: Robot, folder: Path) -> list[str]:
         "title": robot.name,
         "version": metadata.version("irtwin"),
         "joints": made.robot.joints,
+        "full_speed_after": FULL_SPEED_AFTER,
         "chain": chain,
         "base": made.structure.bodies[0].name,
         "flange": flange(made.robot),
@@ -110,7 +112,7 @@ def _templates() -> jinja2.Environment:
         return name is not None and name.removesuffix(".jinja").endswith((".xml", ".launch", ".srdf"))
 
     texts = {one.name: one.read_text(encoding="utf-8") for one in files("irtwin.ros").joinpath("package").iterdir()}
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.DictLoader(texts),
         autoescape=autoescape,
         undefined=jinja2.StrictUndefined,
@@ -118,3 +120,10 @@ def _templates() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    environment.filters["decimal"] = _decimal
+    return environment
+
+
+def _decimal(value: float) -> str:
+    """Return a number without exponent: "1e-05" is text to YAML 1.1, which ROS reads."""
+    return repr(value) if "e" not in repr(value) else f"{value:.12f}"
