@@ -7,13 +7,20 @@ import signal
 import socket
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.providers.records import ingest
+from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
 from tests import rows
+from tests.data_sets import irtwin as in_this_process
+from tests.live.controller import Controller, serving
+from tests.synthetic import arm
 
 pytestmark = pytest.mark.slow
 
@@ -78,3 +85,41 @@ def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
         assert "no workspace here" in process.communicate(timeout=120)[1]
         assert process.returncode == 2
     assert not list(tmp_path.iterdir())
+
+
+def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
+    place = tmp_path / "w"
+    made = arm(6)
+    described = replace(made, joints=tuple(replace(joint, torque_constant=9.0) for joint in made.joints))
+    with Workspace(place) as there:
+        ingest(there, DataSet(tmp_path, described, (), None, None, "dc_bus", False, {}))
+        KnowledgeGraph(there.graph_folder).close()
+    controller = Controller()
+    with serving(controller) as port:
+        process = irtwin("live", "--rtde", f"127.0.0.1:{port}", "--robot", made.name, "--workspace", place)
+        assert process.stderr is not None
+        assert f"Following 127.0.0.1:{port}: positions, speeds, torques" in process.stderr.readline()
+        while controller.sent < 200 and process.poll() is None:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=120)
+    assert process.returncode == 0, said
+    stored = int(said.partition(" samples stored")[0].rpartition("\n")[2])
+    assert 190 <= stored <= controller.sent
+    question = "SELECT (series:mean(?run, 'power', 0, 1) AS ?watts) { ?run irt:State_Time ?at }"
+    out, said = irtwin("query", question, "--format", "json", "--workspace", place).communicate(timeout=120)
+    (answer,) = json.loads(out)
+    assert 96.0 < answer["watts"] < 144.0, said
+
+
+def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
+    for given, message in (
+        (("--rtde", "127.0.0.1:9"), "--rtde and --robot go together."),
+        (("--rtde", "127.0.0.1:9", "--robot", "KUKA KR6 R700", "--port", "0"), "Give --port or --rtde, not both."),
+    ):
+        told = in_this_process("live", *given, "--workspace", workspace)
+        assert (told.status, message in told.err) == (2, True), told.err
+    process = irtwin("live", "--rtde", "127.0.0.1:9", "--robot", "UR5", "--workspace", workspace)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 2
+    assert 'no robot "UR5" here; the nearest is "KUKA KR6 R700"' in said

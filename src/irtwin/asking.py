@@ -26,7 +26,7 @@ def ask(
 
     `graph_url` is that of a SPARQL server that keeps the graph. InputError where there is no graph or no answer.
     """
-    with _graph(Path(workspace), graph_url) as graph:
+    with open_graph(Path(workspace), graph_url) as graph:
         return queries.ask(graph, question, robot)
 
 
@@ -34,7 +34,7 @@ def explain(triple: str, workspace: Path | str = WORKSPACE, *, graph_url: str | 
     """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
     from irtwin.knowledge.explain.explain import explain as explain_triples
 
-    with _graph(Path(workspace), graph_url) as graph:
+    with open_graph(Path(workspace), graph_url) as graph:
         return explain_triples(graph, triple)
 
 
@@ -42,7 +42,7 @@ def export(owl: Path, workspace: Path | str = WORKSPACE, *, graph_url: str | Non
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
     from irtwin.knowledge.store.export import export_owl
 
-    with _graph(Path(workspace), graph_url) as graph:
+    with open_graph(Path(workspace), graph_url) as graph:
         export_owl(graph, owl)
 
 
@@ -56,7 +56,8 @@ def questions() -> Table:
 
 
 @contextmanager
-def _graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
+def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
+    """Give a workspace's graph, or a server's, as it stands. Raises InputError where there is none."""
     if url is not None:
         with KnowledgeGraph(url, workspace) as graph:
             yield graph

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from tests.planning.boxes import arm
+from tests.virtual.scene_data import kr6
 
 from irtwin.errors import InputError
 from irtwin.robot.collision import STEP, CollisionModel, Obstacle
@@ -86,3 +87,14 @@ def test_the_slope_of_the_clearance_is_that_of_its_differences():
     assert value == model.clearance(q)
     step = np.array([0.0, 0.0, 1e-3])
     assert model.clearance(q + step) - value == pytest.approx(slope @ step, rel=0.02)
+
+
+def test_pairs_that_ever_meet_are_those_of_each_pose() -> None:
+    robot = kr6()
+    model = CollisionModel(robot)
+    poses = np.random.default_rng(3).uniform(-2.0, 2.7, (300, 6))
+    met = {frozenset(pair) for pair in map(model.meeting, poses) if pair is not None}
+    found = model.ever_meeting(poses)
+    assert met
+    assert met <= found <= model.own_pairs
+    assert model.ever_meeting(poses[:0]) == set()

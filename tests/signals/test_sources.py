@@ -18,6 +18,7 @@ from irtwin.errors import InputError
 from irtwin.input_file import check_file
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sources import catalogue
+from irtwin.signals.sources.bag_source import BagSource
 from irtwin.signals.sources.csv_source import CsvSource
 from irtwin.signals.sources.parquet_source import ParquetSource
 from irtwin.signals.sources.source import MOST_VALUES, Source, first_line
@@ -76,12 +77,14 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_formats_that_ship() -> None:
-    assert catalogue.sources() == {".csv": CsvSource, ".parquet": ParquetSource}
+    bags = {end: BagSource for end in (".bag", ".mcap", ".db3", "/")}
+    assert catalogue.sources() == {".csv": CsvSource, ".parquet": ParquetSource} | bags
     assert isinstance(catalogue.source_of(Path("runs/one.CSV"), ROBOT), CsvSource)
 
 
 def test_another_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"run\.xlsx: a run is a \.csv or \.parquet file; convert it to one of these"):
+    ends = r"\.csv or \.parquet or \.bag or \.mcap or \.db3 file, or a ROS 2 bag's folder; convert it to one of these"
+    with pytest.raises(InputError, match=rf"run\.xlsx: a run is a {ends}"):
         read_signals(tmp_path / "run.xlsx", ROBOT)
 
 

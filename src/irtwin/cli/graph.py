@@ -123,17 +123,58 @@ def reason(
 
 @click.command()
 @workspace_option
+@database_option
 @graph_option
-@click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), required=True, help="RDF/XML file to write.")
-def export(workspace: Path, graph_url: str | None, owl: Path) -> None:
-    """Write the whole graph as one OWL file for Protégé.
+@click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), help="RDF/XML file to write: the whole graph.")
+@click.option("--ros", type=click.Path(path_type=Path, file_okay=False), help="Folder to write: a robot's ROS package.")
+@click.option("--mcap", type=click.Path(path_type=Path, dir_okay=False), help="MCAP file to write: a run, for ROS 2.")
+@click.option("--bag", type=click.Path(path_type=Path), help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
+@click.option("--robot", metavar="NAME", help="The robot; not needed where there is one alone.")
+@click.option("--run", "run_name", metavar="NAME", help="The run.")
+def export(
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+    owl: Path | None,
+    ros: Path | None,
+    mcap: Path | None,
+    bag: Path | None,
+    robot: str | None,
+    run_name: str | None,
+) -> None:
+    """Write the graph for Protégé, or a robot or a run for ROS.
 
-    The file holds ontology, individuals and inferences in RDF/XML.
+    --owl writes ontology, individuals and inferences as one RDF/XML file.
+
+    --ros writes a package for ROS 1 and 2 made of what the graph says of a robot: URDF, SRDF, limits, kinematics,
+    RViz and launch files. MoveIt's setup needs nothing added to it. `irtwin robot ros` makes it of a URDF.
+
+    --mcap and --bag write a run: positions, speeds and torques as /joint_states, each other column as a topic of
+    numbers, such as /power. Needs irtwin[ros].
     """
-    from irtwin import asking
+    asked = [place for place in (owl, ros, mcap, bag) if place is not None]
+    if len(asked) != 1:
+        raise click.UsageError("Give one of --owl, --ros, --mcap, --bag.")
+    if (run_name is not None) != (mcap is not None or bag is not None):
+        raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
+    if owl is not None:
+        from irtwin import asking
 
-    asking.export(owl, workspace, graph_url=graph_url)
-    click.echo(owl)
+        if robot is not None:
+            raise click.UsageError("--owl writes the whole graph; leave --robot out.")
+        asking.export(owl, workspace, graph_url=graph_url)
+    elif ros is not None:
+        from irtwin.ros.export import export_package
+
+        for line in export_package(ros, workspace, robot, graph_url):
+            say(f"irtwin: {line}")
+    elif run_name is not None:
+        from irtwin.ros.export import export_bag
+
+        if mcap is not None and mcap.suffix.lower() != ".mcap":
+            raise click.UsageError("--mcap writes a file whose name ends in .mcap.")
+        export_bag(asked[0], workspace, run_name, robot, database)
+    click.echo(asked[0])
 
 
 @click.command("map")

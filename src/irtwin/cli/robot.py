@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from irtwin.cli.options import say
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -118,6 +119,22 @@ def urdf(source: Path, out: Path) -> None:
     described = read_robot(source)
     check_place(out)
     write(out, described.urdf.encode())
+    click.echo(out)
+
+
+@robot.command()
+@_source
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
+def ros(source: Path, out: Path) -> None:
+    """Write a robot as a ROS package.
+
+    SOURCE is a URDF file, a data set's folder, or its dataset.toml. The package is that of `irtwin export --ros`.
+    """
+    from irtwin.ros.ros_package import write_package
+    from irtwin.signals.log import read_robot
+
+    for line in write_package(read_robot(source), out):
+        say(f"irtwin: {line}")
     click.echo(out)
 
 

@@ -42,7 +42,8 @@ def _announce(address: str) -> None:
 @graph_option
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
 @click.option("--replay", type=click.Path(path_type=Path, dir_okay=False), help="Play this log of a robot instead.")
-@click.option("--robot", metavar="NAME", help="Whose log it is.")
+@click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
+@click.option("--robot", metavar="NAME", help="Whose log or controller it is.")
 @click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")
 def live(
     workspace: Path,
@@ -50,6 +51,7 @@ def live(
     graph_url: str | None,
     port: int | None,
     replay: Path | None,
+    rtde: str | None,
     robot: str | None,
     speed: float,
 ) -> None:
@@ -61,16 +63,19 @@ def live(
     """
     from irtwin.live.watch import watch
 
-    if replay is None and (robot is not None or speed != 1.0):
-        raise click.UsageError("--robot and --speed are for a log: name it by --replay.")
-    if replay is not None and port is not None:
-        raise click.UsageError("give --port or --replay, not both.")
+    if sum(source is not None for source in (port, replay, rtde)) > 1:
+        raise click.UsageError("Give one of --port, --replay and --rtde.")
+    if robot is not None and replay is None and rtde is None:
+        raise click.UsageError("--robot is for --replay and --rtde.")
+    if speed != 1.0 and replay is None:
+        raise click.UsageError("--speed is for --replay.")
     watch(
         workspace,
         database=database,
         graph_url=graph_url,
         port=port,
         replayed=replay,
+        rtde=rtde,
         robot=robot,
         speed=speed,
         announce=say,

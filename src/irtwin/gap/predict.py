@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import Run, payload_told
+from irtwin.signals.log import Run, payload_told, topics_told
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.twin.twin import Twin
@@ -24,7 +24,7 @@ def read_motion(
     payload_mass kg, payload_com m in the flange frame: what the controller was told; None takes it from the data set
     that lists the file. Raises InputError on a file that is no run of the robot.
     """
-    signals, _ = read_signals(file, twin.robot, measured=False)
+    signals, _ = read_signals(file, twin.robot, measured=False, topics=topics_told(file, twin.robot))
     mass, com = payload_told(file) if payload_mass is None or payload_com is None else (0.0, (0.0, 0.0, 0.0))
     return Run(
         name=file.stem,

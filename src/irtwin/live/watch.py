@@ -16,6 +16,7 @@ from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.replay import Replay
+from irtwin.live.rtde import Rtde
 from irtwin.providers.records import find_robot, load_robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
@@ -32,6 +33,7 @@ def watch(
     graph_url: str | None = None,
     port: int | None = None,
     replayed: Path | None = None,
+    rtde: str | None = None,
     robot: str | None = None,
     speed: float = 1.0,
     announce: Callable[[str], None] = lambda line: None,
@@ -40,6 +42,7 @@ def watch(
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
     With `replayed`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
+    With `rtde`: what the controller there says of the robot of this name, until a signal comes.
     """
     sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
@@ -69,10 +72,18 @@ def watch(
             take(lines_of(sys.stdin.buffer))
             done.set()
 
+        def refuse_of_arm(reason: str) -> None:
+            refuse(reason)
+            twin.check()  # whether it was refused as nothing can be stored any more
+
         if replay is not None:
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
             after = twin.stored_until(replay.robot_id)
             replay.play(_refusing(twin.receive, refuse), done, after=after, ahead=AHEAD)
+        elif rtde is not None:
+            arm = _arm(place, rtde, robot)
+            announce(f"Following {arm.address}: {arm.what}")
+            arm.follow(twin.receive, refuse_of_arm, done, announce)
         else:
             if port is None:
                 threading.Thread(target=take_standard_input, daemon=True).start()
@@ -101,3 +112,10 @@ def _refusing(take: Callable[[State], None], refuse: Callable[[str], None]) -> C
             refuse(str(error))
 
     return take_or_refuse
+
+
+def _arm(place: Workspace, address: str, robot: str | None) -> Rtde:
+    if robot is None:
+        raise InputError(f"{address}: whose controller is it? Name its robot by --robot")
+    robot_id = find_robot(place, robot)
+    return Rtde(address, load_robot(place, robot_id), robot_id)

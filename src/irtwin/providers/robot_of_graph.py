@@ -40,6 +40,7 @@ _JOINTS = f"""SELECT * {{
   OPTIONAL {{ ?joint irt:Lower_Limit ?lower ; irt:Upper_Limit ?upper }}
   OPTIONAL {{ ?joint irt:Speed_Limit ?velocity }}
   OPTIONAL {{ ?joint irt:Torque_Limit ?effort }}
+  OPTIONAL {{ ?joint irt:Acceleration_Limit ?acceleration }}
 }} ORDER BY ?number"""
 _SHAPES = f"""SELECT * {{
   ?on irt:link_of ?arm ; irt:Link_Name ?link ; irt:Link_Number ?link_number .
@@ -75,8 +76,14 @@ def robot_of_graph(graph: KnowledgeGraph, robot_iri: str) -> Robot:
     name = said[0]["name"]
     moving = [_joint(row) for row in joints if row["axis_x"] is not None]
     robot = parse_urdf(urdf_text(name, structure, moving), source=f"{name} in the graph")
+    accelerations = {row["name"]: row["acceleration"] for row in joints}  # of these a URDF has no word
     return replace(
-        robot, name=name, manufacturer=said[0]["manufacturer"], type=said[0]["type"], weight=said[0]["weight"]
+        robot,
+        name=name,
+        joints=tuple(replace(joint, acceleration=accelerations[joint.name]) for joint in robot.joints),
+        manufacturer=said[0]["manufacturer"],
+        type=said[0]["type"],
+        weight=said[0]["weight"],
     )
 
 

@@ -87,6 +87,29 @@ class CollisionModel:
         """The links with mass but without collision shapes, which nothing is kept off."""
         return tuple(link.name for link in self._robot.links if link.mass > 0 and not link.collisions)
 
+    @property
+    def own_pairs(self) -> frozenset[frozenset[str]]:
+        """The pairs of the robot's own links that are checked, by name."""
+        return frozenset(frozenset(self._pair(pair)) for pair in range(self._own))
+
+    def ever_meeting(self, poses: np.ndarray) -> set[frozenset[str]]:
+        """Return the pairs that touch at any of the joint positions, (N, n), by name."""
+        results = pin.GeometryData(self._geometry)
+        left: dict[frozenset[str], list[int]] = {}
+        for pair in range(len(self._pairs)):
+            left.setdefault(frozenset(self._pair(pair)), []).append(pair)
+        met: set[frozenset[str]] = set()
+        for q in poses:
+            if not pin.computeCollisions(self._model, self._data, self._geometry, results, q, False):
+                continue
+            touching = {
+                name for name, own in left.items() if any(results.collisionResults[k].isCollision() for k in own)
+            }
+            for pair in (pair for name in touching for pair in left.pop(name)):
+                results.deactivateCollisionPair(pair)  # known: the next poses are searched for the others
+            met |= touching
+        return met
+
     def meeting(self, q: np.ndarray) -> tuple[str, str] | None:
         """Return the first pair that touches at the joint positions `q`: (n,); None where none does."""
         if not pin.computeCollisions(self._model, self._data, self._geometry, self._results, q, True):
@@ -187,8 +210,7 @@ class CollisionModel:
         joints = [each.parentJoint for each in objects]
         for one in range(len(objects)):
             for other in range(one):
-                a, b = joints[one], joints[other]
-                if a == b or parents[a] == b or parents[b] == a:
+                if joined(parents, joints[one], joints[other]):
                     continue
                 self._geometry.addCollisionPair(pin.CollisionPair(other, one))
         self._leave_out_those_that_always_touch()
@@ -231,6 +253,14 @@ class CollisionModel:
 
     def _name(self, index: int) -> str:
         return self._names[index] if index < len(self._names) else str(self._geometry.geometryObjects[index].name)
+
+
+def joined(parents: Sequence[int], one: int, other: int) -> bool:
+    """Whether bodies that two joints carry, 0 the base, are one, or have one joint between them.
+
+    parents: of each joint, by number, as in Pinocchio's model.
+    """
+    return one == other or parents[one] == other or parents[other] == one
 
 
 def _solid(shape: Shape, where: str) -> coal.ShapeBase:

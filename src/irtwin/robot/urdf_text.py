@@ -38,7 +38,8 @@ def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:
         _origin(shape, solid.origin)
         SubElement(SubElement(shape, "geometry"), solid.kind, _sizes(solid))
         if solid.colour is not None:
-            SubElement(SubElement(shape, "material", name=""), "color", rgba=_words(solid.colour))
+            rgba = _words(solid.colour)  # its name too: readers take two materials of one name for the same
+            SubElement(SubElement(shape, "material", name=f"rgba {rgba}"), "color", rgba=rgba)
 
 
 def _sizes(solid: Solid) -> dict[str, str]:

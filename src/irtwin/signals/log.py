@@ -17,13 +17,14 @@ from irtwin.signals.dh_table import robot_of_table
 from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
+from irtwin.signals.sources.bag_source import number_topics
 from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
 
 ROLES = ("observed", "reference", "simulated")
 SHEET_KEYS = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _POWER_AT = ("mains", "dc_bus")
 # what the tables of dataset.toml may hold, besides notes
-DATA_SET_KEYS = ("robot", "run", "twin")
+DATA_SET_KEYS = ("robot", "run", "twin", "topics")
 ROBOT_KEYS = (
     "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
     "arm_movement_type", "simulated", "joint",
@@ -85,7 +86,8 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         f"{file}: [robot] {key} is kept as a note; did you mean {near}?" for key, near in table.near_misses(ROBOT_KEYS)
     ]
     findings: list[Finding] = []
-    runs = list(_runs(folder, file, document, robot, repair, repairs, findings))
+    topics = _topics(file, document, robot)
+    runs = list(_runs(folder, file, document, robot, repair, repairs, findings, topics))
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
@@ -127,15 +129,29 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
 
     Raises InputError where that data set's dataset.toml cannot be read.
     """
+    for _, table in _listing(file):
+        return table.number("payload_mass", least=0.0) or 0.0, _centre(table)
+    return 0.0, (0.0, 0.0, 0.0)
+
+
+def topics_told(file: Path, robot: Robot) -> dict[str, str]:
+    """Return what [topics] of the data set around a run says; nothing where none lists the file. Raises InputError."""
+    for document, table in _listing(file):
+        return _topics(table.file, document, robot)
+    return {}
+
+
+def _listing(file: Path) -> Iterator[tuple[dict[str, Any], Table]]:
+    """Yield the data sets around a run that list it, each with the run's table."""
     for folder in list(file.absolute().parents)[:2]:
         toml = folder / "dataset.toml"
-        runs = read_toml(toml).get("run") if toml.is_file() else None
+        document = read_toml(toml) if toml.is_file() else {}
+        runs = document.get("run")
         for number, values in enumerate(runs if isinstance(runs, list) else [], start=1):
             table = Table(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
             named = table.text("file")
             if named is not None and real_path(folder / named) == real_path(file):
-                return table.number("payload_mass", least=0.0) or 0.0, _centre(table)
-    return 0.0, (0.0, 0.0, 0.0)
+                yield document, table
 
 
 def read_robot(source: Path) -> Robot:
@@ -191,6 +207,7 @@ def _runs(
     repair: bool,
     repairs: list[str],
     findings: list[Finding],
+    topics: Mapping[str, str],
 ) -> Iterator[Run]:
     for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
         table = Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
@@ -199,14 +216,14 @@ def _runs(
         role = table.text("role", "observed") or ""
         if role not in ROLES:
             raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
-        signals, dropped = read_signals(path, robot, repair=repair)
+        signals, dropped = read_signals(path, robot, repair=repair, topics=topics)
         pieces, sampled = as_sampled(signals, path)
         repairs += dropped
         findings += sampled
         run = Run(
             name=path.stem,
             file=path,
-            sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+            sha256=_checksum(path),
             role=role,
             payload_mass=table.number("payload_mass", least=0.0) or 0.0,
             payload_com=_centre(table),
@@ -216,6 +233,24 @@ def _runs(
             signals=signals,
         )
         yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
+
+
+def _checksum(path: Path) -> str:
+    """Return the sha256 of a run's file, in hexadecimal; of a folder, that of its files' names and checksums."""
+    if path.is_file():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    files = sorted(one for one in path.iterdir() if one.is_file())
+    return hashlib.sha256("\n".join(f"{one.name} {_checksum(one)}" for one in files).encode()).hexdigest()
+
+
+def _topics(file: Path, document: Mapping[str, Any], robot: Robot) -> dict[str, str]:
+    """Return what [topics] says: the topic of the joint states, and of columns that these do not carry."""
+    values = document.get("topics", {})
+    if not isinstance(values, dict):
+        raise InputError(f"{file}: [topics] should be a table")
+    table = Table(file, "[topics]", values)
+    table.check_keys(("joint_states", *number_topics(robot)))
+    return {key: table.text(key) or "" for key in values}
 
 
 def _piece(run: Run, number: int, signals: Signals) -> Run:

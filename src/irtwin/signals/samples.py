@@ -19,13 +19,21 @@ from irtwin.signals.sources.source import MOST_COLUMNS, Source
 FEWEST = 20  # samples; fewer cannot be filtered
 
 
-def read_signals(path: Path, robot: Robot, *, repair: bool = False, measured: bool = True) -> tuple[Signals, list[str]]:
-    """Read a run's file; return its signals and, with `repair`, a line for each kind of sample that was dropped.
+def read_signals(
+    path: Path,
+    robot: Robot,
+    *,
+    repair: bool = False,
+    measured: bool = True,
+    topics: Mapping[str, str] | None = None,
+) -> tuple[Signals, list[str]]:
+    """Read a run's file; return its signals and a line for each kind of sample that was dropped.
 
-    `measured`: whether torque or power has to be there, or the motion is enough. Raises InputError, naming file, line
-    or row and column, on anything `LOG_FORMAT.md` calls bad input.
+    `repair` drops bad samples; `measured`: whether torque or power has to be there, or the motion is enough; `topics`:
+    what [topics] of dataset.toml says. Raises InputError, naming file, line or row and column, on anything
+    `LOG_FORMAT.md` calls bad input.
     """
-    source = source_of(path, robot)
+    source = source_of(path, robot, topics)
     channels = by_column(robot.joint_names)
     known = _known(source.columns(), channels, robot, path)
     table, repairs = source.read(known, repair=repair)

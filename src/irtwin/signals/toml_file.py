@@ -14,6 +14,7 @@ from typing import Any
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
 
+BAG_FOLDER = "metadata.yaml"  # what a folder that is a ROS 2 bag holds
 _LARGEST = 20_000_000  # bytes
 _GREATEST = 1e300  # of a number
 _DEEPEST = 32  # tables in tables
@@ -70,7 +71,7 @@ class Table:
         return InputError(f"{self.file}: {named} is no key of the log format; {hint}")
 
     def path(self, key: str, folder: Path) -> Path:
-        """Return the file that a key names. Raises InputError where it is none, or not in the folder."""
+        """Return the file that a key names, or a folder's bag. Raises InputError where there is none in the folder."""
         text = self.text(key)
         if text is None:
             raise InputError(f"{self.file}: {self.name} {key} is missing")
@@ -82,7 +83,7 @@ class Table:
             raise InputError(
                 f'{self.file}: {self.name} {key} = "{text}" leads outside the data set; copy the file into it'
             )
-        if not real.is_file():
+        if not (real.is_file() or (real / BAG_FOLDER).is_file()):
             raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
         return path
 

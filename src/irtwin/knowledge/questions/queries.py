@@ -58,7 +58,27 @@ def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table
     named = named_questions().get(question)
     if named is None or not named.of_robot:
         raise InputError(f"{question!r} does not ask about one robot; leave --robot out")
-    return graph.query(named.text, {"arm": _robot_iri(graph, robot)})
+    return graph.query(named.text, {"arm": robot_named(graph, robot)})
+
+
+def robot_named(graph: KnowledgeGraph, name: str | None) -> str:
+    """Return the IRI of the robot called `name`, of the only one where None.
+
+    Raises InputError where there is none of the name, with the nearest one, or where there are others.
+    """
+    rows = graph.query("SELECT ?arm ?name { ?arm irt:has_Information / irt:IR_Name ?name } ORDER BY ?name")
+    found = {row["name"]: row["arm"] for row in rows}
+    known = ", ".join(list(found)[:10]) + (", ..." if len(found) > 10 else "")
+    if name is None and len(found) == 1:
+        return str(*found.values())
+    if name is None:
+        raise InputError(f"say which robot by --robot; known are {known}" if found else "the graph knows no robot")
+    if name not in found:
+        near = get_close_matches(name, found, n=1)
+        raise InputError(
+            f"there is no robot {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
+        )
+    return str(found[name])
 
 
 def to_json(table: Table) -> str:
@@ -88,18 +108,6 @@ def _read(file: Path) -> Question:
     text = file.read_text(encoding="utf-8")
     header = dict(_HEADER.findall(text))
     return Question(file.stem, header["title"], header["question"], header["theme"], header.get("of") == "robot", text)
-
-
-def _robot_iri(graph: KnowledgeGraph, name: str) -> str:
-    rows = graph.query("SELECT ?arm ?name { ?arm irt:has_Information / irt:IR_Name ?name } ORDER BY ?name")
-    found = {row["name"]: row["arm"] for row in rows}
-    if name not in found:
-        near = get_close_matches(name, found, n=1)
-        known = ", ".join(list(found)[:10]) + (", ..." if len(found) > 10 else "")
-        raise InputError(
-            f"there is no robot {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
-        )
-    return str(found[name])
 
 
 def _text(question: str) -> str:

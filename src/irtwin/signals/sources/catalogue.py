@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
+from irtwin.signals.sources.bag_source import BagSource
 from irtwin.signals.sources.csv_source import CsvSource
 from irtwin.signals.sources.parquet_source import ParquetSource
 from irtwin.signals.sources.source import Source
 
 GROUP = "irtwin.sources"
 
-_OWN: tuple[type[Source], ...] = (CsvSource, ParquetSource)
+_OWN: tuple[type[Source], ...] = (CsvSource, ParquetSource, BagSource)
 
 
-def source_of(path: Path, robot: Robot) -> Source:
-    """Return a run's file as a source, by the end of its name. Raises InputError where no format ends so."""
+def source_of(path: Path, robot: Robot, topics: Mapping[str, str] | None = None) -> Source:
+    """Return a run's file, or folder, as a source, by the end of its name. Raises InputError where no format ends so.
+
+    topics: what [topics] of dataset.toml says.
+    """
     known = sources()
-    kind = known.get(path.suffix.lower())
+    kind = known.get("/" if path.is_dir() else path.suffix.lower())
     if kind is None:
-        raise InputError(f"{path}: a run is a {' or '.join(known)} file; convert it to one of these")
-    return kind(path, robot)
+        ends = " or ".join(end for end in known if end != "/")
+        raise InputError(f"{path}: a run is a {ends} file, or a ROS 2 bag's folder; convert it to one of these")
+    return kind(path, robot, topics)
 
 
 def sources() -> dict[str, type[Source]]:

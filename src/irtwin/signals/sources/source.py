@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -21,16 +21,18 @@ class Source(ABC):
 
     `columns` are those of `docs/LOG_FORMAT.md`, by which the joints of `robot` are named, and others that nobody asks
     for. A format of several streams, each with a clock of its own, brings them onto one `time` in `read`.
-    What is checked of the samples is the same for all formats, and not done here.
+    What is checked of the samples is the same for all formats, and not done here. `topics`: what [topics] of
+    dataset.toml says, for formats of several streams.
     """
 
-    suffixes: ClassVar[tuple[str, ...]]  # in small letters, as ".csv"
+    suffixes: ClassVar[tuple[str, ...]]  # in small letters, as ".csv"; "/" of a folder
     counted: ClassVar[str] = "row"  # what a message calls a sample's place in the file
     first: ClassVar[int] = 0  # place of the first sample
 
-    def __init__(self, path: Path, robot: Robot) -> None:
+    def __init__(self, path: Path, robot: Robot, topics: Mapping[str, str] | None = None) -> None:
         self.path = path
         self.robot = robot
+        self.topics = topics or {}
 
     @abstractmethod
     def columns(self) -> Sequence[str]:

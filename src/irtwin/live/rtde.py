@@ -1,0 +1,235 @@
+"""States of a Universal Robots arm by RTDE, the real-time data exchange of its controller: version 2 of the protocol.
+
+Packages are a size (2 bytes, its own among them), a kind (1 byte) and what is in it, big-endian. The client asks for
+version 2, says which variables it wants, and has data sent.
+"""
+
+from __future__ import annotations
+
+import math
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+
+from irtwin.errors import InputError
+from irtwin.live.joint_stream import STREAMED, State
+from irtwin.robot.description import Robot
+
+PORT = 30004
+_VERSION, _SETUP, _START, _DATA = ord("V"), ord("O"), ord("S"), ord("U")  # kinds of packages
+_HEAD = struct.Struct(">HB")
+_JOINTS = 6
+_FORMS = {"DOUBLE": "d", "VECTOR6D": "6d"}
+_WANTED = ("timestamp", "actual_q")  # s since the controller started; rad
+_IF_THERE = (
+    "actual_qd",  # rad/s
+    "actual_current",  # A
+    "joint_temperatures",  # degC
+    "actual_robot_voltage",  # V
+    "actual_robot_current",  # A
+    "payload",  # kg
+)
+_PATIENCE = 5.0  # s without a package: the controller sends some hundred a second
+_AGAIN = 1.0  # s until the next try to connect
+_HEAVIEST = 1e6  # kg
+_SKIPPED = 100  # packages of other kinds before an answer
+
+
+class LostError(Exception):
+    """The connection broke, or what came is no RTDE."""
+
+
+class Rtde:
+    """An arm's controller; `what` says which values come, and what is missing for others."""
+
+    def __init__(self, address: str, robot: Robot, robot_id: str, rate: float = 125.0) -> None:
+        """Connect to HOST or HOST:PORT. Raises InputError where no controller of such an arm answers.
+
+        rate: samples a second to ask for, Hz.
+        """
+        self._where, self._rate = _read_address(address), rate
+        self.address = f"{self._where[0]}:{self._where[1]}"
+        self._robot, self.robot_id = robot, robot_id
+        if len(robot.joints) != _JOINTS:
+            raise InputError(
+                f"{robot.name} has {len(robot.joints)} moving joints; an arm of Universal Robots has {_JOINTS}"
+            )
+        constants = [joint.torque_constant for joint in robot.joints]
+        self._constants = None if None in constants else [float(constant or 0.0) for constant in constants]
+        self._fields: dict[str, str] = {}
+        self._recipe = 0
+        try:
+            self._socket = self._connect()
+        except (OSError, LostError) as error:
+            raise InputError(
+                f"{self.address}: no controller answers by RTDE ({error}); check address and port"
+            ) from error
+
+    @property
+    def what(self) -> str:
+        """Which values come, and what is missing for others."""
+        torque = "actual_current" in self._fields
+        said = ["positions", *(["speeds"] if "actual_qd" in self._fields else [])]
+        said += ["torques (current times torque constant)"] if torque and self._constants else []
+        said += ["temperatures"] if "joint_temperatures" in self._fields else []
+        said += ["power (robot voltage times robot current)"] if self._has_power else []
+        lacking = [] if not torque or self._constants else ["no torques: give torque_constant of each joint"]
+        lacking += [] if self._has_power else ["no power: the controller does not offer it"]
+        return "; ".join([", ".join(said), *lacking])
+
+    def follow(
+        self,
+        take: Callable[[State], None],
+        refuse: Callable[[str], None],
+        done: threading.Event,
+        announce: Callable[[str], None] = lambda line: None,
+    ) -> None:
+        """Give each state on until `done`; one that says none, or is not taken, is refused by its reason.
+
+        A connection that is lost is made again, and announced.
+        """
+        while not done.is_set():
+            try:
+                with closing(self._socket):
+                    for said, offset in self._packages(done):
+                        try:
+                            take(self._state(said, offset))
+                        except InputError as error:
+                            refuse(str(error))
+            except (OSError, LostError) as error:
+                announce(f"{self.address}: the connection is lost ({_reason(error)}); trying again")
+                self._connect_again(done)
+                if not done.is_set():
+                    announce(f"{self.address}: connected again")
+
+    def _connect_again(self, done: threading.Event) -> None:
+        while not done.wait(_AGAIN):
+            try:
+                self._socket = self._connect()
+                return
+            except (OSError, LostError):
+                continue
+
+    @property
+    def _has_power(self) -> bool:
+        return {"actual_robot_voltage", "actual_robot_current"} <= self._fields.keys()
+
+    def _connect(self) -> socket.socket:
+        """Connect, agree on version and variables, and start the data."""
+        connection = socket.create_connection(self._where, timeout=_PATIENCE)
+        try:
+            if self._ask(connection, _VERSION, struct.pack(">H", 2)) != b"\x01":
+                raise LostError("it does not speak version 2 of RTDE")
+            self._set_up(connection)
+            if self._ask(connection, _START, b"") != b"\x01":
+                raise LostError("it does not start to send")
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _set_up(self, connection: socket.socket) -> None:
+        """Ask for the variables, and once more without those that the controller does not have."""
+        names = [*_WANTED, *_IF_THERE]
+        for _ in range(2):
+            answer = self._ask(connection, _SETUP, struct.pack(">d", self._rate) + ",".join(names).encode())
+            kinds = answer[1:].decode("ascii", "replace").split(",")
+            if not answer or len(kinds) != len(names):
+                raise LostError("it does not say which variables it has")
+            self._recipe = answer[0]
+            self._fields = {name: kind for name, kind in zip(names, kinds, strict=True) if kind in _FORMS}
+            names = list(self._fields)
+            if absent := [name for name in _WANTED if name not in names]:
+                raise LostError(f"it has no {absent[0]}")
+            if len(names) == len(kinds):
+                return
+        raise LostError("it does not keep to the variables that it said")
+
+    def _ask(self, connection: socket.socket, kind: int, content: bytes) -> bytes:
+        connection.sendall(_HEAD.pack(_HEAD.size + len(content), kind) + content)
+        for _ in range(_SKIPPED):
+            came, answer = _package(connection)
+            if came == kind:
+                return answer
+        raise LostError("it does not answer")
+
+    def _packages(self, done: threading.Event) -> Iterator[tuple[dict[str, tuple[float, ...]], float]]:
+        """Yield the variables of each data package, and what its timestamp counts from, s since 1970."""
+        form = struct.Struct(">B" + "".join(_FORMS[kind] for kind in self._fields.values()))
+        offset = None
+        while not done.is_set():
+            kind, content = _package(self._socket)
+            if kind != _DATA:
+                continue  # a text of the controller's, say
+            if len(content) != form.size or content[0] != self._recipe:
+                raise LostError("a data package is not what was asked for")
+            said = self._by_name(form.unpack(content)[1:])
+            if offset is None:
+                offset = time.time() - said["timestamp"][0]
+            yield said, offset
+
+    def _by_name(self, values: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+        said, place = {}, 0
+        for name, kind in self._fields.items():
+            width = _JOINTS if kind == "VECTOR6D" else 1
+            said[name] = values[place : place + width]
+            place += width
+        return said
+
+    def _state(self, said: Mapping[str, tuple[float, ...]], offset: float) -> State:
+        """Return the state of a data package. Raises InputError where a value is none of a robot."""
+        values = {"q": said["actual_q"]}
+        if "actual_qd" in said:
+            values["dq"] = said["actual_qd"]
+        if "actual_current" in said and self._constants is not None:
+            values["torque"] = tuple(a * b for a, b in zip(said["actual_current"], self._constants, strict=True))
+        if "joint_temperatures" in said:
+            values["temperature"] = said["joint_temperatures"]
+        if self._has_power:
+            values["power"] = (said["actual_robot_voltage"][0] * said["actual_robot_current"][0],)
+        for field, numbers in values.items():
+            greatest = STREAMED[field].greatest
+            if not all(-greatest <= number <= greatest for number in numbers):  # nor NaN
+                raise InputError(f"{self.address}: {STREAMED[field].label} is not a number within {greatest:g}")
+        payload = said.get("payload", (math.nan,))[0]
+        return State(
+            self.robot_id,
+            offset + said["timestamp"][0],
+            tuple(
+                values.get(field, (math.nan,) * (_JOINTS if channel.per_joint else 1))
+                for field, channel in STREAMED.items()
+            ),
+            payload if 0 <= payload <= _HEAVIEST else None,
+        )
+
+
+def _package(connection: socket.socket) -> tuple[int, bytes]:
+    """Return the next package's kind and content."""
+    size, kind = _HEAD.unpack(_exactly(connection, _HEAD.size))
+    if size < _HEAD.size:
+        raise LostError("what it sends is no RTDE")
+    return kind, _exactly(connection, size - _HEAD.size)
+
+
+def _exactly(connection: socket.socket, count: int) -> bytes:
+    parts = bytearray()
+    while len(parts) < count:
+        part = connection.recv(count - len(parts))
+        if not part:
+            raise LostError("it closed the connection")
+        parts += part
+    return bytes(parts)
+
+
+def _reason(error: Exception) -> str:
+    return f"silent for {_PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)
+
+
+def _read_address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":") if ":" in text else (text, "", str(PORT))
+    if not host or not port.isascii() or not port.isdigit() or not 0 < int(port) < 1 << 16:
+        raise InputError(f'--rtde "{text[:100]}": give HOST or HOST:PORT')
+    return host, int(port)

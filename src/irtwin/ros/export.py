@@ -1,0 +1,56 @@
+"""What a workspace knows, written for ROS."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+
+from sqlalchemy import select
+
+from irtwin.asking import open_graph
+from irtwin.errors import InputError
+from irtwin.knowledge.questions.queries import robot_named
+from irtwin.providers.records import find_robot, load_robot, load_run
+from irtwin.providers.robot_of_graph import robot_of_graph
+from irtwin.ros.bags import write_bag
+from irtwin.ros.ros_package import write_package
+from irtwin.storage import schema
+from irtwin.storage.database import Workspace
+
+
+def export_package(out: Path, workspace: Path, robot: str | None, graph_url: str | None = None) -> list[str]:
+    """Write the ROS package of a robot of the graph into a folder; return what one should know of it.
+
+    robot: its name; the only one's where None. Raises InputError where there is no such robot, or no place to write.
+    """
+    with open_graph(workspace, graph_url) as graph:
+        described = robot_of_graph(graph, robot_named(graph, robot))
+    return write_package(described, out)
+
+
+def export_bag(out: Path, workspace: Path, run: str, robot: str | None, database: str | None = None) -> None:
+    """Write a stored run, by its name, as a bag: FILE.mcap, FILE.bag of ROS 1, else the folder of a ROS 2 bag.
+
+    robot: the name of the run's robot; needed where runs of several have the name. Raises InputError where there is no
+    such run, or no place to write.
+    """
+    with Workspace.existing(workspace, database) as place:
+        row = _run(place, run, None if robot is None else find_robot(place, robot))
+        described = load_robot(place, row.robot_id)
+        stored = load_run(place, described, row.run_id)
+    write_bag(out, described, stored.signals, row.start_time)
+
+
+def _run(place: Workspace, name: str, robot_id: str | None) -> schema.Run:
+    with place.reading() as session:
+        runs = list(session.scalars(select(schema.Run).order_by(schema.Run.run_id)))
+    of_robot = [run for run in runs if robot_id in (None, run.robot_id)]
+    found = [run for run in of_robot if run.name == name]
+    if not found:
+        near = get_close_matches(name, {run.name for run in of_robot}, 1, 0.0)
+        hint = f'the nearest is "{near[0]}"' if near else "it has none; run a data set first"
+        raise InputError(f'{place.folder}: no run "{name}" here; {hint}')
+    if len(found) > 1:
+        owners = ", ".join(run.robot_id for run in found[:10])
+        raise InputError(f'{place.folder}: several robots have a run "{name}": {owners}; say which by --robot')
+    return found[0]

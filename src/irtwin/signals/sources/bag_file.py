@@ -1,0 +1,137 @@
+"""Messages of ROS bags, by the package rosbags: ROS 1, ROS 2 (SQLite or MCAP), a folder or a file alone."""
+
+from __future__ import annotations
+
+import bz2
+import re
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from irtwin.errors import InputError
+from irtwin.input_file import check_file
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32")
+_LARGEST = 1_000_000_000  # bytes of a bag
+_LARGEST_CHUNK = 256_000_000  # bytes, inflated; recorders take chunks of a MB or so
+_METADATA = "metadata.yaml"
+_COMPRESSED = re.compile(r"^\s*compression_mode:\s*[\"']?(file|message)\b", re.IGNORECASE | re.MULTILINE)
+_DAMAGE = (
+    *(AssertionError, AttributeError, EOFError, LookupError, MemoryError, OSError, OverflowError),
+    *(RuntimeError, TypeError, ValueError, struct.error),
+)  # what rosbags, which trusts its input, raises on bytes that are no bag
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag with messages of one type."""
+
+    name: str
+    kind: str
+    count: int
+
+
+class BagFile:
+    """A bag that is open to read."""
+
+    def __init__(self, path: Path, reader: Any) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self.path = path
+        self._reader = reader
+        self._of_ros1 = path.suffix.lower() == ".bag"
+        self._types = get_typestore(Stores.ROS1_NOETIC if self._of_ros1 else Stores.ROS2_HUMBLE)
+
+    @property
+    def topics(self) -> list[Topic]:
+        """The topics that may hold a run's channels, in the order of their names."""
+        found: dict[tuple[str, str], int] = {}
+        for connection in self._wanted():
+            key = (connection.topic, connection.msgtype)
+            found[key] = found.get(key, 0) + connection.msgcount
+        return [Topic(*key, count) for key, count in sorted(found.items())]
+
+    def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+        """Yield topic, time of recording (ns since 1970) and message of what the topics hold, in that order of time."""
+        chosen = [connection for connection in self._wanted() if connection.topic in topics]
+        parse = self._types.deserialize_ros1 if self._of_ros1 else self._types.deserialize_cdr
+        for connection in chosen:
+            self._check_type(connection)
+        for connection, time, content in self._reader.messages(chosen) if chosen else ():
+            yield connection.topic, time, parse(content, connection.msgtype)
+
+    def _wanted(self) -> list[Connection]:
+        return [one for one in self._reader.connections if one.msgtype in (JOINT_STATE, *NUMBERS)]
+
+    def _check_type(self, connection: Connection) -> None:
+        if self._of_ros1 and connection.digest != self._types.generate_msgdef(connection.msgtype)[1]:
+            raise InputError(
+                f"{self.path}: topic {connection.topic} has a {connection.msgtype} that is not ROS' own; convert it"
+            )
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[BagFile]:
+    """Give a bag. Raises InputError where it cannot be read, as long as it is open: it is read on the way."""
+    _check_place(path)
+    try:
+        import apsw
+        from rosbags.rosbag1 import Reader as Reader1
+        from rosbags.rosbag1 import ReaderError as ReaderError1
+        from rosbags.rosbag2 import Reader as Reader2
+        from rosbags.rosbag2 import ReaderError as ReaderError2
+        from rosbags.serde import SerdeError
+    except ImportError as error:
+        raise InputError('bags need the package rosbags; install it with: pip install "irtwin[ros]"') from error
+    _bound_compression()
+    try:
+        with (Reader1 if path.suffix.lower() == ".bag" else Reader2)(path) as reader:
+            yield BagFile(path, reader)
+    except (ReaderError1, ReaderError2, SerdeError, apsw.Error, *_DAMAGE) as error:
+        said = f"{type(error).__name__}: {error}".strip().partition("\n")[0][:200]
+        raise InputError(f"{path}: not a readable bag, or damaged ({said}); record or convert it again") from error
+
+
+def _check_place(path: Path) -> None:
+    if not path.is_dir():
+        size = check_file(path)
+    else:
+        if not (path / _METADATA).is_file():
+            raise InputError(f"{path}: is a folder without {_METADATA}, so no bag of ROS 2; name the bag's folder")
+        check_file(path / _METADATA)
+        with (path / _METADATA).open(encoding="utf-8", errors="replace") as file:
+            mode = _COMPRESSED.search(file.read(1_000_000))
+        if mode is not None:
+            raise InputError(
+                f"{path}: its {mode[1].lower()}s are compressed one by one; unpack it with `ros2 bag convert`"
+            )
+        size = sum(file.stat().st_size for file in path.iterdir() if file.is_file())
+    if size > _LARGEST:
+        raise InputError(f"{path}: is larger than {_LARGEST // 1_000_000} MB; keep the topics of the run alone")
+
+
+def _bound_compression() -> None:
+    """Have rosbags inflate no chunk without bound: it takes a chunk whole, and a few kB may hold gigabytes."""
+    from backports import zstd
+    from lz4.frame import LZ4FrameDecompressor
+    from rosbags.rosbag1 import reader as ros1
+    from rosbags.rosbag2 import storage_mcap as mcap
+
+    def bounded(kind: Any) -> Any:
+        def inflate(data: bytes, size: int = _LARGEST_CHUNK) -> bytes:
+            made: bytes = kind().decompress(data, min(size, _LARGEST_CHUNK) + 1)
+            if len(made) > _LARGEST_CHUNK:
+                raise ValueError(f"a chunk of more than {_LARGEST_CHUNK // 1_000_000} MB")
+            return made
+
+        return inflate
+
+    ros1.decompressors.update(bz2=bounded(bz2.BZ2Decompressor), lz4=bounded(LZ4FrameDecompressor))
+    mcap.DECOMPRESSORS.update(lz4=bounded(LZ4FrameDecompressor), zstd=bounded(zstd.ZstdDecompressor))

@@ -1,0 +1,239 @@
+"""Runs as ROS bags: joint states, and a topic of numbers for each channel that these do not carry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import pyarrow as pa
+
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.robot.ros_names import ros_joints
+from irtwin.signals.channels import CHANNELS
+from irtwin.signals.sources.bag_file import JOINT_STATE, NUMBERS, BagFile, Topic, open_bag
+from irtwin.signals.sources.source import MOST_VALUES, Source
+
+_LATEST = 1 << 62  # ns since 1970
+FIELDS = {"q": "position", "dq": "velocity", "torque": "effort"}  # of sensor_msgs/JointState
+_HOLE = 25.0  # sampling intervals of a topic: beyond, nobody knows its value
+
+
+def number_topics(robot: Robot) -> dict[str, str]:
+    """Return the name, as ROS takes it, of the topic of numbers for each column that joint states do not carry."""
+    names = ros_joints(robot)
+    others = [channel for field, channel in CHANNELS.items() if field not in (*FIELDS, "time")]
+    return {
+        channel.column(joint): channel.column(names.get(joint, ""))
+        for channel in others
+        for joint in (robot.joint_names if channel.per_joint else ("",))
+    }
+
+
+class BagSource(Source):
+    """A bag of ROS 1 or 2, or an MCAP file of ROS 2.
+
+    Joint states give positions, and speeds and torques where each message has them; a topic of numbers (std_msgs
+    Float64 or Float32) whose last part is a column's name, as /power, gives that column. Its values are taken, by the
+    times of recording, at those of the joint states, straight in between. `topics` says which, where several would do.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".bag", ".mcap", ".db3", "/")
+    counted: ClassVar[str] = "joint state"
+    first: ClassVar[int] = 1
+
+    def columns(self) -> Sequence[str]:
+        """Return the columns that the messages fill."""
+        return list(self._run[0].column_names)
+
+    def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
+        """Return some of the columns; joint states of a time at which another topic is silent are left out."""
+        table, said = self._run
+        self.check_size(table.num_rows, len(columns))
+        return table.select(columns), said
+
+    @cached_property
+    def _run(self) -> tuple[pa.Table, list[str]]:
+        with open_bag(self.path) as bag:
+            topics = bag.topics
+            states = self._states_topic(topics)
+            numbers = self._number_topics(topics)
+            self._check_count([topic for topic in topics if topic.name in (states, *numbers.values())])
+            joints, others = self._messages(bag, states, tuple(numbers.values()))
+        table = joints.table()
+        known = np.ones(len(joints.recorded), dtype=bool)
+        said = []
+        for column, topic in numbers.items():
+            table[column], heard = others[topic].at(np.array(joints.recorded, dtype=np.int64))
+            known &= heard
+        if not known.all():
+            said = [f"{self.path}: {int((~known).sum())} joint states left out, at which another topic is silent"]
+        return pa.table({name: values[known] for name, values in table.items()}), said
+
+    def _states_topic(self, topics: Sequence[Topic]) -> str:
+        found = [topic.name for topic in topics if topic.kind == JOINT_STATE and topic.count]
+        if (named := self.topics.get("joint_states")) is not None:
+            if named not in found:
+                raise InputError(f"{self.path}: {named} of [topics] holds no joint states; {_there(found)}")
+            return named
+        if not found:
+            raise InputError(f"{self.path}: holds no joint states (sensor_msgs/JointState); record /joint_states")
+        if len(found) > 1:
+            raise InputError(
+                f"{self.path}: several topics hold joint states: {', '.join(found)}; "
+                f'say which in dataset.toml: [topics] joint_states = "{found[0]}"'
+            )
+        return found[0]
+
+    def _number_topics(self, topics: Sequence[Topic]) -> dict[str, str]:
+        """Return the topic of each column that is one of numbers."""
+        numbers = [topic.name for topic in topics if topic.kind in NUMBERS and topic.count]
+        result: dict[str, str] = {}
+        for column, name in number_topics(self.robot).items():
+            found = [topic for topic in numbers if topic.rpartition("/")[2] in (column, name)]
+            if (named := self.topics.get(column)) is not None:
+                if named not in numbers:
+                    raise InputError(f"{self.path}: {named} of [topics] holds no numbers; {_there(numbers)}")
+                found = [named]
+            if len(found) > 1:
+                raise InputError(
+                    f"{self.path}: several topics could be {column}: {', '.join(found)}; "
+                    f'say which in dataset.toml: [topics] {column} = "{found[0]}"'
+                )
+            if found:
+                result[column] = found[0]
+        return result
+
+    def _check_count(self, topics: Sequence[Topic]) -> None:
+        width = len(FIELDS) * len(self.robot.joints) + 1
+        for topic in topics:
+            self.check_size(topic.count, width if topic.kind == JOINT_STATE else 1)
+
+    def _messages(
+        self, bag: BagFile, states: str, numbers: Sequence[str]
+    ) -> tuple[_JointStates, Mapping[str, _Numbers]]:
+        joints = _JointStates(self)
+        others = {name: _Numbers() for name in numbers}
+        left = MOST_VALUES  # what the index said of the count may be wrong
+        for topic, recorded, message in bag.messages((states, *numbers)):
+            if not 0 <= recorded < _LATEST:
+                raise InputError(f"{self.path}: a message of {topic} has no time; record the run again")
+            if topic == states:
+                joints.take(recorded, message)
+                left -= joints.width
+            else:
+                others[topic].take(recorded, message)
+                left -= 2
+            if left < 0:
+                raise InputError(f"{self.path}: more than {MOST_VALUES:,} values; cut the run into several")
+        joints.check(states)
+        if empty := [topic for topic, values in others.items() if values.empty]:
+            raise InputError(f"{self.path}: {empty[0]} holds no message, though the bag says so; record it again")
+        return joints, others
+
+
+class _JointStates:
+    """The joint states that name all moving joints of a robot; others, of a gripper say, are passed over."""
+
+    def __init__(self, source: BagSource) -> None:
+        self.recorded: list[int] = []  # ns since 1970
+        self._source = source
+        self._names = ros_joints(source.robot)
+        self._stamps: list[int] = []
+        self._values: dict[str, list[np.ndarray]] = {field: [] for field in FIELDS}
+        self._places: dict[tuple[str, ...], list[int] | None] = {}
+        self._others: tuple[str, ...] = ()
+        self.width = len(FIELDS) * len(self._names) + 1
+
+    def take(self, recorded: int, message: Any) -> None:
+        """Keep a message. Raises InputError where it has not as many values as names."""
+        names = tuple(message.name)
+        if names not in self._places:
+            self._places[names] = self._order(names)
+        order = self._places[names]
+        if order is None:
+            self._others = names
+            return
+        self.recorded.append(recorded)
+        self._stamps.append(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
+        for field, key in FIELDS.items():
+            values = getattr(message, key)
+            if len(values) == len(names):
+                self._values[field].append(values[order])
+            elif len(values) or field == "q":
+                raise InputError(
+                    f"{self._source.path}, {self._source.place(len(self.recorded) - 1)}: "
+                    f"{len(values)} values of {key} for {len(names)} joints; record the run again"
+                )
+
+    def check(self, topic: str) -> None:
+        """Raise InputError where no message named all joints."""
+        if self.recorded:
+            return
+        absent = [
+            joint for joint, name in self._names.items() if joint not in self._others and name not in self._others
+        ]
+        shown = ", ".join(self._others[:10]) or "none"
+        raise InputError(
+            f"{self._source.path}: no message of {topic} has all joints of {self._source.robot.name}; "
+            f"{', '.join(absent[:10])} {'is' if len(absent) == 1 else 'are'} missing (it has {shown[:200]})"
+        )
+
+    def table(self) -> dict[str, np.ndarray]:
+        """Return the columns of time, s since the first message, and of what all messages carry."""
+        stamps = np.array(self._stamps if any(self._stamps) else self.recorded, dtype=np.int64)
+        columns = {"time": (stamps - stamps[0]) / 1e9}
+        for field, rows in self._values.items():
+            values = np.array(rows, dtype=float)
+            if len(rows) == len(stamps) and not (field != "q" and np.isnan(values).all()):
+                columns |= dict(zip(CHANNELS[field].columns(self._names), values.T, strict=True))
+        return columns
+
+    def _order(self, names: tuple[str, ...]) -> list[int] | None:
+        """Return the place in a message of each joint, by its own name or by ROS'; None where one is missing."""
+        found = [
+            names.index(one) if one in names else names.index(two) if two in names else None
+            for one, two in self._names.items()
+        ]
+        return None if None in found else [place for place in found if place is not None]
+
+
+class _Numbers:
+    """The values of a topic of numbers."""
+
+    def __init__(self) -> None:
+        self._recorded: list[int] = []
+        self._values: list[float] = []
+
+    @property
+    def empty(self) -> bool:
+        """Whether no message came."""
+        return not self._recorded
+
+    def take(self, recorded: int, message: Any) -> None:
+        """Keep a message."""
+        self._recorded.append(recorded)
+        self._values.append(float(message.data))
+
+    def at(self, recorded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the values at other times (N,) ns, straight in between, and whether they are known there.
+
+        They are not before the first message, after the last, and in a hole.
+        """
+        wanted = (recorded - recorded[0]).astype(float)
+        times, last = np.unique((np.array(self._recorded, dtype=np.int64) - recorded[0])[::-1], return_index=True)
+        times = times.astype(float)
+        values = np.interp(wanted, times, np.array(self._values)[::-1][last])
+        known = (wanted >= times[0]) & (wanted <= times[-1])
+        if len(times) > 1:
+            gaps = np.diff(times)
+            before = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(gaps) - 1)
+            inside = (wanted > times[before]) & (wanted < times[before + 1])
+            known &= ~(inside & (gaps[before] > _HOLE * np.median(gaps)))
+        return values, known
+
+
+def _there(topics: Sequence[str]) -> str:
+    return f"there are {', '.join(topics[:10])}" if topics else "there is none"
