@@ -40,6 +40,13 @@ RUNS: list[tuple[Any, ...]] = [
     ("Arm_D", "first", "2026-03-05 06:00", 4.0, 2.0, None, None, None, None, None, None, None, None),
 ]
 REPEATS = {"Arm_C.press_2": "Arm_C.press_1"}
+PLANS: list[
+    tuple[Any, ...]
+] = [  # robot, plan, the run that carried it out, s, payload kg, J: energy, half its interval
+    ("Arm_A", "pick", "check_1", 18.0, 9.0, 1900.0, 150.0),
+    ("Arm_B", "haul", "work_2", 8.0, 1.0, 700.0, 20.0),
+    ("Arm_D", "draft", None, 900.0, 0.0, None, None),
+]
 LEDGER = {  # run: effect, joint, J
     "Arm_A.fit_1": "rigid_body j1 250, coulomb_friction j1 50, rigid_body j2 150, coulomb_friction j2 30",
     "Arm_A.check_1": "rigid_body j1 150, coulomb_friction j1 50, rigid_body j2 450, coulomb_friction j2 110",
@@ -68,7 +75,16 @@ FITS = [  # robot, run, joint, part, RMSE, R squared
 def fill(workspace: Workspace) -> None:
     """Put the fleet into a workspace's database."""
     with Session(workspace.engine) as session, session.begin():
-        for row in [*_robots(), *_structures(), *_runs(), *_twins(), *_energies(), *_diagnoses()]:
+        for row in [
+            *_robots(),
+            *_structures(),
+            *_plans(),
+            *_runs(),
+            *_twins(),
+            *_energies(),
+            *_prices(),
+            *_diagnoses(),
+        ]:
             session.add(row)
             session.flush()
 
@@ -135,14 +151,47 @@ def _devices(robot: str, joint: str | None, kind: str, column: str, label: str, 
     )
 
 
+def _plans() -> Iterator[Base]:
+    for robot, name, _, seconds, payload, *_ in PLANS:
+        run_id = f"{robot}.{name}"
+        yield schema.Run(
+            run_id=run_id, robot_id=robot, name=name, kind="Planned_Run", payload_kg=payload, payload_com_x_m=0.0,
+            payload_com_y_m=0.0, payload_com_z_m=0.0, run_time_s=seconds, sample_count=int(100 * seconds),
+            sample_rate_hz=100.0, file=f"series/{run_id}.parquet", sha256=f"plan of {run_id}",
+        )  # fmt: skip
+        yield schema.Series(
+            series_id=f"planned {run_id}", run_id=run_id, kind="planned", path=f"series/{run_id}.parquet",
+            row_count=int(100 * seconds), columns="time,q_j1",
+        )  # fmt: skip
+
+
+def _prices() -> Iterator[Base]:
+    for robot, name, _, seconds, _, joules, half in PLANS:
+        if joules is None:
+            continue
+        run_id, made = f"{robot}.{name}", f"energy.{robot}.{name}"
+        yield _activity(made, robot, "energy", "2026-03-05 12:03")
+        yield schema.RunPrice(
+            run_id=run_id, twin_id=f"{robot}.t1", energy_from="modelled", energy_j=joules, energy_lower_j=joules - half,
+            energy_upper_j=joules + half, mean_power_w=joules / seconds, mean_power_lower_w=(joules - half) / seconds,
+            mean_power_upper_w=(joules + half) / seconds, peak_power_w=280.0, peak_power_lower_w=270.0,
+            peak_power_upper_w=290.0, activity_id=made,
+        )  # fmt: skip
+        yield schema.Series(
+            series_id=f"modelled {run_id}", run_id=run_id, kind="modelled", path=f"series/{run_id}.model.parquet",
+            row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
+        )  # fmt: skip
+
+
 def _runs() -> Iterator[Base]:
+    performs = {f"{robot}.{run}": f"{robot}.{plan}" for robot, plan, run, *_ in PLANS}
     for robot, name, start, seconds, payload, idle, *_ in RUNS:
         run_id = f"{robot}.{name}"
         yield schema.Run(
-            run_id=run_id, robot_id=robot, name=name, role="observed", payload_kg=payload, payload_com_x_m=0.0,
-            payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id), start_time=_moment(start),
-            start_time_from="log", run_time_s=seconds, sample_count=int(100 * seconds), sample_rate_hz=100.0,
-            file=f"runs/{name}.csv", sha256=f"log of {run_id}",
+            run_id=run_id, robot_id=robot, name=name, kind="Measured_Run", role="observed", payload_kg=payload,
+            payload_com_x_m=0.0, payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id),
+            performs=performs.get(run_id), start_time=_moment(start), start_time_from="log", run_time_s=seconds,
+            sample_count=int(100 * seconds), sample_rate_hz=100.0, file=f"runs/{name}.csv", sha256=f"log of {run_id}",
         )  # fmt: skip
         yield schema.Series(
             series_id=f"measured {run_id}", run_id=run_id, kind="measured", path=f"series/{run_id}.parquet",

@@ -142,7 +142,7 @@ def lacking(graph: KnowledgeGraph, declaration: Declaration) -> list[str]:
         SELECT ?subject WHERE {{
           ?subject a <{declaration.applies_to}> .
           {required}
-          FILTER NOT EXISTS {{ ?subject irt:Run_Role "live" }}
+          FILTER NOT EXISTS {{ ?subject a irt:Live_Run }}
           FILTER NOT EXISTS {{ VALUES ?property {{ {populated} }} ?subject ?property ?there }}
         }} ORDER BY ?subject"""
     )
