@@ -62,6 +62,7 @@ PARAMETERS = [  # robot, effect, joint, name, value, unit, lower, upper
     ("Arm_A", "standby_power", None, "P0", 50.0, "W", 49.0, 51.0),
     ("Arm_B", "standby_power", None, "P0", 20.0, "W", 18.0, 22.0),
 ]
+ROUNDS = [("same effects", 14.0, 12.0, "better"), ("effects of a diagnosis", 12.0, 13.0, "no better")]
 FITS = [  # robot, run, joint, part, RMSE, R squared
     ("Arm_A", "fit_1", "j1", "fit", 0.5, 0.99),
     ("Arm_A", "fit_1", "j2", "fit", 0.4, 0.98),
@@ -237,6 +238,16 @@ def _twins() -> Iterator[Base]:
         twin_id="Arm_A.t1", number=1, combination="Ia j1 + Izz l1", value=1.5, unit="kg m^2", lower=1.0, upper=2.0,
         activity_id="identification.Arm_A",
     )  # fmt: skip
+    for number, (tried, before, after, outcome) in enumerate(ROUNDS, 1):
+        made = f"improvement.Arm_A.{number}"
+        yield _activity(made, "Arm_A", "improvement", "2026-03-05 12:04")
+        yield schema.ActivityUse(activity_id=made, entity=f"{ID}run/Arm_A.check_1")
+        yield schema.ActivityUse(activity_id=made, entity=f"{ID}twin/Arm_A.t0")
+        yield schema.ImprovementRound(
+            round_id=f"Arm_A.{number}", robot_id="Arm_A", number=number, tried=tried, effects="rigid_body",
+            earlier_twin_id="Arm_A.t0", tried_twin_id=f"Arm_A.t{number}", error_before_percent=before,
+            error_after_percent=after, limit_percent=10.0, outcome=outcome, activity_id=made,
+        )  # fmt: skip
     for robot, name, joint, part, rmse, r_squared in FITS:
         yield schema.TorqueFit(
             twin_id=f"{robot}.t1", run_id=f"{robot}.{name}", joint=joint, part=part, robot_id=robot, rmse_nm=rmse,

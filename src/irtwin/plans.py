@@ -11,7 +11,7 @@ from irtwin import modelling
 from irtwin.modelling import Expectation
 from irtwin.planning.plan import Plan, Task
 from irtwin.providers.energy import stored_price
-from irtwin.providers.records import check_run_name, find_robot, keep_plan, load_twin
+from irtwin.providers.records import check_run_name, find_robot, keep_run, load_twin
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import PLANNED, Run, check_plan
 from irtwin.storage.database import Workspace
@@ -109,7 +109,7 @@ def _keep(
         made, run = make(twin)
         with rewriting(place, graph_url) as graph:
             with staged(place, robot_id) as apart:
-                run_id = keep_plan(apart, robot_id, twin.robot.joint_names, run)
+                run_id = keep_run(apart, robot_id, twin.robot.joint_names, run)
                 populate_apart(apart, lambda line: None)
             graph.load_ontology()
             map_rows(place, graph)

@@ -25,6 +25,7 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.backup import backup as keep
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
+from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.planner import populate
@@ -70,6 +71,9 @@ def run(
         conclude(graph, announce)
         announce("Writing the report")
         report = write_report(place, graph, robot_id)
+        following = next_experiment(place, graph, robot_id)
+        for line in following.words if following else ():
+            announce(f"  {line}")
         if populate_others(place, graph, announce):
             conclude(graph, announce)
         return report
@@ -139,6 +143,7 @@ def adopt(
         graph.load_ontology()
         map_rows(place, graph)
         reason(graph)
+        next_experiment(place, graph, robot_id)
         return write_report(place, graph, robot_id)
 
 

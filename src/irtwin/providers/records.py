@@ -29,7 +29,7 @@ from irtwin.signals.conditioning import condition
 from irtwin.storage import schema
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.files import inside
-from irtwin.storage.schema import MEASURED, MEASURED_RUN, PLANNED, PLANNED_RUN, Base, Joint, Robot, Run
+from irtwin.storage.schema import LIVE_RUN, MEASURED, MEASURED_RUN, PLANNED, PLANNED_RUN, Base, Joint, Robot, Run
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
@@ -47,7 +47,7 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
     taken = {row.run_id for row in runs}
     if len(taken) < len(runs):
         raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
-    _check_kept_plans(workspace, robot_id, data_set, runs)
+    _check_kept_runs(workspace, robot_id, data_set, runs)
     series = {
         row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
         for row, run in zip(runs, listed, strict=True)
@@ -60,12 +60,19 @@ def ingest(workspace: Workspace, data_set: log.DataSet) -> Outcome:
     return workspace.ingest(_robot_row(robot_id, data_set), parts, runs, series)
 
 
-def keep_plan(workspace: Workspace, robot_id: str, joint_names: Sequence[str], run: log.Run) -> str:
-    """Keep a planned run of no data set; return its run_id. Raises InputError where the name is taken."""
+def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], run: log.Run) -> str:
+    """Keep a run of no data set, planned or measured; return its run_id.
+
+    Raises InputError where its name is taken, or it carried out what is no plan of the robot.
+    """
     check_run_name(workspace, robot_id, run.name)
     row = _run_row(robot_id, run, datetime.now(UTC))
     row.role = None
-    workspace.keep_plan(row, pa.table(columns_of(run.signals, joint_names)))
+    with workspace.reading() as session:
+        plan = None if row.performs is None else session.get(Run, row.performs)
+    if row.performs is not None and (plan is None or plan.kind != PLANNED_RUN):
+        raise InputError(f'{run.file}: performs "{run.performs}", which is no planned run in {workspace.folder}')
+    workspace.keep_run(row, pa.table(columns_of(run.signals, joint_names)))
     return row.run_id
 
 
@@ -75,19 +82,19 @@ def check_run_name(workspace: Workspace, robot_id: str, name: str) -> None:
         known = session.scalars(select(Run.name).where(Run.robot_id == robot_id)).all()
     for other in known:
         if _folded(other) == _folded(name):
-            raise InputError(f'{workspace.folder}: the robot has a run "{other}" already; give another name by --run')
+            raise InputError(f'{workspace.folder}: the robot has a run "{other}" already; choose another name')
 
 
-def _check_kept_plans(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[Run]) -> None:
-    """Raise InputError where a data set does not go with the plans of its robot that the workspace keeps."""
+def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[Run]) -> None:
+    """Raise InputError where a data set does not go with the runs of no data set that the workspace keeps."""
     with workspace.reading() as session:
         kept = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_(None))).all()
         joints = session.scalars(select(Joint.name).where(Joint.robot_id == robot_id).order_by(Joint.position)).all()
     plans = {row.run_id: row.name for row in kept if row.kind == PLANNED_RUN}
     toml = data_set.folder / "dataset.toml"
-    if plans and tuple(joints) != data_set.robot.joint_names:
+    if any(row.kind != LIVE_RUN for row in kept) and tuple(joints) != data_set.robot.joint_names:
         raise InputError(
-            f"{toml}: the workspace keeps plans of this robot with the joints {', '.join(joints)}; remove the robot "
+            f"{toml}: the workspace keeps runs of this robot with the joints {', '.join(joints)}; remove the robot "
             "with `irtwin drop` first, or give it another name"
         )
     taken = {row.run_id for row in kept}

@@ -113,6 +113,37 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     )
 
 
+def read_log(
+    file: Path,
+    robot: Robot,
+    *,
+    payload_mass: float = 0.0,
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    performs: str | None = None,
+    repair: bool = False,
+) -> tuple[list[Run], list[str]]:
+    """Read a log of no data set as one observed run, or several where it has holes in time; say what was repaired.
+
+    payload_mass in kg, payload_com in m in the flange frame. Raises InputError as `read_data_set` does.
+    """
+    signals, dropped = read_signals(file, robot, repair=repair)
+    pieces, sampled = as_sampled(signals, file)
+    run = Run(
+        name=file.stem,
+        file=file,
+        sha256=hashlib.sha256(file.read_bytes()).hexdigest(),
+        role="observed",
+        payload_mass=payload_mass,
+        payload_com=payload_com,
+        repeat_of=None,
+        started=None,
+        notes={},
+        signals=signals,
+        performs=performs,
+    )
+    return [_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)], dropped + sampled
+
+
 def check_plan(signals: Signals, file: Path) -> None:
     """Raise InputError where a planned motion has a hole in time: nothing says how the robot is to pass it."""
     gaps = holes(signals.time)

@@ -122,7 +122,7 @@ class Workspace:
         `parts` are the rows of joints, links, shapes and devices; `series` holds the measured or planned samples of
         each run, by `run_id`. The data set that is there already changes nothing; another one of the same robot
         replaces it, and all that was derived from it is dropped. Runs of no data set stay: those that were watched
-        live, and plans that were kept on their own.
+        live, plans and logs that were kept on their own.
         """
         missing = {run.run_id for run in runs} ^ set(series)
         if missing:
@@ -173,8 +173,8 @@ class Workspace:
         """Keep a run that was watched live, with its samples and what is known of it; return where they lie."""
         return self._keep_run(run, series, [activity, *rows])
 
-    def keep_plan(self, run: Run, series: pa.Table) -> None:
-        """Keep a planned run of no data set, with its motion."""
+    def keep_run(self, run: Run, series: pa.Table) -> None:
+        """Keep a run of no data set, planned or measured, with its samples."""
         self._keep_run(run, series, [])
 
     def _keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base]) -> Series:

@@ -213,6 +213,28 @@ class Twin(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+class ImprovementRound(Base):
+    """A try to better a robot's twin by what was logged since; `round_id` is `robot_id.` and its number.
+
+    Twins are named by their ids alone: one that was replaced has no row any more.
+    """
+
+    __tablename__ = "improvement_round"
+
+    round_id: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
+    number: Mapped[int]
+    tried: Mapped[str]  # "same effects" or "effects of a diagnosis"
+    effects: Mapped[str]  # comma separated
+    earlier_twin_id: Mapped[str]
+    tried_twin_id: Mapped[str]
+    error_before_percent: Mapped[float]  # worst energy error of what neither twin was fitted to
+    error_after_percent: Mapped[float]
+    limit_percent: Mapped[float]
+    outcome: Mapped[str]  # "within the limit", "better" or "no better"
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
 class TwinEffect(Base):
     """An effect that a twin is made of."""
 
