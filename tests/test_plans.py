@@ -94,17 +94,20 @@ def test_the_graph_says_of_a_plan_what_the_command_printed(performed: Path, kept
     assert reach["energy_J"] == pytest.approx(reach["mean_power_W"] * reach["time_s"])
     assert rows["later"]["energy_J"] == pytest.approx(reach["energy_J"], rel=1e-3)
     printed = float(kept[1].out.partition("energy ")[2].partition(" ")[0])
-    assert reach["energy_J"] == pytest.approx(printed, rel=0.1)  # priced anew by the twin of the second data set
+    assert reach["energy_J"] == pytest.approx(printed, rel=1e-3)  # as it was planned, whatever the twin is since
 
 
 def test_a_plan_leads_back_to_twin_and_motion(performed: Path) -> None:
     used = asking.ask(
-        """SELECT ?kind { ?run irt:Run_Name "reach" ; irt:modelled_by ?twin . GRAPH ?g { ?run irt:Planned_Energy ?j }
+        """SELECT ?kind { ?run irt:Run_Name "reach" ; irt:priced_by ?twin . GRAPH ?g { ?run irt:Planned_Energy ?j }
         ?g prov:wasGeneratedBy ?activity . ?activity prov:used ?used FILTER(?used IN (?run, ?twin))
         BIND(IF(?used = ?run, "motion", "twin") AS ?kind) } ORDER BY ?kind""",
         performed,
     )
     assert [row["kind"] for row in used] == ["motion", "twin"]
+    (known,) = asking.explain("id:run/arm_2.reach irt:Planned_Energy ?", performed)
+    assert known.by.startswith("provider:energy of irtwin ")
+    assert [one.by for one in known.because if one.what == "id:run/arm_2.reach"] == ["what was planned"]
 
 
 def test_planned_is_held_against_measured(performed: Path) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, insert, select
 from sqlalchemy.orm import Session
 
-from irtwin.storage.schema import LIVE, LIVE_RUN, Activity, Base, Robot, Run, Series, in_utc
+from irtwin.storage.schema import LIVE, LIVE_RUN, Activity, Base, Robot, Run, RunPrice, Series, in_utc
 
 Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 
@@ -98,8 +99,12 @@ def files_of(rows: Rows) -> dict[str, str]:
 
 
 def drop_data_set(session: Session, robot_id: str) -> None:
-    """Drop what a data set said and what was derived of the robot; the robot stays, and runs of no data set do."""
-    _drop(session, robot_id, Run.role.is_not(None))
+    """Drop what a data set said and what was derived of the robot.
+
+    The robot stays, and so do runs of no data set and the prices of plans among them.
+    """
+    kept = select(RunPrice.activity_id).join(Run).where(Run.robot_id == robot_id, Run.role.is_(None))
+    _drop(session, robot_id, Run.role.is_not(None), set(session.scalars(kept)))
 
 
 def drop_recorded(session: Session, robot_id: str) -> None:
@@ -107,9 +112,9 @@ def drop_recorded(session: Session, robot_id: str) -> None:
     _drop(session, robot_id, Run.kind != LIVE_RUN)
 
 
-def _drop(session: Session, robot_id: str, which: ColumnElement[bool]) -> None:
+def _drop(session: Session, robot_id: str, which: ColumnElement[bool], kept: AbstractSet[str] = frozenset()) -> None:
     made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
-    drop_activities(session, set(session.scalars(made)))
+    drop_activities(session, set(session.scalars(made)) - kept)
     runs = select(Run.run_id).where(Run.robot_id == robot_id, which)
     session.execute(delete(Series).where(Series.run_id.in_(runs)))
     session.execute(delete(Run).where(Run.robot_id == robot_id, which))

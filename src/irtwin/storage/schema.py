@@ -328,12 +328,15 @@ class RunEnergy(Base):
 
 
 class RunPrice(Base):
-    """What a planned run will take by its robot's twin, with 95 % intervals of the twin's parameters."""
+    """What a planned run will take by its robot's twin, with 95 % intervals of the twin's parameters.
+
+    The twin is named by its id alone: one that was replaced has no row any more, and the price stays what it was.
+    """
 
     __tablename__ = "run_price"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
-    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
+    twin_id: Mapped[str]
     energy_from: Mapped[str]  # "modelled", or "mechanical": without the electrical losses
     energy_j: Mapped[float]
     energy_lower_j: Mapped[float | None]
