@@ -129,6 +129,7 @@ def _run(
     state, energy = f"run_state.{run_id}", f"energy.{run_id}"
     yield "run", {
         "run_id": run_id, "robot_id": robot_id, "name": run_id.split(".")[1],
+        "kind": "Measured_Run",
         "role": "reference" if k < 20 else "observed",
         "payload_kg": payload, "payload_com_x_m": 0.0, "payload_com_y_m": 0.0, "payload_com_z_m": 0.05,
         "repeat_of": f"{robot_id}.cycle_0001" if k % 10 == 9 else None, "start_time": _text(start),

@@ -31,8 +31,8 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.joint_stream import StateReader, feed, listening
 from irtwin.live.live_twin import LiveTwin
 from irtwin.live.watch import SWITCH
-from irtwin.storage.database import LIVE, Workspace
-from irtwin.storage.schema import Joint, Robot, Run
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import LIVE_RUN, Joint, Robot, Run
 
 RATE = 83.0  # Hz
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
@@ -146,7 +146,7 @@ def main(robots: int, seconds: float, on_server: bool) -> None:
         twin.stop()
         stopped = time.perf_counter() - began
         with place.reading() as session:
-            runs = session.scalars(select(Run).where(Run.role == LIVE)).all()
+            runs = session.scalars(select(Run).where(Run.kind == LIVE_RUN)).all()
         found = []
         for run in runs:
             stamps = place.read_series(run.run_id)["time"].to_numpy() + run.start_time.timestamp()

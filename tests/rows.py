@@ -58,6 +58,7 @@ def run(name: str, **changes: Any) -> Run:
         "run_id": f"{ROBOT}.{name}",
         "robot_id": ROBOT,
         "name": name,
+        "kind": "Measured_Run",
         "role": "observed",
         "payload_kg": 0.0,
         "payload_com_x_m": 0.0,

@@ -40,6 +40,13 @@ RUNS: list[tuple[Any, ...]] = [
     ("Arm_D", "first", "2026-03-05 06:00", 4.0, 2.0, None, None, None, None, None, None, None, None),
 ]
 REPEATS = {"Arm_C.press_2": "Arm_C.press_1"}
+PLANS: list[
+    tuple[Any, ...]
+] = [  # robot, plan, the run that carried it out, s, payload kg, J: energy, half its interval
+    ("Arm_A", "pick", "check_1", 18.0, 9.0, 1900.0, 150.0),
+    ("Arm_B", "haul", "work_2", 8.0, 1.0, 700.0, 20.0),
+    ("Arm_D", "draft", None, 900.0, 0.0, None, None),
+]
 LEDGER = {  # run: effect, joint, J
     "Arm_A.fit_1": "rigid_body j1 250, coulomb_friction j1 50, rigid_body j2 150, coulomb_friction j2 30",
     "Arm_A.check_1": "rigid_body j1 150, coulomb_friction j1 50, rigid_body j2 450, coulomb_friction j2 110",
@@ -55,6 +62,7 @@ PARAMETERS = [  # robot, effect, joint, name, value, unit, lower, upper
     ("Arm_A", "standby_power", None, "P0", 50.0, "W", 49.0, 51.0),
     ("Arm_B", "standby_power", None, "P0", 20.0, "W", 18.0, 22.0),
 ]
+ROUNDS = [("same effects", 14.0, 12.0, "better"), ("effects of a diagnosis", 12.0, 13.0, "no better")]
 FITS = [  # robot, run, joint, part, RMSE, R squared
     ("Arm_A", "fit_1", "j1", "fit", 0.5, 0.99),
     ("Arm_A", "fit_1", "j2", "fit", 0.4, 0.98),
@@ -68,7 +76,16 @@ FITS = [  # robot, run, joint, part, RMSE, R squared
 def fill(workspace: Workspace) -> None:
     """Put the fleet into a workspace's database."""
     with Session(workspace.engine) as session, session.begin():
-        for row in [*_robots(), *_structures(), *_runs(), *_twins(), *_energies(), *_diagnoses()]:
+        for row in [
+            *_robots(),
+            *_structures(),
+            *_plans(),
+            *_runs(),
+            *_twins(),
+            *_energies(),
+            *_prices(),
+            *_diagnoses(),
+        ]:
             session.add(row)
             session.flush()
 
@@ -135,14 +152,47 @@ def _devices(robot: str, joint: str | None, kind: str, column: str, label: str, 
     )
 
 
+def _plans() -> Iterator[Base]:
+    for robot, name, _, seconds, payload, *_ in PLANS:
+        run_id = f"{robot}.{name}"
+        yield schema.Run(
+            run_id=run_id, robot_id=robot, name=name, kind="Planned_Run", payload_kg=payload, payload_com_x_m=0.0,
+            payload_com_y_m=0.0, payload_com_z_m=0.0, run_time_s=seconds, sample_count=int(100 * seconds),
+            sample_rate_hz=100.0, file=f"series/{run_id}.parquet", sha256=f"plan of {run_id}",
+        )  # fmt: skip
+        yield schema.Series(
+            series_id=f"planned {run_id}", run_id=run_id, kind="planned", path=f"series/{run_id}.parquet",
+            row_count=int(100 * seconds), columns="time,q_j1",
+        )  # fmt: skip
+
+
+def _prices() -> Iterator[Base]:
+    for robot, name, _, seconds, _, joules, half in PLANS:
+        if joules is None:
+            continue
+        run_id, made = f"{robot}.{name}", f"energy.{robot}.{name}"
+        yield _activity(made, robot, "energy", "2026-03-05 12:03")
+        yield schema.RunPrice(
+            run_id=run_id, twin_id=f"{robot}.t1", energy_from="modelled", energy_j=joules, energy_lower_j=joules - half,
+            energy_upper_j=joules + half, mean_power_w=joules / seconds, mean_power_lower_w=(joules - half) / seconds,
+            mean_power_upper_w=(joules + half) / seconds, peak_power_w=280.0, peak_power_lower_w=270.0,
+            peak_power_upper_w=290.0, activity_id=made,
+        )  # fmt: skip
+        yield schema.Series(
+            series_id=f"modelled {run_id}", run_id=run_id, kind="modelled", path=f"series/{run_id}.model.parquet",
+            row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
+        )  # fmt: skip
+
+
 def _runs() -> Iterator[Base]:
+    performs = {f"{robot}.{run}": f"{robot}.{plan}" for robot, plan, run, *_ in PLANS}
     for robot, name, start, seconds, payload, idle, *_ in RUNS:
         run_id = f"{robot}.{name}"
         yield schema.Run(
-            run_id=run_id, robot_id=robot, name=name, role="observed", payload_kg=payload, payload_com_x_m=0.0,
-            payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id), start_time=_moment(start),
-            start_time_from="log", run_time_s=seconds, sample_count=int(100 * seconds), sample_rate_hz=100.0,
-            file=f"runs/{name}.csv", sha256=f"log of {run_id}",
+            run_id=run_id, robot_id=robot, name=name, kind="Measured_Run", role="observed", payload_kg=payload,
+            payload_com_x_m=0.0, payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id),
+            performs=performs.get(run_id), start_time=_moment(start), start_time_from="log", run_time_s=seconds,
+            sample_count=int(100 * seconds), sample_rate_hz=100.0, file=f"runs/{name}.csv", sha256=f"log of {run_id}",
         )  # fmt: skip
         yield schema.Series(
             series_id=f"measured {run_id}", run_id=run_id, kind="measured", path=f"series/{run_id}.parquet",
@@ -188,6 +238,16 @@ def _twins() -> Iterator[Base]:
         twin_id="Arm_A.t1", number=1, combination="Ia j1 + Izz l1", value=1.5, unit="kg m^2", lower=1.0, upper=2.0,
         activity_id="identification.Arm_A",
     )  # fmt: skip
+    for number, (tried, before, after, outcome) in enumerate(ROUNDS, 1):
+        made = f"improvement.Arm_A.{number}"
+        yield _activity(made, "Arm_A", "improvement", "2026-03-05 12:04")
+        yield schema.ActivityUse(activity_id=made, entity=f"{ID}run/Arm_A.check_1")
+        yield schema.ActivityUse(activity_id=made, entity=f"{ID}twin/Arm_A.t0")
+        yield schema.ImprovementRound(
+            round_id=f"Arm_A.{number}", robot_id="Arm_A", number=number, tried=tried, effects="rigid_body",
+            earlier_twin_id="Arm_A.t0", tried_twin_id=f"Arm_A.t{number}", error_before_percent=before,
+            error_after_percent=after, limit_percent=10.0, outcome=outcome, activity_id=made,
+        )  # fmt: skip
     for robot, name, joint, part, rmse, r_squared in FITS:
         yield schema.TorqueFit(
             twin_id=f"{robot}.t1", run_id=f"{robot}.{name}", joint=joint, part=part, robot_id=robot, rmse_nm=rmse,

@@ -25,7 +25,7 @@ from irtwin.robot.collision import CollisionModel
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, columns_of
 from irtwin.signals.conditioning import choose_cutoff, condition
-from irtwin.signals.log import DataSet, own_runs, read_data_set
+from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled
 from irtwin.storage.files import check_place, write
@@ -97,9 +97,10 @@ def check_log(folder: Path, *, repair: bool = False, json_file: Path | None = No
 class Expectation:
     """What a twin expects of a motion: a row a sample, and its price, None where the twin knows nothing of power.
 
-    checks_itself: whether the robot has shapes that were held to keep off one another.
+    checks_itself: whether the robot has shapes that were held to keep off one another. run: the motion as it was read.
     """
 
+    run: Run
     table: pa.Table
     price: Price | None
     checks_itself: bool
@@ -132,7 +133,7 @@ def expect(
         buffer = io.BytesIO()
         pa.parquet.write_table(table, buffer)
         write(Path(out), buffer.getvalue())
-    return Expectation(table, cost, collisions.checks_itself)
+    return Expectation(run, table, cost, collisions.checks_itself)
 
 
 def read_twin(source: Path) -> Twin:

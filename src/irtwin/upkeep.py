@@ -17,6 +17,7 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
+from irtwin.next_experiment import FOLDER
 from irtwin.providers.records import find_robot
 from irtwin.storage import files
 from irtwin.storage.database import Workspace
@@ -45,7 +46,8 @@ def drop(
         if set(journals) - set(left_behind(place.folder / LIVE)):
             raise InputError(f'{place.folder}: "{robot}" is being watched; stop `irtwin live` first')
         place.drop_robot(robot_id)
-        for file in (*journals, place.report_path(robot_id)):
+        proposed = [place.folder / FOLDER / f"{robot_id}{ending}" for ending in (".txt", ".csv")]
+        for file in (*journals, *proposed, place.report_path(robot_id)):
             file.unlink(missing_ok=True)
         if journals:  # the graph may show what no row ever said
             place.mapped_rows.unlink(missing_ok=True)

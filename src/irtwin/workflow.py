@@ -26,11 +26,12 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.backup import backup as keep
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
+from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.planner import populate
-from irtwin.providers.records import check_name, find_robot, identifier, ingest, robot_iri
+from irtwin.providers.records import check_name, check_plans, find_robot, identifier, ingest, robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
@@ -68,7 +69,10 @@ def run(
         map_rows(place, graph)
         conclude(graph, announce)
         announce("Writing the report")
-        report = _report(place, graph, robot_id)
+        report = write_report(place, graph, robot_id)
+        following = next_experiment(place, graph, robot_id)
+        for line in following.words if following else ():
+            announce(f"  {line}")
         if populate_others(place, graph, announce):
             conclude(graph, announce)
         return report
@@ -131,11 +135,12 @@ def adopt(
         robot_id = find_robot(place, robot)
         with staged(place, robot_id) as apart:
             adopt_twin(apart, robot_id)
-            _populate_apart(apart, lambda line: None)
+            populate_apart(apart, lambda line: None)
         graph.load_ontology()
         map_rows(place, graph)
         reason(graph)
-        return _report(place, graph, robot_id)
+        next_experiment(place, graph, robot_id)
+        return write_report(place, graph, robot_id)
 
 
 def reason_again(
@@ -218,18 +223,20 @@ def _take_in(place: Workspace, data_set: DataSet, announce: Announce) -> str:
     """Ingest a data set and populate what follows from it, all or nothing; return the robot_id."""
     robot_id = identifier(data_set.robot.name)
     check_name(place, data_set.robot.name)
-    announce(f"Ingesting {data_set.robot.name}, {len(data_set.runs)} runs")
+    count = len(data_set.runs) + len(data_set.plans)
+    announce(f"Ingesting {data_set.robot.name}, {count} runs")
     with staged(place, robot_id) as apart:
         announce(f"  {ingest(apart, data_set, lambda line: announce(f'  {line}'))}")
         announce("Running the data providers")
         try:
-            _populate_apart(apart, announce)
+            populate_apart(apart, announce)
+            check_plans(apart, robot_id, data_set.plans)
         except InputError as error:
             raise InputError(f"{data_set.folder}: {error}; nothing of this data set was stored") from error
     return robot_id
 
 
-def _populate_apart(apart: Workspace, announce: Announce) -> None:
+def populate_apart(apart: Workspace, announce: Announce) -> None:
     """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
     with KnowledgeGraph(workspace=apart.folder) as graph:
         graph.load_ontology()
@@ -263,7 +270,8 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
         announce(f"  {violation}")
 
 
-def _report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
+def write_report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
+    """Write a robot's energy report from the graph; return its path."""
     robot = robot_iri(robot_id)
     out = place.report_path(robot_id)
     scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))

@@ -101,6 +101,7 @@ def test_a_total_is_what_the_runs_come_to(graph: KnowledgeGraph, total: str) -> 
     added_up = graph.query(
         f"""SELECT ?arm ({RAW[total]} AS ?value) {{
           ?run irt:run_of ?arm ; irt:Run_Time ?time ; irt:Payload ?payload .
+          FILTER NOT EXISTS {{ ?run a irt:Planned_Run }}
           OPTIONAL {{ ?run irt:Idle_Share ?idle }}
           OPTIONAL {{ ?run irt:Energy_Consumption ?energy ; irt:Modelled_Energy ?modelled ;
                        irt:Standby_Energy ?standby ; irt:Returned_Energy ?returned }}

@@ -31,6 +31,8 @@ RUN = "Arm_A.idle_1"
 CONCLUSIONS = {
     ("id:twin/Arm_A.t1", "rdf:type", "irt:Twin_To_Reidentify"),
     ("id:twin/Arm_A.t1", "irt:fails_on", "id:run/Arm_A.check_1"),
+    ("id:twin/Arm_B.t1", "rdf:type", "irt:Twin_To_Reidentify"),  # on a run that it was fitted to
+    ("id:twin/Arm_B.t1", "irt:fails_on", "id:run/Arm_B.work_1"),
     ("id:run/Arm_A.idle_1", "rdf:type", "irt:Idle_Heavy_Run"),
     ("id:run/Arm_B.work_2", "rdf:type", "irt:Regenerating_Run"),
 }

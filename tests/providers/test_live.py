@@ -32,7 +32,7 @@ pytestmark = pytest.mark.slow
 NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 UNSAID = (math.nan, math.nan)
 NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {
-  ?run irt:Run_Role "live" ; irt:Current_State ?state ; irt:State_Time ?time ; irt:Sample_Count ?count ;
+  ?run a irt:Live_Run ; irt:Current_State ?state ; irt:State_Time ?time ; irt:Sample_Count ?count ;
     irt:Superseded_States ?superseded ; irt:has_Joint_State ?joint .
   ?joint irt:of_Joint <https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/joint_a1> ; irt:Joint_Position ?q }"""
 
@@ -76,7 +76,7 @@ def mapped(place: Workspace) -> set[Quad]:
 
 def live_run(place: Workspace) -> Run:
     with place.reading() as session:
-        return session.scalars(select(Run).where(Run.role == "live")).one()
+        return session.scalars(select(Run).where(Run.kind == "Live_Run")).one()
 
 
 def wait_for(condition) -> None:
@@ -95,7 +95,7 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
         assert row["time"].timestamp() == pytest.approx(NOON + 0.99, abs=1e-6)
         assert (row["state"], row["q"]) == ("moving", pytest.approx(math.sin(0.99)))
         assert row["superseded"] == twin.superseded <= 99
-        assert graph.query("ASK { ?run irt:run_of id:robot\\/KUKA_KR6_R700 ; irt:Run_Role 'live' }")[0]["answer"]
+        assert graph.query("ASK { ?run irt:run_of id:robot\\/KUKA_KR6_R700 ; a irt:Live_Run }")[0]["answer"]
         for number in range(100, 130):
             standing = ((1.0, 0.5), (0.0, 0.0), UNSAID, UNSAID, (math.nan,))
             twin.receive(State(rows.ROBOT, NOON + 0.01 * number, standing))
@@ -156,7 +156,7 @@ def test_a_long_stream_becomes_several_runs(
             if number % 50 == 0:
                 time.sleep(0.05)
     with place.reading() as session:
-        runs = session.scalars(select(Run).where(Run.role == "live").order_by(Run.start_time)).all()
+        runs = session.scalars(select(Run).where(Run.kind == "Live_Run").order_by(Run.start_time)).all()
     assert len(runs) > 1
     assert sum(run.sample_count for run in runs) == 450
     power = np.concatenate([place.read_series(run.run_id)["power"].to_numpy() for run in runs])
@@ -185,7 +185,7 @@ def moved(number: int, by: float) -> State:
 def counts(place: Workspace) -> list[tuple[float, int]]:
     """When each live run began, s from noon, and its samples."""
     with place.reading() as session:
-        found = session.scalars(select(Run).where(Run.role == "live").order_by(Run.start_time))
+        found = session.scalars(select(Run).where(Run.kind == "Live_Run").order_by(Run.start_time))
         return [(round(run.start_time.timestamp() - NOON, 3), run.sample_count) for run in found]
 
 
@@ -272,7 +272,7 @@ def test_where_storage_is_slow_the_source_waits(
         assert twin.waited > 0.1
     assert twin.stored == live_run(place).sample_count == 50
     assert lines == ["storage cannot keep up: the source waits (back-pressure); no sample is lost"]
-    (row,) = graph.query("SELECT ?waited { ?run irt:Run_Role 'live' ; irt:Source_Waited ?waited }")
+    (row,) = graph.query("SELECT ?waited { ?run a irt:Live_Run ; irt:Source_Waited ?waited }")
     assert row["waited"] == pytest.approx(twin.waited)
 
 

@@ -36,7 +36,7 @@ RULE = "https://w3id.org/irtwin/rules/gap_alarm"
 ALARMS = """SELECT ?state ?reason ?rule ?joint {
   ?alarm a irt:Gap_Alarm ; irt:Alarm_State ?state ; irt:Alarm_Reason ?reason ;
   irt:raised_by_Rule ?rule OPTIONAL { ?alarm irt:gap_at_Joint / irt:Joint_Name ?joint } }"""
-ENERGY = """SELECT ?energy ?power ?modelled ?from ?part { ?run irt:Run_Role "live" ; irt:Energy_Consumption ?energy ;
+ENERGY = """SELECT ?energy ?power ?modelled ?from ?part { ?run a irt:Live_Run ; irt:Energy_Consumption ?energy ;
   irt:Run_Power ?power ; irt:Energy_From ?from
   OPTIONAL { ?run irt:Modelled_Energy ?modelled ; irt:Part_In_Twin ?part } }"""
 
@@ -88,7 +88,7 @@ def wait_for(condition: Callable[[], object]) -> None:
 
 def live_run(place: Workspace) -> schema.Run:
     with place.reading() as session:
-        return session.scalars(select(schema.Run).where(schema.Run.role == "live")).one()
+        return session.scalars(select(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
 
 
 def test_energy_grows_while_the_run_lasts_and_the_end_breaks_no_shape(
@@ -112,7 +112,7 @@ def test_energy_grows_while_the_run_lasts_and_the_end_breaks_no_shape(
     assert row["power"] == pytest.approx(row["energy"] / 12.0, rel=1e-2)
     assert (row["from"], row["part"]) == ("measured", "held_out")
     shares = graph.query("""SELECT (SUM(?each) AS ?all) (COUNT(DISTINCT ?joint) AS ?joints) {
-        ?share a irt:Energy_Share ; irt:of_Run / irt:Run_Role "live" ; irt:Energy ?each
+        ?share a irt:Energy_Share ; irt:of_Run ?run . ?run a irt:Live_Run . ?share irt:Energy ?each
         OPTIONAL { ?share irt:of_Joint ?joint } }""")
     assert shares[0]["all"] == pytest.approx(row["modelled"])
     assert shares[0]["joints"] == 2
@@ -188,11 +188,11 @@ def test_a_new_twin_gives_live_runs_their_energy_anew(place: Workspace, tmp_path
         for state in states(log()):
             twin.receive(state)
     with place.reading() as session:
-        old = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.role == "live")).one()
+        old = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
     run_all(small_robots.data_set(tmp_path / "data", "arm"), place.folder)  # the same once more
     run_all(small_robots.data_set(tmp_path / "other", "arm", seed=4), place.folder)
     with place.reading() as session:
-        new = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.role == "live")).one()
+        new = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
     assert new.twin_id != old.twin_id
     assert new.energy_consumption_j == pytest.approx(old.energy_consumption_j, rel=1e-3)  # as measured
     assert new.modelled_energy_j != old.modelled_energy_j

@@ -12,7 +12,7 @@ from tests.storage.test_database import WORK, populate, state, workspace
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE, Activity
+from irtwin.storage.schema import LIVE, LIVE_RUN, Activity
 from irtwin.storage.staging import staged
 
 pytestmark = pytest.mark.slow
@@ -79,7 +79,7 @@ def test_other_robots_and_live_runs_stay(workspace: Workspace) -> None:
     populate(workspace)
     other = rows.run("alone", run_id="Other.alone", robot_id="Other")
     workspace.ingest(rows.robot(robot_id="Other"), [], [other], {"Other.alone": rows.samples(4)})
-    live = rows.run("live_1", role=LIVE)
+    live = rows.run("live_1", kind=LIVE_RUN, role=None)
     activity = Activity(
         activity_id="live.1", robot_id=rows.ROBOT, provider=LIVE, subject="run", started=rows.NOON, ended=rows.NOON,
         software="irtwin",

@@ -6,19 +6,40 @@ import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import DAY, Number, say
+from irtwin.cli.options import DAY, Number, database_option, graph_option, say
+from irtwin.errors import InputError
+
+if TYPE_CHECKING:
+    from irtwin.plans import Kept
+
+_PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
 
 
+def _kept(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options by which a motion is kept as a planned run."""
+    for option in (
+        graph_option,
+        database_option,
+        click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: that of --out, or plan."),
+        click.option(
+            "--workspace", type=click.Path(path_type=Path, file_okay=False), help="Keep it there, as a planned run."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
 @click.command()
-@click.argument("source", type=click.Path(path_type=Path))
+@click.argument("source")
 @click.option("--from", "start", metavar="POSE", required=True, help="Where the motion starts.")
 @click.option("--to", "goal", metavar="POSE", required=True, help="Where it ends.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV or Parquet file.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV or Parquet file to write.")
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -48,11 +69,12 @@ _NO_POWER = "energy and power are not known; the twin has seen no power"
     metavar="X Y Z",
     help="Payload's centre of mass in the flange frame, m.",
 )
+@_kept
 def plan(
-    source: Path,
+    source: str,
     start: str,
     goal: str,
-    out: Path,
+    out: Path | None,
     line: bool,
     boxes: tuple[tuple[float, ...], ...],
     objective: str,
@@ -61,20 +83,26 @@ def plan(
     search: float,
     payload_mass: float,
     payload_com: tuple[float, float, float],
+    workspace: Path | None,
+    name: str | None,
+    database: str | None,
+    graph_url: str | None,
 ) -> None:
     """Plan a motion from pose to pose, around obstacles, and say what it costs.
 
     SOURCE is a twin that `irtwin diagnose --save-twin` wrote, or a URDF, or the folder of a data set, of which energy
     is not known. A POSE is joint positions, "0,-1.57,...", or a pose of the flange in the base frame,
     "pose:x,y,z,roll,pitch,yaw", in m and rad. The motion keeps to the limits of position, speed, acceleration, jerk and
-    torque.
+    torque. With --workspace, SOURCE is the name of a robot there; its twin plans, and the plan is kept with what it
+    will take, in the graph too.
     """
-    from irtwin import modelling
+    from irtwin import modelling, plans
     from irtwin.planning.plan import Task
     from irtwin.planning.poses import read_target
     from irtwin.robot.collision import Obstacle
 
-    twin = modelling.read_twin(source)
+    _check_kept(workspace, name, out)
+    twin = plans.robot_twin(source, workspace, database) if workspace else modelling.read_twin(Path(source))
     joints = len(twin.robot.joints)
     task = Task(
         start=read_target(start, joints, "--from"),
@@ -87,16 +115,28 @@ def plan(
         payload_mass=payload_mass,
         payload_com=payload_com,
     )
-    made = modelling.plan(twin, task, out, rate)
+    if workspace is None:
+        made, kept = modelling.plan(twin, task, out, rate), None
+    else:
+        made, kept = plans.plan(
+            source,
+            task,
+            workspace,
+            name=name or (out.stem if out else _PLAN),
+            out=out,
+            rate=rate,
+            database=database,
+            graph_url=graph_url,
+        )
     _say_unchecked(made.checks_itself)
     clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
-    click.echo(f"{out}: {made.seconds:.3f} s{clear}; {made.price or _NO_POWER}")
+    click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {(kept or made).price or _NO_POWER}")
 
 
 @click.command()
-@click.argument("twin", type=click.Path(path_type=Path))
+@click.argument("twin")
 @click.argument("run", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Parquet file to write.")
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload mass, kg. Default: from the run's data set.")
 @click.option(
     "--payload-com",
@@ -105,19 +145,36 @@ def plan(
     metavar="X Y Z",
     help="Payload's centre of mass in the flange frame, m. Default: from the run's data set.",
 )
+@_kept
 def predict(
-    twin: Path, run: Path, out: Path, payload_mass: float | None, payload_com: tuple[float, float, float] | None
+    twin: str,
+    run: Path,
+    out: Path | None,
+    payload_mass: float | None,
+    payload_com: tuple[float, float, float] | None,
+    workspace: Path | None,
+    name: str | None,
+    database: str | None,
+    graph_url: str | None,
 ) -> None:
     """Predict torque, power and energy of a run with a saved twin.
 
     TWIN is a file that `irtwin diagnose --save-twin` wrote. RUN is a CSV or Parquet file with the motion: a log, or
-    what `plan` or `excite` wrote. A motion that leaves the robot's limits or in which two links meet is refused.
+    what `plan` or `excite` wrote. A motion that leaves the robot's limits or in which two links meet is refused. With
+    --workspace, TWIN is the name of a robot there, and the motion is kept with what it will take, in the graph too.
     """
-    from irtwin import modelling
+    from irtwin import modelling, plans
 
-    expected = modelling.expect(twin, run, out, payload_mass=payload_mass, payload_com=payload_com)
+    _check_kept(workspace, name, out)
+    if workspace is None:
+        expected, kept = modelling.expect(twin, run, out, payload_mass=payload_mass, payload_com=payload_com), None
+    else:
+        expected, kept = plans.predict(
+            twin, run, workspace, name=name or run.stem, out=out, payload_mass=payload_mass, payload_com=payload_com,
+            database=database, graph_url=graph_url,
+        )  # fmt: skip
     _say_unchecked(expected.checks_itself)
-    click.echo(f"{out}: {expected.price or _NO_POWER}")
+    click.echo(f"{_where(out, kept)}: {(kept or expected).price or _NO_POWER}")
 
 
 @click.command()
@@ -164,6 +221,18 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
         f"{motion.limit_margin:.1%} margin to the joint limits, "
         + ("no wall within reach" if motion.clearance == math.inf else f"{motion.clearance:.3f} m to the nearest wall")
     )
+
+
+def _check_kept(workspace: Path | None, name: str | None, out: Path | None) -> None:
+    if workspace is None and out is None:
+        raise InputError("nothing says where the motion is to go; give --out FILE, --workspace FOLDER, or both")
+    if workspace is None and name is not None:
+        raise InputError("--run names a planned run of a workspace; give --workspace FOLDER too")
+
+
+def _where(out: Path | None, kept: Kept | None) -> str:
+    places = [str(out)] if out else []
+    return " and ".join([*places, f'planned run "{kept.run}" of {kept.robot}'] if kept else places)
 
 
 def _say_unchecked(checks_itself: bool) -> None:

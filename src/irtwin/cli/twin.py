@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import database_option, graph_option, say, workspace_option
+from irtwin.cli.options import Number, database_option, graph_option, say, workspace_option
 
 if TYPE_CHECKING:
     from irtwin.signals.finding import Finding
@@ -119,6 +119,56 @@ def diagnose(
         announce=say,
     )
     click.echo(line(found.document, found.against))
+
+
+@click.command()
+@click.argument("robot")
+@click.argument("new_log", metavar="LOG", type=click.Path(path_type=Path))
+@workspace_option
+@click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
+@click.option(
+    "--payload-com",
+    type=Number(-10.0, 10.0),
+    nargs=3,
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    help="Payload's centre of mass in the flange frame, m.",
+)
+@click.option("--performs", metavar="PLAN", help="Name of the planned run that the log carried out.")
+@click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
+@database_option
+@graph_option
+def improve(
+    robot: str,
+    new_log: Path,
+    workspace: Path,
+    payload_mass: float,
+    payload_com: tuple[float, float, float],
+    performs: str | None,
+    repair: bool,
+    database: str | None,
+    graph_url: str | None,
+) -> None:
+    """Better a robot's twin by a new log.
+
+    LOG is a CSV or Parquet file, such as of the motion that `irtwin run` proposed. The twin is fitted again, with the
+    effects that it lacks where that is needed. The earlier twin stays unless the new one is better on what neither was
+    fitted to.
+    """
+    from irtwin import improvement
+
+    found = improvement.improve(
+        robot, new_log, workspace, payload_mass=payload_mass, payload_com=payload_com, performs=performs,
+        repair=repair, database=database, graph_url=graph_url, announce=say,
+    )  # fmt: skip
+    for number, one in enumerate(found.rounds, start=1):
+        click.echo(f"round {number}, {one.tried}: {one.before:.3g} % before, {one.after:.3g} % after; {one.outcome}")
+    if found.within:
+        click.echo(f"The twin is within the limit of {found.limit:g} % on every run.")
+    else:
+        click.echo(f"Nothing helps yet: the twin is beyond the limit of {found.limit:g} %. What to log next:")
+        for line in found.next.words if found.next else ():
+            click.echo(line)
 
 
 @click.command()

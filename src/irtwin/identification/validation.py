@@ -11,7 +11,7 @@ from irtwin.signals.motion import Motion
 
 FIT, HELD_OUT, APART = "fit", "held_out", "apart"
 _FEW = 3  # runs that differ; fewer are cut in time instead
-_FIT_SHARE = 2 / 3
+FIT_SHARE = 2 / 3
 _GOLDEN = (1 + 5**0.5) / 2
 
 
@@ -40,13 +40,13 @@ def split(motions: Sequence[Motion], repeats: dict[str, str] | None = None) -> S
     """
     groups = _groups(motions, repeats or {})
     if len(groups) < _FEW:
-        cuts = [round(_FIT_SHARE * len(motion.time)) for motion in motions]
+        cuts = [round(FIT_SHARE * len(motion.time)) for motion in motions]
         return Split(
             tuple(motion.part(0, cut) for motion, cut in zip(motions, cuts, strict=True)),
             tuple(motion.part(cut, len(motion.time)) for motion, cut in zip(motions, cuts, strict=True)),
             "each run cut in time: first two thirds fitted, last third held out",
         )
-    judged = {run for k, group in enumerate(groups, 1) if k * _GOLDEN % 1 < 1 - _FIT_SHARE for run in group}
+    judged = {run for k, group in enumerate(groups, 1) if k * _GOLDEN % 1 < 1 - FIT_SHARE for run in group}
     return Split(
         tuple(motion for motion in motions if motion.run not in judged),
         tuple(motion for motion in motions if motion.run in judged),

@@ -23,6 +23,7 @@ from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
+Announce = Callable[[str], None]
 _MOST_REASONS = 20  # said of refused lines
 
 
@@ -36,7 +37,7 @@ def watch(
     rtde: str | None = None,
     robot: str | None = None,
     speed: float = 1.0,
-    announce: Callable[[str], None] = lambda line: None,
+    announce: Announce = lambda line: None,
 ) -> None:
     """Watch a workspace's robots until the stream on standard input ends, or SIGINT or SIGTERM comes.
 
@@ -68,31 +69,44 @@ def watch(
         def take(lines: Iterable[bytes]) -> None:
             feed(lines, reader, twin.receive, refuse)
 
-        def take_standard_input() -> None:
-            take(lines_of(sys.stdin.buffer))
-            done.set()
-
-        def refuse_of_arm(reason: str) -> None:
-            refuse(reason)
-            twin.check()  # whether it was refused as nothing can be stored any more
-
         if replay is not None:
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
             after = twin.stored_until(replay.robot_id)
             replay.play(_refusing(twin.receive, refuse), done, after=after, ahead=AHEAD)
         elif rtde is not None:
-            arm = _arm(place, rtde, robot)
-            announce(f"Following {arm.address}: {arm.what}")
-            arm.follow(twin.receive, refuse_of_arm, done, announce)
+            _follow(_arm(place, rtde, robot), twin, refuse, done, announce)
         else:
-            if port is None:
-                threading.Thread(target=take_standard_input, daemon=True).start()
-            with nullcontext() if port is None else listening(port, take) as actual:
-                announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
-                while not done.wait(0.2):
-                    twin.check()
+            _read(take, port, twin, done, announce)
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
+
+
+def _read(
+    take: Callable[[Iterable[bytes]], None], port: int | None, twin: LiveTwin, done: threading.Event, announce: Announce
+) -> None:
+    """Take lines of clients on a port, or of standard input where it is None, until it is `done`."""
+
+    def take_standard_input() -> None:
+        take(lines_of(sys.stdin.buffer))
+        done.set()
+
+    if port is None:
+        threading.Thread(target=take_standard_input, daemon=True).start()
+    with nullcontext() if port is None else listening(port, take) as actual:
+        announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
+        while not done.wait(0.2):
+            twin.check()
+
+
+def _follow(
+    arm: Rtde, twin: LiveTwin, refuse: Callable[[str], None], done: threading.Event, announce: Announce
+) -> None:
+    def refuse_of_arm(reason: str) -> None:
+        refuse(reason)
+        twin.check()  # whether it was refused as nothing can be stored any more
+
+    announce(f"Following {arm.address}: {arm.what}")
+    arm.follow(twin.receive, refuse_of_arm, done, announce)
 
 
 def _replay(place: Workspace, log: Path, robot: str | None, speed: float) -> Replay:

@@ -7,45 +7,45 @@ from collections import defaultdict
 import numpy as np
 import pyarrow as pa
 from scipy.integrate import cumulative_trapezoid
-from sqlalchemy import select
 
 from irtwin.identification.validation import APART
 from irtwin.providers import live_energy
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import run_iri, twin_iri
+from irtwin.providers.records import load_run, load_twin, run_iri, twin_iri
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
+from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
-from irtwin.storage.files import inside
-from irtwin.twin.files import from_json
+from irtwin.storage.schema import LIVE_RUN, PLANNED_RUN
+from irtwin.twin.price import Figure, Price, cost
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
-    """Make a run's energy, its ledger, and its modelled series; of a live run its gap as well."""
+    """Make a run's energy, its ledger, and its modelled series; of a live run its gap as well; of a plan its price."""
     with workspace.reading() as session:
         run = session.get_one(schema.Run, run_id)
-    if run.role == schema.LIVE:
+    if run.kind == LIVE_RUN:
         return live_energy.provide(workspace, run_id)
     robot_id = run.robot_id
+    twin_id, twin = load_twin(workspace, robot_id)
+    if run.kind == PLANNED_RUN:
+        return _planned(workspace, robot_id, run_id, twin_id, twin)
     with workspace.reading() as session:
-        row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one()
-        role = session.get_one(schema.TwinRun, (row.twin_id, run_id))
-    document = workspace.read_document(row.file, row.sha256).decode()
-    twin = from_json(document, inside(workspace.folder, row.file))
+        role = session.get_one(schema.TwinRun, (twin_id, run_id))
     motion = robot_motions(workspace, robot_id).motions[run_id]
     ledger = twin.ledger(motion)
     return Made(
         robot_id=robot_id,
-        used=[run_iri(run_id), twin_iri(row.twin_id)],
+        used=[run_iri(run_id), twin_iri(twin_id)],
         rows=[
-            _run_energy(run_id, row.twin_id, role, twin, motion, ledger),
+            _run_energy(run_id, twin_id, role, twin, motion, ledger),
             *(
                 schema.EnergyShare(
-                    twin_id=row.twin_id,
+                    twin_id=twin_id,
                     run_id=run_id,
                     effect=entry.effect,
                     place=entry.joint or "robot",
@@ -61,6 +61,52 @@ def provide(workspace: Workspace, run_id: str) -> Made:
             ),
         ],
         series={run_id: modelled_series(twin, motion, held_out(role, motion))},
+    )
+
+
+def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twin: Twin) -> Made:
+    motion = condition(load_run(workspace, twin.robot, run_id), twin.robot, twin.cutoff)
+    taken = cost(twin, [motion])
+    row = schema.RunPrice(
+        run_id=run_id,
+        twin_id=twin_id,
+        energy_from="modelled" if twin.knows_power else "mechanical",
+        **_figure("energy", "j", taken.energy),
+        **_figure("mean_power", "w", taken.mean),
+        **_figure("peak_power", "w", taken.peak),
+    )
+    nothing = np.zeros(len(motion.time), dtype=bool)
+    return Made(
+        robot_id=robot_id,
+        used=[run_iri(run_id), twin_iri(twin_id)],
+        rows=[row],
+        series={run_id: modelled_series(twin, motion, nothing)},
+    )
+
+
+def _figure(name: str, unit: str, figure: Figure) -> dict[str, float | None]:
+    """Return a value and its interval by their columns."""
+    half = figure.half_width
+    lower, upper = (None, None) if half is None else (figure.value - half, figure.value + half)
+    return {f"{name}_{unit}": figure.value, f"{name}_lower_{unit}": lower, f"{name}_upper_{unit}": upper}
+
+
+def stored_price(workspace: Workspace, run_id: str) -> Price | None:
+    """Return what a planned run takes, as it was stored; None where its robot's twin knows nothing of power."""
+    with workspace.reading() as session:
+        seconds = session.get_one(schema.Run, run_id).run_time_s
+        row = session.get_one(schema.RunPrice, run_id)
+    if row.energy_from != "modelled":
+        return None
+
+    def figure(value: float, upper: float | None) -> Figure:
+        return Figure(value, None if upper is None else upper - value)
+
+    return Price(
+        seconds,
+        energy=figure(row.energy_j, row.energy_upper_j),
+        peak=figure(row.peak_power_w, row.peak_power_upper_w),
+        mean=figure(row.mean_power_w, row.mean_power_upper_w),
     )
 
 

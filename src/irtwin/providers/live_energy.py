@@ -207,13 +207,15 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     energy = LiveEnergy(run_id, run.robot_id, joints, known, run.payload_kg, com)
     table = workspace.read_series(run_id)
     columns = {name: np.array(table.column(name), dtype=float) for name in table.column_names}
-    columns["time"] = columns["time"] + run.start_time.timestamp()
+    assert run.start_time is not None  # of what was watched
+    began = run.start_time.timestamp()
+    columns["time"] = columns["time"] + began
     stretches: list[Stretch] = []
     for start in range(0, table.num_rows, _AT_ONCE):
         piece = {name: values[start : start + _AT_ONCE] for name, values in columns.items()}
         stretches += energy.feed(piece, last=start + _AT_ONCE >= table.num_rows)
     rows = [_KINDS[name](**values) for name, some in energy.tables("").items() for values in some]
-    series = {} if not stretches else {run_id: _modelled_series(joints, stretches, run.start_time.timestamp())}
+    series = {} if not stretches else {run_id: _modelled_series(joints, stretches, began)}
     return Made(run.robot_id, used(run_id, known), rows, series)
 
 

@@ -16,12 +16,12 @@ from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import facts
-from irtwin.storage.schema import LIVE
+from irtwin.storage.schema import MEASURED, MEASURED_RUN
 
 
 @dataclass(frozen=True)
 class RobotMotions:
-    """A robot's motions by run_id, in the order in which they began, live runs not among them.
+    """A robot's motions by run_id, in the order in which they began: what was measured, neither plans nor live runs.
 
     `own` are those that its twin is of: a simulator's stay apart where the robot's own are there. `repeats`: name of a
     run -> name of the run whose programmed motion it repeats.
@@ -59,7 +59,9 @@ def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
     robot = load_robot(workspace, robot_id)
     in_order = select(schema.Run.run_id).order_by(schema.Run.start_time, schema.Run.run_id)
     with workspace.reading() as session:
-        run_ids = session.scalars(in_order.where(schema.Run.robot_id == robot_id, schema.Run.role != LIVE)).all()
+        run_ids = session.scalars(
+            in_order.where(schema.Run.robot_id == robot_id, schema.Run.kind == MEASURED_RUN)
+        ).all()
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     own = own_runs(list(runs.values()))
     cutoff = choose_cutoff(own)
@@ -75,10 +77,10 @@ def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
 
 def _facts(workspace: Workspace, robot_id: str) -> Hashable:
     """Return all that the motions follow from: the robot, its joints, its runs and the checksums of their samples."""
-    runs = select(schema.Run).where(schema.Run.robot_id == robot_id, schema.Run.role != LIVE)
+    runs = select(schema.Run).where(schema.Run.robot_id == robot_id, schema.Run.kind == MEASURED_RUN)
     joints = select(schema.Joint).where(schema.Joint.robot_id == robot_id)
     measured = select(schema.Series.run_id, schema.Series.series_id).join(schema.Run)
-    measured = measured.where(schema.Run.robot_id == robot_id, schema.Series.kind == "measured")
+    measured = measured.where(schema.Run.robot_id == robot_id, schema.Series.kind == MEASURED)
     with workspace.reading() as session:
         rows = [session.get_one(schema.Robot, robot_id), *session.scalars(joints), *session.scalars(runs)]
         return frozenset({*map(facts, rows), *map(tuple, session.execute(measured))})

@@ -8,7 +8,7 @@ import json
 import math
 import re
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,14 +18,21 @@ import pyarrow as pa
 from sqlalchemy import select
 
 from irtwin.errors import InputError
+from irtwin.planning.admission import check_motion
 from irtwin.providers.mesh_files import mesh_copies
 from irtwin.providers.structure_rows import device_rows, structure_rows
 from irtwin.robot import description
+from irtwin.robot.collision import CollisionModel
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals import log
 from irtwin.signals.channels import columns_of, from_columns
+from irtwin.signals.conditioning import condition
+from irtwin.storage import schema
 from irtwin.storage.database import Outcome, Workspace
-from irtwin.storage.schema import Base, Joint, Robot, Run
+from irtwin.storage.files import inside
+from irtwin.storage.schema import LIVE_RUN, MEASURED, MEASURED_RUN, PLANNED, PLANNED_RUN, Base, Joint, Robot, Run
+from irtwin.twin.files import from_json
+from irtwin.twin.twin import Twin
 
 _INDIVIDUALS = "https://w3id.org/irtwin/id/"
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
@@ -39,13 +46,15 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
     """
     robot_id = identifier(data_set.robot.name)
     now = datetime.now(UTC)
-    runs = [_run_row(robot_id, run, now) for run in data_set.runs]
+    listed = [*data_set.runs, *data_set.plans]
+    runs = [_run_row(robot_id, run, now) for run in listed]
     taken = {row.run_id for row in runs}
     if len(taken) < len(runs):
         raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
+    _check_kept_runs(workspace, robot_id, data_set, runs)
     series = {
         row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
-        for row, run in zip(runs, data_set.runs, strict=True)
+        for row, run in zip(runs, listed, strict=True)
     }
     meshes, undrawn = mesh_copies(data_set)
     for line in undrawn:
@@ -57,6 +66,55 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
     ]
     documents = {mesh.path: mesh.content for mesh in meshes.values()}
     return workspace.ingest(_robot_row(robot_id, data_set), parts, runs, series, documents)
+
+
+def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], run: log.Run) -> str:
+    """Keep a run of no data set, planned or measured; return its run_id.
+
+    Raises InputError where its name is taken, or it carried out what is no plan of the robot.
+    """
+    check_run_name(workspace, robot_id, run.name)
+    row = _run_row(robot_id, run, datetime.now(UTC))
+    row.role = None
+    with workspace.reading() as session:
+        plan = None if row.performs is None else session.get(Run, row.performs)
+    if row.performs is not None and (plan is None or plan.kind != PLANNED_RUN):
+        raise InputError(f'{run.file}: performs "{run.performs}", which is no planned run in {workspace.folder}')
+    workspace.keep_run(row, pa.table(columns_of(run.signals, joint_names)))
+    return row.run_id
+
+
+def check_run_name(workspace: Workspace, robot_id: str, name: str) -> None:
+    """Raise InputError where a robot has a run of this name, in any form of Unicode, upper or lower case."""
+    with workspace.reading() as session:
+        known = session.scalars(select(Run.name).where(Run.robot_id == robot_id)).all()
+    for other in known:
+        if _folded(other) == _folded(name):
+            raise InputError(f'{workspace.folder}: the robot has a run "{other}" already; choose another name')
+
+
+def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[Run]) -> None:
+    """Raise InputError where a data set does not go with the runs of no data set that the workspace keeps."""
+    with workspace.reading() as session:
+        kept = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_(None))).all()
+        joints = session.scalars(select(Joint.name).where(Joint.robot_id == robot_id).order_by(Joint.position)).all()
+    plans = {row.run_id: row.name for row in kept if row.kind == PLANNED_RUN}
+    toml = data_set.folder / "dataset.toml"
+    if any(row.kind != LIVE_RUN for row in kept) and tuple(joints) != data_set.robot.joint_names:
+        raise InputError(
+            f"{toml}: the workspace keeps runs of this robot with the joints {', '.join(joints)}; remove the robot "
+            "with `irtwin drop` first, or give it another name"
+        )
+    taken = {row.run_id for row in kept}
+    own = {row.run_id for row in runs if row.kind == PLANNED_RUN}
+    for row in runs:
+        if row.run_id in taken:
+            raise InputError(f'{toml}: the workspace keeps a run "{row.name}" of this robot already; rename the file')
+        if row.performs is not None and row.performs not in own | set(plans):
+            name = row.performs.removeprefix(f"{robot_id}.")
+            raise InputError(
+                f'{toml}: run "{row.name}" performs = "{name}", which is no planned run, here or in {workspace.folder}'
+            )
 
 
 def identifier(name: str) -> str:
@@ -156,21 +214,44 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
 
 
 def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log.Run:
-    """Give back a run with its measured signals."""
+    """Give back a run with its signals, measured or planned."""
     with workspace.reading() as session:
         row = session.get_one(Run, run_id)
+    planned = row.kind == PLANNED_RUN
+    samples = workspace.read_series(run_id, PLANNED if planned else MEASURED)
     return log.Run(
         name=row.name,
         file=Path(row.file),
         sha256=row.sha256,
-        role=row.role,
+        role=row.role or (log.PLANNED if planned else "observed"),
         payload_mass=row.payload_kg,
         payload_com=(row.payload_com_x_m, row.payload_com_y_m, row.payload_com_z_m),
         repeat_of=None if row.repeat_of is None else row.repeat_of.removeprefix(f"{row.robot_id}."),
         started=row.start_time,
         notes={},
-        signals=from_columns(_columns(workspace.read_series(run_id)), robot.joint_names),
+        signals=from_columns(_columns(samples), robot.joint_names),
+        performs=None if row.performs is None else row.performs.removeprefix(f"{row.robot_id}."),
     )
+
+
+def check_plans(workspace: Workspace, robot_id: str, plans: Sequence[log.Run]) -> None:
+    """Raise InputError where a planned motion is none that the robot can make, by its twin."""
+    if not plans:
+        return
+    _, twin = load_twin(workspace, robot_id)
+    collisions = CollisionModel(twin.robot)
+    for run in plans:
+        check_motion(twin, condition(run, twin.robot, twin.cutoff), collisions, run.file)
+
+
+def load_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin]:
+    """Give back a robot's twin with its twin_id. Raises InputError where it has none, or its file is gone."""
+    with workspace.reading() as session:
+        row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
+    if row is None:
+        raise InputError(f"{workspace.folder}: robot {robot_id} has no twin yet; run its data set first")
+    document = workspace.read_document(row.file, row.sha256).decode()
+    return row.twin_id, from_json(document, inside(workspace.folder, row.file))
 
 
 def _columns(table: pa.Table) -> dict[str, np.ndarray]:
@@ -229,18 +310,21 @@ def _run_row(robot_id: str, run: log.Run, now: datetime) -> Run:
     time = run.signals.time
     duration = float(time[-1] - time[0])
     x, y, z = run.payload_com
+    planned = run.role == log.PLANNED
     return Run(
         run_id=f"{robot_id}.{identifier(run.name)}",
         robot_id=robot_id,
         name=run.name,
+        kind=PLANNED_RUN if planned else MEASURED_RUN,
         role=run.role,
         payload_kg=run.payload_mass,
         payload_com_x_m=x,
         payload_com_y_m=y,
         payload_com_z_m=z,
         repeat_of=None if run.repeat_of is None else f"{robot_id}.{identifier(run.repeat_of)}",
-        start_time=run.started or now,
-        start_time_from="log" if run.started else "ingest",
+        performs=None if run.performs is None else f"{robot_id}.{identifier(run.performs)}",
+        start_time=None if planned else run.started or now,
+        start_time_from=None if planned else "log" if run.started else "ingest",
         run_time_s=duration,
         sample_count=len(time),
         sample_rate_hz=(len(time) - 1) / duration,

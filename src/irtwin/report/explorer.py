@@ -23,6 +23,7 @@ _BUDGET = 160_000  # points of all charts of all runs: about 1.3 MB of page
 _TORQUE, _POWER = CHANNELS["torque"], CHANNELS["power"]
 _MODEL = "_model"
 _HELD_OUT = "held_out"
+PLANNED = "planned"  # part of a run that did not take place
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def explorer(answers: Answers, read_series: ReadSeries) -> dict[str, Any] | None
     """Return the packed curves of every modelled run, None where there is none.
 
     The charts of a run are its joint torques, power and energy used so far, with their units, each measured (where it
-    was) and modelled, over the time (s) since the run began.
+    was) and modelled, over the time (s) since the run began. Torque that was not measured is drawn of a plan alone.
     """
     rows = answers["modelled_series"].rows
     if not rows:
@@ -92,7 +93,7 @@ def _run(row: Row, columns: Columns, points: int, kinds: Mapping[str, str | None
     torques = [
         _chart(columns, _TORQUE.column(joint), joint, _TORQUE.unit_of(kinds.get(joint) or ""), points)
         for joint in columns.joints
-        if columns.get(_TORQUE.column(joint)) is not None
+        if row["part"] == PLANNED or columns.get(_TORQUE.column(joint)) is not None
     ]
     return {
         "name": row["run_name"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from irtwin.ros.bags import write_bag
 from irtwin.ros.ros_package import write_package
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
+
+_NO_START = datetime(1970, 1, 1, tzinfo=UTC)  # of a plan: its bag begins at 0 s
 
 
 def export_package(out: Path, workspace: Path, robot: str | None, graph_url: str | None = None) -> list[str]:
@@ -38,7 +41,7 @@ def export_bag(out: Path, workspace: Path, run: str, robot: str | None, database
         row = _run(place, run, None if robot is None else find_robot(place, robot))
         described = load_robot(place, row.robot_id)
         stored = load_run(place, described, row.run_id)
-    write_bag(out, described, stored.signals, row.start_time)
+    write_bag(out, described, stored.signals, row.start_time or _NO_START)
 
 
 def _run(place: Workspace, name: str, robot_id: str | None) -> schema.Run:

@@ -84,6 +84,11 @@ class Signals:
         """Return what was logged, by field, in the order of the table."""
         return {field: values for field in CHANNELS if (values := getattr(self, field)) is not None}
 
+    @property
+    def motion(self) -> Self:
+        """What of them is motion: time, positions, and speeds and accelerations where they were logged."""
+        return type(self)(self.time, self.q, dq=self.dq, ddq=self.ddq)
+
     def rows(self, chosen: slice | np.ndarray) -> Self:
         """Return some of the samples."""
         some: dict[str, Any] = {name: it[chosen] for name, it in vars(self).items() if isinstance(it, np.ndarray)}

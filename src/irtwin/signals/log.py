@@ -16,11 +16,12 @@ from irtwin.signals.channels import Signals
 from irtwin.signals.dh_table import robot_of_table
 from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
-from irtwin.signals.sampling import as_sampled
+from irtwin.signals.sampling import as_sampled, holes
 from irtwin.signals.sources.bag_source import number_topics
 from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
 
-ROLES = ("observed", "reference", "simulated")
+PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
+ROLES = ("observed", "reference", "simulated", PLANNED)
 SHEET_KEYS = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _POWER_AT = ("mains", "dc_bus")
 # what the tables of dataset.toml may hold, besides notes
@@ -29,14 +30,14 @@ ROBOT_KEYS = (
     "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
     "arm_movement_type", "simulated", "joint",
 )  # fmt: skip
-RUN_KEYS = ("file", "role", "payload_mass", "payload_com", "repeat_of", "started")
+RUN_KEYS = ("file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started")
 TWIN_KEYS = ("effects",)
 _EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recorded motion with its conditions; payload_mass in kg, payload_com in m in the flange frame."""
+    """One motion with its conditions; payload_mass in kg, payload_com in m in the flange frame."""
 
     name: str
     file: Path
@@ -48,12 +49,14 @@ class Run:
     started: datetime | None
     notes: Mapping[str, Any]
     signals: Signals = field(repr=False)
+    performs: str | None = None  # name of the planned run that it carried out, here or in the workspace
 
 
 @dataclass(frozen=True)
 class DataSet:
     """A robot and its runs; `effects` is what the twin is said to model, None for the baseline.
 
+    `plans` are the runs whose role is "planned": motions alone, which no twin is fitted to and no diagnosis reads.
     `repairs` says what was done in reading: bad samples dropped, joints that mimic others left out; `findings` what
     was mended: a run cut at a hole in time, held samples thinned out.
     """
@@ -69,6 +72,7 @@ class DataSet:
     repairs: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
+    plans: tuple[Run, ...] = ()
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
@@ -87,7 +91,10 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     ]
     findings: list[Finding] = []
     topics = _topics(file, document, robot)
-    runs = list(_runs(folder, file, document, robot, repair, repairs, findings, topics))
+    listed = _resolved(list(_runs(folder, file, document, robot, repair, repairs, findings, topics)), file)
+    runs = tuple(run for run in listed if run.role != PLANNED)
+    if not runs:
+        raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
     power_at = table.text("power_at", "mains")
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
@@ -101,7 +108,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     return DataSet(
         folder=folder,
         robot=robot,
-        runs=_resolved(runs, file),
+        runs=runs,
         effects=None if effects is None else tuple(effects),
         ambient_temperature=table.number("ambient_temperature"),
         power_at=power_at,
@@ -110,7 +117,49 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         repairs=tuple(repairs),
         findings=tuple(findings),
         urdf=table.path("urdf", folder) if "urdf" in table.values else None,
+        plans=tuple(run for run in listed if run.role == PLANNED),
     )
+
+
+def read_log(
+    file: Path,
+    robot: Robot,
+    *,
+    payload_mass: float = 0.0,
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    performs: str | None = None,
+    repair: bool = False,
+) -> tuple[list[Run], list[str]]:
+    """Read a log of no data set as one observed run, or several where it has holes in time; say what was repaired.
+
+    payload_mass in kg, payload_com in m in the flange frame. Raises InputError as `read_data_set` does.
+    """
+    signals, dropped = read_signals(file, robot, repair=repair)
+    pieces, sampled = as_sampled(signals, file)
+    run = Run(
+        name=file.stem,
+        file=file,
+        sha256=hashlib.sha256(file.read_bytes()).hexdigest(),
+        role="observed",
+        payload_mass=payload_mass,
+        payload_com=payload_com,
+        repeat_of=None,
+        started=None,
+        notes={},
+        signals=signals,
+        performs=performs,
+    )
+    return [_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)], [
+        *dropped,
+        *(each.say for each in sampled),
+    ]
+
+
+def check_plan(signals: Signals, file: Path) -> None:
+    """Raise InputError where a planned motion has a hole in time: nothing says how the robot is to pass it."""
+    gaps = holes(signals.time)
+    if len(gaps):
+        raise InputError(f"{file}: has a hole in time after {signals.time[gaps[0] - 1]:.12g} s; plan the motion whole")
 
 
 def own_runs(runs: Sequence[Run]) -> list[Run]:
@@ -216,7 +265,10 @@ def _runs(
         role = table.text("role", "observed") or ""
         if role not in ROLES:
             raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
-        signals, dropped = read_signals(path, robot, repair=repair, topics=topics)
+        signals, dropped = read_signals(path, robot, repair=repair, measured=role != PLANNED, topics=topics)
+        if role == PLANNED:
+            signals = signals.motion
+            check_plan(signals, path)
         pieces, sampled = as_sampled(signals, path)
         repairs += dropped
         findings += sampled
@@ -228,7 +280,8 @@ def _runs(
             payload_mass=table.number("payload_mass", least=0.0) or 0.0,
             payload_com=_centre(table),
             repeat_of=table.text("repeat_of"),
-            started=_started(table),
+            performs=table.text("performs"),
+            started=None if role == PLANNED else _started(table),
             notes={key: value for key, value in table.values.items() if key not in ("file", "role")},
             signals=signals,
         )
@@ -295,6 +348,7 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
             raise InputError(f'{file}: two runs are named "{run.name}" ({names[run.name]}, {run.file}); rename one')
         names[run.name] = run.file
     files = {run.file.resolve(): run.name for run in reversed(runs)}  # of a run in pieces, the first
+    plans = {run.name for run in runs if run.role == PLANNED}
     resolved = []
     for run in runs:
         if run.repeat_of is not None:
@@ -304,6 +358,15 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
                     f'{file}: run "{run.name}" repeat_of = "{run.repeat_of}" is not another run of this data set'
                 )
             run = replace(run, repeat_of=target)
+        if run.role == PLANNED and (run.repeat_of is not None or run.performs is not None):
+            raise InputError(f'{file}: run "{run.name}" is planned; repeat_of and performs are of measured runs')
+        if run.repeat_of in plans:
+            raise InputError(
+                f'{file}: run "{run.name}" repeat_of = "{run.repeat_of}" is a planned run; write performs = '
+                f'"{run.repeat_of}"'
+            )
+        if run.performs in names and run.performs not in plans:
+            raise InputError(f'{file}: run "{run.name}" performs = "{run.performs}", which is not a planned run')
         resolved.append(run)
     _check_circles({run.name: run.repeat_of for run in resolved}, file)
     return tuple(resolved)

@@ -29,7 +29,18 @@ from irtwin.storage.rows import (
     values,
     with_dependents,
 )
-from irtwin.storage.schema import LIVE, Activity, ActivityUse, Base, Robot, Run, Series
+from irtwin.storage.schema import (
+    MEASURED,
+    MODELLED,
+    PLANNED,
+    PLANNED_RUN,
+    Activity,
+    ActivityUse,
+    Base,
+    Robot,
+    Run,
+    Series,
+)
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
 from irtwin.storage.structure_schema import LinkShape
 
@@ -115,10 +126,10 @@ class Workspace:
     ) -> Outcome:
         """Take in a robot's data set, all of it or nothing.
 
-        `parts` are the rows of joints, links, shapes and devices; `series` holds the measured samples of each run, by
-        `run_id`; `documents` the files that parts name, by their path in the workspace. The data set that is there
-        already changes nothing; another one of the same robot replaces it, and all that was derived from it is dropped.
-        Runs that were watched live are no part of a data set and stay.
+        `parts` are the rows of joints, links, shapes and devices; `series` holds the measured or planned samples of
+        each run, by `run_id`; `documents` the files that parts name, by their path in the workspace. The data set that
+        is there already changes nothing; another one of the same robot replaces it, and all that was derived from it is
+        dropped. Runs of no data set stay: those that were watched live, plans and logs that were kept on their own.
         """
         missing = {run.run_id for run in runs} ^ set(series)
         if missing:
@@ -133,7 +144,8 @@ class Workspace:
                 session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(values(robot)))
             for path, content in (documents or {}).items():
                 files.write(inside(self.folder, path), content)
-            insert_rows(session, [*rows[1 if known else 0 :], *self._store(series, "measured", None)])
+            stored = [row for run in runs for row in self._store({run.run_id: series[run.run_id]}, _told(run), None)]
+            insert_rows(session, [*rows[1 if known else 0 :], *stored])
         self.remove_orphans()
         return "replaced" if known else "new"
 
@@ -162,16 +174,23 @@ class Workspace:
             drop_activities(session, with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
                 files.write(inside(self.folder, path), content)
-            modelled = self._store(series or {}, "modelled", activity.activity_id)
+            modelled = self._store(series or {}, MODELLED, activity.activity_id)
             insert_rows(session, [activity, *uses, *rows, *modelled])
         self.remove_orphans()
 
     def keep_live_run(self, run: Run, series: pa.Table, activity: Activity, rows: Sequence[Base]) -> Series:
         """Keep a run that was watched live, with its samples and what is known of it; return where they lie."""
+        return self._keep_run(run, series, [activity, *rows])
+
+    def keep_run(self, run: Run, series: pa.Table) -> None:
+        """Keep a run of no data set, planned or measured, with its samples."""
+        self._keep_run(run, series, [])
+
+    def _keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base]) -> Series:
         with self._writing() as session:
-            (stored,) = self._store({run.run_id: series}, "measured", None)
+            (stored,) = self._store({run.run_id: series}, _told(run), None)
             run.file, run.sha256 = stored.path, stored.series_id
-            insert_rows(session, [run, stored, activity, *rows])
+            insert_rows(session, [run, stored, *rows])
         return stored
 
     def drop_robot(self, robot_id: str) -> None:
@@ -180,7 +199,7 @@ class Workspace:
             drop_robot(session, robot_id)
         self.remove_orphans()
 
-    def read_series(self, run_id: str, kind: str = "measured", columns: Sequence[str] | None = None) -> pa.Table:
+    def read_series(self, run_id: str, kind: str = MEASURED, columns: Sequence[str] | None = None) -> pa.Table:
         """Read a run's samples, or some columns of them. Raises InputError where there are none."""
         with self.reading() as session:
             found = session.execute(
@@ -251,13 +270,13 @@ class Workspace:
 
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
         """Whether exactly these source rows are stored already, with their series and meshes undamaged."""
-        runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
+        runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_not(None)))
         stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
         for table in part_tables():
             found = session.execute(select(table).where(table.columns["robot_id"] == robot_id))
             stored |= {(table.name, *row) for row in found}
         measured = select(Series.path, Series.series_id).join(Run)
-        measured = measured.where(Run.robot_id == robot_id, Series.kind == "measured")
+        measured = measured.where(Run.robot_id == robot_id, Series.kind != MODELLED)
         named = [(row.path, row.series_id) for row in session.execute(measured)]
         shapes = select(LinkShape.mesh_file, LinkShape.mesh_sha256).where(LinkShape.robot_id == robot_id)
         named += [(row.mesh_file, row.mesh_sha256) for row in session.execute(shapes) if row.mesh_file is not None]
@@ -285,6 +304,11 @@ class Workspace:
                     f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
                     "choose a new workspace and ingest again"
                 )
+
+
+def _told(run: Run) -> str:
+    """Return the kind of the samples that a run comes with."""
+    return PLANNED if run.kind == PLANNED_RUN else MEASURED
 
 
 def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missing") -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, RowMapping, Select, Table, delete, insert, select
+from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, insert, select
 from sqlalchemy.orm import Session
 
-from irtwin.storage.schema import LIVE, Activity, Base, Robot, Run, RunEnergy, Series, in_utc
+from irtwin.storage.schema import LIVE, LIVE_RUN, Activity, Base, Robot, Run, RunEnergy, RunPrice, Series, in_utc
 
 Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 
@@ -40,7 +41,7 @@ def facts(row: Base) -> tuple[object, ...]:
     """Return a row's values, to compare; the time of taking in is no fact of the data set."""
     said = values(row)
     if isinstance(row, Run):
-        said["start_time"] = in_utc(row.start_time) if row.start_time_from == "log" else None
+        said["start_time"] = in_utc(row.start_time) if row.start_time and row.start_time_from == "log" else None
     return (row.__tablename__, *said.values())
 
 
@@ -70,10 +71,10 @@ def insert_values(session: Session, rows: Rows) -> None:
             session.execute(insert(table), rows[table.name])
 
 
-def data_set_rows(session: Session, robot_id: str) -> Rows:
-    """Return the rows of a robot, its data set and what was derived from it: all but its live runs."""
+def recorded_rows(session: Session, robot_id: str) -> Rows:
+    """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
     return {
-        table.name: [dict(row) for row in session.execute(found).mappings()] for table, found in _data_set(robot_id)
+        table.name: [dict(row) for row in session.execute(found).mappings()] for table, found in _recorded(robot_id)
     }
 
 
@@ -99,15 +100,25 @@ def files_of(rows: Rows) -> dict[str, str]:
 
 
 def drop_data_set(session: Session, robot_id: str) -> None:
-    """Drop what a data set said and what was derived from it; the robot stays, and so do its live runs.
+    """Drop what a data set said and what was derived of the robot; what a twin says of live runs goes with the twin.
 
-    What a twin says of live runs goes with the twin.
+    The robot stays, and so do runs of no data set and the prices of plans among them.
     """
+    kept = select(RunPrice.activity_id).join(Run).where(Run.robot_id == robot_id, Run.role.is_(None))
+    _drop(session, robot_id, Run.role.is_not(None), set(session.scalars(kept)))
+
+
+def drop_recorded(session: Session, robot_id: str) -> None:
+    """Drop all that `recorded_rows` returns but the robot itself."""
+    _drop(session, robot_id, Run.kind != LIVE_RUN)
+
+
+def _drop(session: Session, robot_id: str, which: ColumnElement[bool], kept: AbstractSet[str] = frozenset()) -> None:
     made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
-    drop_activities(session, set(session.scalars(made)))
-    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
+    drop_activities(session, set(session.scalars(made)) - kept)
+    runs = select(Run.run_id).where(Run.robot_id == robot_id, which)
     session.execute(delete(Series).where(Series.run_id.in_(runs)))
-    session.execute(delete(Run).where(Run.robot_id == robot_id, Run.role != LIVE))
+    session.execute(delete(Run).where(Run.robot_id == robot_id, which))
     _drop_parts(session, robot_id)
 
 
@@ -155,10 +166,10 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
     return found
 
 
-def _data_set(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
+def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
     """Yield each table with the query of a robot's rows in it, without its live runs'."""
-    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.role != LIVE)
-    of_live = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.role == LIVE)
+    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.kind != LIVE_RUN)
+    of_live = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.kind == LIVE_RUN)
     made = select(Activity.activity_id).where(
         Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(of_live)
     )

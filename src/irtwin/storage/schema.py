@@ -13,7 +13,10 @@ from sqlalchemy import DateTime, Dialect, ForeignKey
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
-LIVE = "live"  # role of runs that were watched, and provider of what is known of them
+LIVE = "live"  # provider of what is known of runs that are watched
+# Kinds of run, by their classes in the ontology: made up, taken in as a log, or watched while it lasted.
+PLANNED_RUN, MEASURED_RUN, LIVE_RUN = "Planned_Run", "Measured_Run", "Live_Run"
+MEASURED, PLANNED, MODELLED = "measured", "planned", "modelled"  # kinds of series
 
 
 class Moment(TypeDecorator[datetime]):
@@ -88,14 +91,15 @@ class Joint(Base):
 
 
 class Run(Base):
-    """One recorded motion; `run_id` is `robot_id.name`."""
+    """One motion, recorded or planned; `run_id` is `robot_id.name`."""
 
     __tablename__ = "run"
 
     run_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
     name: Mapped[str]
-    role: Mapped[str]  # as the data set says, or "live" for one that was watched, not taken in
+    kind: Mapped[str]  # PLANNED_RUN, MEASURED_RUN or LIVE_RUN
+    role: Mapped[str | None]  # as the data set says; none for a run of no data set, which another one leaves as it is
     payload_kg: Mapped[float]
     payload_com_x_m: Mapped[float]
     payload_com_y_m: Mapped[float]
@@ -104,8 +108,11 @@ class Run(Base):
         # Deferred: a run may stand before the one that it repeats.
         ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
     )
-    start_time: Mapped[datetime]  # the log's `started`, else when it was taken in
-    start_time_from: Mapped[str]  # "log" or "ingest"
+    performs: Mapped[str | None] = mapped_column(  # the planned run that it carried out
+        ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
+    )
+    start_time: Mapped[datetime | None]  # the log's `started`, else when it was taken in; a plan has none
+    start_time_from: Mapped[str | None]  # "log" or "ingest"
     run_time_s: Mapped[float]
     sample_count: Mapped[int]
     sample_rate_hz: Mapped[float]
@@ -114,13 +121,13 @@ class Run(Base):
 
 
 class Series(Base):
-    """A Parquet file of a run's samples: as measured, or as a twin models them."""
+    """A Parquet file of a run's samples: as measured or planned, or as a twin models them."""
 
     __tablename__ = "series"
 
     series_id: Mapped[str] = mapped_column(primary_key=True)  # sha256 of the Parquet file
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
-    kind: Mapped[str]  # "measured" or "modelled"
+    kind: Mapped[str]  # MEASURED, PLANNED or MODELLED
     path: Mapped[str]  # inside the workspace
     row_count: Mapped[int]
     columns: Mapped[str]  # comma separated
@@ -206,6 +213,28 @@ class Twin(Base):
     condition_number: Mapped[float | None]  # of the scaled base regressor
     base_parameter_count: Mapped[int | None]
     split: Mapped[str]  # in words: which data were fitted, which held out
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class ImprovementRound(Base):
+    """A try to better a robot's twin by what was logged since; `round_id` is `robot_id.` and its number.
+
+    Twins are named by their ids alone: one that was replaced has no row any more.
+    """
+
+    __tablename__ = "improvement_round"
+
+    round_id: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
+    number: Mapped[int]
+    tried: Mapped[str]  # "same effects" or "effects of a diagnosis"
+    effects: Mapped[str]  # comma separated
+    earlier_twin_id: Mapped[str]
+    tried_twin_id: Mapped[str]
+    error_before_percent: Mapped[float]  # worst energy error of what neither twin was fitted to
+    error_after_percent: Mapped[float]
+    limit_percent: Mapped[float]
+    outcome: Mapped[str]  # "within the limit", "better" or "no better"
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -298,6 +327,29 @@ class RunEnergy(Base):
     standby_energy_j: Mapped[float | None]
     standby_share: Mapped[float | None]  # of the modelled energy, 0 to 1
     returned_energy_j: Mapped[float | None]  # mechanical energy that the joints gave back while they braked, positive
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class RunPrice(Base):
+    """What a planned run will take by its robot's twin, with 95 % intervals of the twin's parameters.
+
+    The twin is named by its id alone: one that was replaced has no row any more, and the price stays what it was.
+    """
+
+    __tablename__ = "run_price"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    twin_id: Mapped[str]
+    energy_from: Mapped[str]  # "modelled", or "mechanical": without the electrical losses
+    energy_j: Mapped[float]
+    energy_lower_j: Mapped[float | None]
+    energy_upper_j: Mapped[float | None]
+    mean_power_w: Mapped[float]
+    mean_power_lower_w: Mapped[float | None]
+    mean_power_upper_w: Mapped[float | None]
+    peak_power_w: Mapped[float]
+    peak_power_lower_w: Mapped[float | None]
+    peak_power_upper_w: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

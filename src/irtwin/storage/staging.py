@@ -12,7 +12,7 @@ from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import inside
-from irtwin.storage.rows import Rows, data_set_rows, drop_data_set, files_of, insert_values
+from irtwin.storage.rows import Rows, drop_recorded, files_of, insert_values, recorded_rows
 from irtwin.storage.schema import Robot
 from irtwin.storage.series import is_whole
 
@@ -21,7 +21,7 @@ _PREFIX = ".staged-"
 
 @contextmanager
 def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
-    """Give a workspace that holds one robot, with its data set and all that was derived, but not its live runs.
+    """Give a workspace that holds one robot, with its data set, its plans and all that was derived, but no live runs.
 
     Where the block ends well, what the robot is there replaces in one transaction what it was. Else all stays as it
     was, and so it does where the process is killed. Others may read and write meanwhile.
@@ -41,16 +41,16 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
 
 def _rows(place: Workspace, robot_id: str) -> Rows:
     with place.reading() as session:
-        return data_set_rows(session, robot_id)
+        return recorded_rows(session, robot_id)
 
 
 def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> None:
-    """Make the rows, and the files that they name, all that the target has of the robot's data set."""
+    """Make the rows, and the files that they name, all that the target has of the robot but its live runs."""
     with engine.writing(target.engine) as session:
         for path, checksum in files_of(rows).items():
             if is_whole(source.folder, path, checksum):  # else whoever needs it says so
                 _link(source, target, path)
-        drop_data_set(session, robot_id)
+        drop_recorded(session, robot_id)
         if session.get(Robot, robot_id) is None:
             insert_values(session, rows)
         else:

@@ -53,8 +53,11 @@ def price(twin: Twin, motions: Sequence[Motion]) -> Price | None:
 
     To first order in the parameters; effects that build on predicted power (bus, chopper) are taken as they are.
     """
-    if not twin.knows_power:
-        return None
+    return cost(twin, motions) if twin.knows_power else None
+
+
+def cost(twin: Twin, motions: Sequence[Motion]) -> Price:
+    """Return what `price` does; of a twin that knows nothing of power, what its joints take together."""
     powers = [twin.power(motion) for motion in motions]
     seconds = sum(float(motion.time[-1] - motion.time[0]) for motion in motions)
     total = sum(energy(motion.time, power) for motion, power in zip(motions, powers, strict=True))

@@ -38,7 +38,7 @@ HOPS = 2  # from a statement's terms, before all of the graph is searched for it
 _TERM = re.compile(r'"(?:[^"\\]|\\.)*"(?:\^\^\S+|@[\w-]+)?|<[^<>\s]*>|\S+')
 _WILDCARDS = {"?", "*", "_"}
 _ABOVE = "what is said above"
-_RECORDED = "what was recorded"
+_RECORDED, _PLANNED = "what was recorded", "what was planned"
 
 
 def explain(graph: KnowledgeGraph, pattern: str) -> tuple[Explanation, ...]:
@@ -99,7 +99,7 @@ class Explainer:
         used = [thing for maker in makers for thing in provenance.used_by(self._graph, maker["activity"])]
         return Explanation(
             what,
-            " and ".join(map(_maker, makers)) or _RECORDED,
+            " and ".join(map(_maker, makers)) or self._known_from(iri),
             (*map(self.individual, dict.fromkeys(used)), *self._runs_recorded_as(iri)),
             file=file,
             checksum=checksum,
@@ -109,7 +109,10 @@ class Explainer:
         """Name the run that samples were read from, and its own file."""
         for run in provenance.recorded_of(self._graph, series):
             file, checksum = provenance.file_of(self._graph, run)
-            yield Explanation(shorten(run), _RECORDED, file=file, checksum=checksum)
+            yield Explanation(shorten(run), self._known_from(run), file=file, checksum=checksum)
+
+    def _known_from(self, run: str) -> str:
+        return _PLANNED if provenance.is_planned(self._graph, run) else _RECORDED
 
     def _stated(self, triple: Triple, name: str) -> Explanation:
         what = _show(triple)

@@ -37,6 +37,9 @@ def makers(graph: KnowledgeGraph, thing: str) -> list[Row]:
     return list(graph.query(_MAKERS, {"thing": thing}))
 
 
+_PLAN = "SELECT ?kind { ?thing a ?kind FILTER(?kind IN (irt:Planned_Run, irt:Planned_Series)) }"
+
+
 def activity(graph: KnowledgeGraph, iri: str) -> Row:
     """Return what is known of an activity, like `makers`."""
     return {**next(iter(graph.query(_ACTIVITY, {"activity": iri})), {}), "activity": iri}
@@ -50,6 +53,11 @@ def used_by(graph: KnowledgeGraph, activity: str) -> list[str]:
 def recorded_of(graph: KnowledgeGraph, series: str) -> list[str]:
     """Return the IRI of the run that samples are of, where no activity made them."""
     return [row["run"] for row in graph.query(_RUN, {"thing": series})]
+
+
+def is_planned(graph: KnowledgeGraph, thing: str) -> bool:
+    """Whether a run, or the samples of one, did not take place."""
+    return bool(list(graph.query(_PLAN, {"thing": thing})))
 
 
 def file_of(graph: KnowledgeGraph, thing: str) -> tuple[str | None, str | None]:

@@ -142,8 +142,8 @@
   const RUN = `SELECT * WHERE {
     ${iri} irt:has_Information / irt:IR_Name ?name .
     OPTIONAL {
-      { SELECT (MAX(?began) AS ?start) { ?any irt:run_of ${iri} ; irt:Run_Role "live" ; irt:Start_Time ?began } }
-      ?run irt:run_of ${iri} ; irt:Run_Role "live" ; irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
+      { SELECT (MAX(?began) AS ?start) { ?any irt:run_of ${iri} ; a irt:Live_Run ; irt:Start_Time ?began } }
+      ?run irt:run_of ${iri} ; a irt:Live_Run ; irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
       OPTIONAL { ?run irt:Stale_Since ?since ; irt:Stale_Reason ?why }
       OPTIONAL { ?run irt:Energy_Consumption ?energy ; irt:Energy_From ?from ; irt:Run_Power ?mean }
       OPTIONAL { ?run irt:Energy_Error ?error } } }`;

@@ -2,8 +2,8 @@
 // The robots that are or were watched, the newest live run of each: asked of /sparql each second.
 (function () {
   const QUERY = `SELECT ?robot ?name ?stream ?at ?energy ?power (COUNT(DISTINCT ?alarm) AS ?alarms) WHERE {
-    { SELECT ?robot (MAX(?began) AS ?start) { ?any irt:Run_Role "live" ; irt:run_of ?robot ; irt:Start_Time ?began } GROUP BY ?robot }
-    ?run irt:run_of ?robot ; irt:Run_Role "live" ; irt:Start_Time ?start ; irt:Stream_State ?stream ; irt:State_Time ?at .
+    { SELECT ?robot (MAX(?began) AS ?start) { ?any a irt:Live_Run ; irt:run_of ?robot ; irt:Start_Time ?began } GROUP BY ?robot }
+    ?run irt:run_of ?robot ; a irt:Live_Run ; irt:Start_Time ?start ; irt:Stream_State ?stream ; irt:State_Time ?at .
     ?robot irt:has_Information / irt:IR_Name ?name .
     OPTIONAL { ?run irt:Energy_Consumption ?energy ; irt:Run_Power ?power }
     OPTIONAL { ?alarm a irt:Gap_Alarm ; irt:gap_of_Run ?run ; irt:Alarm_State "active" }

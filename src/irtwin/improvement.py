@@ -1,0 +1,82 @@
+"""The seed's "not satisfied, repeat": a robot's twin is fitted again beside a new log, until it is good enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.next_experiment import NextExperiment, next_experiment
+from irtwin.providers.improvement import Round
+from irtwin.providers.improvement import improve as improve_twin
+from irtwin.providers.records import find_robot, keep_run, load_robot, load_twin
+from irtwin.signals.log import read_log
+from irtwin.storage.database import Workspace
+from irtwin.storage.staging import staged
+from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, write_report
+
+Announce = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """How it ended: the rounds, whether the twin is within the limit (%) on every run, else what to log next.
+
+    report: the robot's energy report.
+    """
+
+    rounds: tuple[Round, ...]
+    within: bool
+    limit: float
+    next: NextExperiment | None
+    report: Path
+
+
+def improve(
+    robot: str,
+    new_log: Path,
+    workspace: Path | str,
+    *,
+    payload_mass: float = 0.0,
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    performs: str | None = None,
+    repair: bool = False,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> Improvement:
+    """Take a new log of a robot into its workspace, and better its twin by it where that can be.
+
+    payload_mass kg, payload_com m in the flange frame; performs: name of the planned run that the log carried out. The
+    log stays beside the runs of the robot's data set; where the twin is no better, the earlier one stays.
+    Raises InputError, and changes nothing, where the robot is unknown or has no twin, the log is none of it, its name
+    is taken, or it has no power to judge by.
+    """
+    with Workspace.existing(Path(workspace), database) as place:
+        robot_id = find_robot(place, robot)
+        load_twin(place, robot_id)
+        known = load_robot(place, robot_id)
+        runs, said = read_log(
+            new_log, known, payload_mass=payload_mass, payload_com=payload_com, performs=performs, repair=repair
+        )
+        for line in said:
+            announce(f"  {line}")
+        with rewriting(place, graph_url) as graph:
+            graph.load_ontology()
+            limit = _limit(graph)
+            with staged(place, robot_id) as apart:
+                for run in runs:
+                    keep_run(apart, robot_id, known.joint_names, run)
+                improved = improve_twin(apart, robot_id, [run.name for run in runs], limit, announce)
+                populate_apart(apart, announce)
+            map_rows(place, graph)
+            conclude(graph, announce)
+            report = write_report(place, graph, robot_id)
+            following = next_experiment(place, graph, robot_id)
+        return Improvement(improved.rounds, improved.within, limit, following, report)
+
+
+def _limit(graph: KnowledgeGraph) -> float:
+    (row,) = graph.query("SELECT ?limit { irt:default_Limits irt:Energy_Error_Limit ?limit }")
+    return float(row["limit"])

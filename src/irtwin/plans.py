@@ -1,0 +1,133 @@
+"""Planned runs: a motion is planned or priced by a robot's twin, and kept in the workspace with what it will take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from irtwin import modelling
+from irtwin.modelling import Expectation
+from irtwin.planning.plan import Plan, Task
+from irtwin.providers.energy import stored_price
+from irtwin.providers.records import check_run_name, find_robot, keep_run, load_twin
+from irtwin.signals.channels import Signals
+from irtwin.signals.log import PLANNED, Run, check_plan
+from irtwin.storage.database import Workspace
+from irtwin.storage.staging import staged
+from irtwin.twin.price import Price
+from irtwin.twin.twin import Twin
+from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, write_report
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A planned run as it was kept: its robot and name, what it will take, and the robot's report.
+
+    The price is None where the twin knows nothing of power.
+    """
+
+    robot: str
+    run: str
+    price: Price | None
+    report: Path
+
+
+def robot_twin(robot: str, workspace: Path | str, database: str | None = None) -> Twin:
+    """Return the twin of a robot of a workspace. Raises InputError where there is no such robot, or no twin of it."""
+    with Workspace.existing(Path(workspace), database) as place:
+        return load_twin(place, find_robot(place, robot))[1]
+
+
+def plan(
+    robot: str,
+    task: Task,
+    workspace: Path | str,
+    *,
+    name: str,
+    out: Path | None = None,
+    rate: float = 100.0,
+    database: str | None = None,
+    graph_url: str | None = None,
+) -> tuple[Plan, Kept]:
+    """Plan a motion by the twin of a robot of a workspace, and keep it there as a planned run called `name`.
+
+    Raises InputError, and keeps nothing, where the robot is unknown or has no twin, the name is taken, or there is no
+    such motion.
+    """
+
+    def make(twin: Twin) -> tuple[Plan, Run]:
+        made = modelling.plan(twin, task, out, rate)
+        motion = made.motion
+        signals = Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq)
+        return made, _run(name, signals, task.payload_mass, task.payload_com)
+
+    return _keep(robot, name, make, Path(workspace), database, graph_url)
+
+
+def predict(
+    robot: str,
+    motion: Path,
+    workspace: Path | str,
+    *,
+    name: str,
+    out: Path | None = None,
+    payload_mass: float | None = None,
+    payload_com: tuple[float, float, float] | None = None,
+    database: str | None = None,
+    graph_url: str | None = None,
+) -> tuple[Expectation, Kept]:
+    """Price a file's motion by the twin of a robot of a workspace, and keep it there as a planned run called `name`.
+
+    Raises InputError, and keeps nothing, as `plan` and `modelling.expect` do.
+    """
+
+    def make(twin: Twin) -> tuple[Expectation, Run]:
+        expected = modelling.expect(twin, motion, out, payload_mass=payload_mass, payload_com=payload_com)
+        run = expected.run
+        check_plan(run.signals, motion)
+        return expected, _run(name, run.signals.motion, run.payload_mass, run.payload_com)
+
+    return _keep(robot, name, make, Path(workspace), database, graph_url)
+
+
+def _keep(
+    robot: str,
+    name: str,
+    make: Callable[[Twin], tuple[T, Run]],
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+) -> tuple[T, Kept]:
+    with Workspace.existing(workspace, database) as place:
+        robot_id = find_robot(place, robot)
+        check_run_name(place, robot_id, name)
+        _, twin = load_twin(place, robot_id)
+        made, run = make(twin)
+        with rewriting(place, graph_url) as graph:
+            with staged(place, robot_id) as apart:
+                run_id = keep_run(apart, robot_id, twin.robot.joint_names, run)
+                populate_apart(apart, lambda line: None)
+            graph.load_ontology()
+            map_rows(place, graph)
+            conclude(graph, lambda line: None)
+            report = write_report(place, graph, robot_id)
+        return made, Kept(robot_id, name, stored_price(place, run_id), report)
+
+
+def _run(name: str, signals: Signals, payload_mass: float, payload_com: tuple[float, float, float]) -> Run:
+    return Run(
+        name=name,
+        file=Path(name),
+        sha256="",
+        role=PLANNED,
+        payload_mass=payload_mass,
+        payload_com=payload_com,
+        repeat_of=None,
+        started=None,
+        notes={},
+        signals=signals,
+    )

@@ -1,0 +1,246 @@
+"""The provider of better twins: fits a robot's twin again beside new logs, and keeps it where it is better.
+
+It judges both twins on what neither was fitted to: what was held out of the earlier one, and the last third of each new
+log.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from sqlalchemy import func, select
+
+from irtwin.effects.effect import Effect
+from irtwin.errors import InputError
+from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.document.experiment import Experiment
+from irtwin.identification.validation import FIT_SHARE, Split
+from irtwin.providers.identification import twin_made
+from irtwin.providers.motions import RobotMotions, robot_motions
+from irtwin.providers.provider import Made
+from irtwin.providers.records import load_run, load_twin, robot_iri, run_iri, twin_iri
+from irtwin.signals.log import DataSet, Run
+from irtwin.signals.motion import Motion
+from irtwin.storage import schema
+from irtwin.storage.database import Workspace
+from irtwin.twin.identify import identify
+from irtwin.twin.twin import Twin
+from irtwin.twin.validate import validate
+
+WITHIN, BETTER, NO_BETTER = "within the limit", "better", "no better"
+_SAME, _DIAGNOSED = "same effects", "effects of a diagnosis"
+_ROUNDS = "https://w3id.org/irtwin/id/improvement_round/"
+
+Announce = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Round:
+    """A try: what was fitted, the worst energy error on what neither twin was fitted to (%), and how it ended."""
+
+    tried: str
+    before: float
+    after: float
+    outcome: str
+
+
+@dataclass(frozen=True)
+class Improved:
+    """The rounds, whether the twin is within the limit on every run, and what a diagnosis would measure next."""
+
+    rounds: tuple[Round, ...]
+    within: bool
+    experiment: Experiment | None
+
+
+@dataclass
+class _Twin:
+    """A twin, and which data it was fitted to and is judged on."""
+
+    twin_id: str
+    twin: Twin
+    parts: Split
+
+
+def improve(
+    workspace: Workspace, robot_id: str, names: Sequence[str], limit: float, announce: Announce = lambda line: None
+) -> Improved:
+    """Better a robot's twin by new logs that the workspace holds already, `names`; limit: energy error, %.
+
+    A round fits the effects of the twin again. Where that leaves it beyond the limit, another adds the effects that a
+    diagnosis of the fitted data finds. A twin that is no better than the one before is not kept. Each round is stored.
+    Raises InputError where nothing that is held out has measured power.
+    """
+    known = robot_motions(workspace, robot_id)
+    twin_id, twin = load_twin(workspace, robot_id)
+    before = _parts_before(workspace, known, twin_id, names)
+    loop = _Loop(workspace, robot_id, known, limit, announce, _Twin(twin_id, twin, before))
+    parts = _parts_with(known, before, names)
+    loop.try_out(_SAME, twin.effects, parts)
+    experiment = None
+    if not loop.within:
+        announce("  looking for effects that the twin lacks")
+        try:
+            found = diagnose(_data_set(workspace, robot_id, known, twin, parts))
+        except InputError as error:
+            announce(f"  these runs do not say: {error}")
+        else:
+            experiment = found.experiment
+            if found.twin is not None and found.twin.effects != twin.effects:
+                loop.try_out(_DIAGNOSED, found.twin.effects, parts)
+    _keep_twin(workspace, robot_id, known, loop.best)
+    return Improved(tuple(loop.rounds), loop.within, experiment)
+
+
+@dataclass
+class _Loop:
+    """Rounds one after the other; `best` is the twin that is to be the robot's."""
+
+    workspace: Workspace
+    robot_id: str
+    known: RobotMotions
+    limit: float
+    announce: Announce
+    best: _Twin
+    rounds: list[Round] = field(default_factory=list)
+
+    @property
+    def within(self) -> bool:
+        """Whether the best twin is within the limit on every run that it is judged on."""
+        return _worst(self.best.twin, _judged(self.best.parts)) <= self.limit
+
+    def try_out(self, tried: str, effects: Sequence[str | Effect], parts: Split) -> None:
+        """Fit effects, judge the twin beside the best so far, and store the round."""
+        started = datetime.now(UTC)
+        self.announce(f"  fitting the {tried}")
+        twin = identify(self.known.robot, parts.fit, effects)
+        found = _Twin(_made(self.robot_id, self.known, twin, parts)[0], twin, parts)
+        before, after = _worst(self.best.twin, parts.held_out), _worst(twin, parts.held_out)
+        earlier = self.best.twin_id
+        if after < before:
+            self.best = found
+        outcome = NO_BETTER if after >= before else WITHIN if self.within else BETTER
+        self.rounds.append(Round(tried, before, after, outcome))
+        self.announce(
+            f"  worst energy error on what neither was fitted to: {before:.3g} %, then {after:.3g} %: {outcome}"
+        )
+        row = self._row(self.rounds[-1], earlier, found)
+        read = {motion.run for motion in (*parts.fit, *parts.held_out)}
+        used = [twin_iri(earlier), *(run_iri(run_id) for name, run_id in self.known.keys.items() if name in read)]
+        activity = _activity("improvement", self.robot_id, f"{_ROUNDS}{row.round_id}", started)
+        self.workspace.replace_activity(activity, used, [row])
+
+    def _row(self, tried: Round, earlier: str, found: _Twin) -> schema.ImprovementRound:
+        of_robot = schema.ImprovementRound.robot_id == self.robot_id
+        with self.workspace.reading() as session:
+            last = session.scalar(select(func.max(schema.ImprovementRound.number)).where(of_robot)) or 0
+        return schema.ImprovementRound(
+            round_id=f"{self.robot_id}.{last + 1}",
+            robot_id=self.robot_id,
+            number=last + 1,
+            tried=tried.tried,
+            effects=",".join(found.twin.effect_ids),
+            earlier_twin_id=earlier,
+            tried_twin_id=found.twin_id,
+            error_before_percent=tried.before,
+            error_after_percent=tried.after,
+            limit_percent=self.limit,
+            outcome=tried.outcome,
+        )
+
+
+def _parts_before(workspace: Workspace, known: RobotMotions, twin_id: str, new: Sequence[str]) -> Split:
+    """Return the parts that runs took in a twin; new logs are held out of it."""
+    with workspace.reading() as session:
+        rows = session.scalars(select(schema.TwinRun).where(schema.TwinRun.twin_id == twin_id)).all()
+        rule = session.get_one(schema.Twin, twin_id).split
+    fit, held_out = [], []
+    for row in rows:
+        motion = known.motions[row.run_id]
+        cut = None if row.held_out_from_s is None else int((motion.time < row.held_out_from_s).sum())
+        if row.part in ("fit", "both"):
+            fit.append(motion if cut is None else motion.part(0, cut))
+        if row.part in ("held_out", "both"):
+            held_out.append(motion if cut is None else motion.part(cut, len(motion.time)))
+    held_out += [motion for motion in known.motions.values() if motion.run in new]
+    return Split(tuple(fit), tuple(held_out), rule)
+
+
+def _parts_with(known: RobotMotions, before: Split, new: Sequence[str]) -> Split:
+    """Return the parts with the first two thirds of each new log fitted."""
+    fit = list(before.fit)
+    held_out = [motion for motion in before.held_out if motion.run not in new]
+    for motion in known.motions.values():
+        if motion.run in new:
+            cut = round(FIT_SHARE * len(motion.time))
+            fit.append(motion.part(0, cut))
+            held_out.append(motion.part(cut, len(motion.time)))
+    rule = before.rule.partition("; logged since")[0]
+    return Split(tuple(fit), tuple(held_out), f"{rule}; logged since and cut in time: {', '.join(new)}")
+
+
+def _judged(parts: Split) -> list[Motion]:
+    """Return what the rules judge a twin on: what was held out, and runs that were fitted whole."""
+    cut = {motion.run for motion in parts.held_out}
+    return [*parts.held_out, *(motion for motion in parts.fit if motion.run not in cut)]
+
+
+def _worst(twin: Twin, motions: Sequence[Motion]) -> float:
+    errors = [fit.energy_error for fit in validate(twin, motions) if fit.energy_error is not None]
+    if not errors:
+        raise InputError(f"{twin.robot.name}: no run outside the fit has measured power to judge by; log power")
+    return max(errors)
+
+
+def _data_set(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> DataSet:
+    """Return what was fitted as a data set, so that a diagnosis sees nothing of what judges."""
+    with workspace.reading() as session:
+        row = session.get_one(schema.Robot, robot_id)
+    cut = {motion.run: float(motion.time[0]) for motion in parts.held_out}
+    names = {motion.run for motion in parts.fit}
+    runs = [_fitted(load_run(workspace, known.robot, known.keys[name]), cut.get(name), names) for name in sorted(names)]
+    return DataSet(
+        folder=Path(robot_id),
+        robot=known.robot,
+        runs=tuple(runs),
+        effects=twin.effect_ids,
+        ambient_temperature=row.ambient_temperature_degc,
+        power_at=row.power_measured_at,
+        simulated=row.simulated,
+        notes=json.loads(row.notes),
+    )
+
+
+def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
+    signals = run.signals if until is None else run.signals.rows(run.signals.time < until)
+    return replace(run, signals=signals, repeat_of=run.repeat_of if run.repeat_of in names else None)
+
+
+def _made(robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:
+    made = twin_made(robot_id, twin, known.keys, parts)
+    return next(row.twin_id for row in made.rows if isinstance(row, schema.Twin)), made
+
+
+def _keep_twin(workspace: Workspace, robot_id: str, known: RobotMotions, best: _Twin) -> None:
+    """Make a twin the robot's, with the parts that runs now take in it."""
+    _, made = _made(robot_id, known, best.twin, best.parts)
+    started = datetime.now(UTC)
+    activity = _activity("identification", robot_id, robot_iri(robot_id), started)
+    workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of="adoption")
+
+
+def _activity(provider: str, robot_id: str, subject: str, started: datetime) -> schema.Activity:
+    return schema.Activity(
+        activity_id=f"{provider}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
+        robot_id=robot_id,
+        provider=provider,
+        subject=subject,
+        started=started,
+        ended=datetime.now(UTC),
+        software=f"irtwin {version('irtwin')}",
+    )

@@ -1,0 +1,217 @@
+"""Planned runs: kept with what they will take, beside what was measured, and counted in no sum of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from irtwin import asking, plans, workflow
+from irtwin.errors import InputError
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.planning.plan import Task
+from irtwin.signals.channels import from_columns
+from irtwin.signals.log import Run, read_data_set
+from irtwin.signals.motion import Motion
+from irtwin.storage.database import Workspace
+from irtwin.workflow import rewriting
+from tests import data_sets
+from tests.data_sets import Said, irtwin
+from tests.synthetic import arm, as_run, measure, swing, with_constants
+
+pytestmark = pytest.mark.slow
+
+ROBOT = with_constants(arm(2))
+EFFECTS = '[twin]\neffects = ["rigid_body", "rotor_inertia", "coulomb_friction", "viscous_friction", "torque_offset", '
+EFFECTS += '"mechanical_power", "copper_loss", "standby_power"]'
+GOAL = ("--from", "0,0", "--to", "1,-1")
+
+
+def recorded() -> list[Run]:
+    return [as_run(measure(ROBOT, swing(ROBOT, seed, seconds=8.0), noise=0.02)) for seed in (1, 2, 3)]
+
+
+def carried_out(file: Path) -> Run:
+    """The run of a robot that does what a planned motion's file says, and stands for a second before and after."""
+    signals = from_columns({name: column.to_numpy() for name, column in _columns(file)}, ROBOT.joint_names)
+    step = signals.time[1] - signals.time[0]
+    still = round(1.0 / step)
+    q = np.concatenate([np.repeat(signals.q[:1], still, 0), signals.q, np.repeat(signals.q[-1:], still, 0)])
+    time = np.arange(len(q)) * step
+    dq = np.gradient(q, step, axis=0)
+    done = Motion(time, q, dq, np.gradient(dq, step, axis=0), run="done")
+    return as_run(measure(ROBOT, done, noise=0.02))
+
+
+def _columns(file: Path):
+    table = pq.read_table(file)
+    return zip(table.column_names, table.columns, strict=True)
+
+
+def write(folder: Path, runs: list[Run], more: str = "") -> Path:
+    return data_sets.write(folder, ROBOT, runs, tail=f"{more}\n{EFFECTS}")
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
+    """A workspace with a robot whose plan "reach" is kept, and what the command said."""
+    folder = tmp_path_factory.mktemp("plans")
+    workflow.run(write(folder / "logs", recorded()), folder / "workspace")
+    said = irtwin("plan", "arm_2", *GOAL, "--workspace", folder / "workspace", "--out", folder / "reach.parquet")
+    return folder, said
+
+
+@pytest.fixture(scope="module")
+def performed(kept: tuple[Path, Said]) -> Path:
+    """The workspace after the robot carried the plan out; its data set has a plan of its own."""
+    folder, _ = kept
+    logs = write(folder / "logs_2", [*recorded(), carried_out(folder / "reach.parquet")])
+    toml = (logs / "dataset.toml").read_text()
+    toml = toml.replace('file = "runs/done.parquet"', 'file = "runs/done.parquet"\nperforms = "reach"')
+    (logs / "runs" / "later.parquet").write_bytes((folder / "reach.parquet").read_bytes())
+    toml = toml.replace("[twin]", '[[run]]\nfile = "runs/later.parquet"\nrole = "planned"\n\n[twin]')
+    (logs / "dataset.toml").write_text(toml)
+    workflow.run(logs, folder / "workspace")
+    return folder / "workspace"
+
+
+def test_a_plan_is_kept_with_what_it_will_take(kept: tuple[Path, Said]) -> None:
+    said = kept[1]
+    assert said.status == 0, said.err
+    assert 'reach.parquet and planned run "reach" of arm_2: ' in said.out
+    assert "+- 95 % interval of the twin's parameters" in said.out
+
+
+def test_the_graph_says_of_a_plan_what_the_command_printed(performed: Path, kept: tuple[Path, Said]) -> None:
+    rows = {row["run"]: row for row in asking.ask("planned_runs", performed)}
+    assert set(rows) == {"reach", "later"}
+    reach = rows["reach"]
+    assert reach["from"] == "modelled"
+    assert reach["lower_J"] < reach["energy_J"] < reach["upper_J"]
+    assert reach["energy_J"] == pytest.approx(reach["mean_power_W"] * reach["time_s"])
+    assert rows["later"]["energy_J"] == pytest.approx(reach["energy_J"], rel=1e-3)
+    printed = float(kept[1].out.partition("energy ")[2].partition(" ")[0])
+    assert reach["energy_J"] == pytest.approx(printed, rel=1e-3)  # as it was planned, whatever the twin is since
+
+
+def test_a_plan_leads_back_to_twin_and_motion(performed: Path) -> None:
+    used = asking.ask(
+        """SELECT ?kind { ?run irt:Run_Name "reach" ; irt:priced_by ?twin . GRAPH ?g { ?run irt:Planned_Energy ?j }
+        ?g prov:wasGeneratedBy ?activity . ?activity prov:used ?used FILTER(?used IN (?run, ?twin))
+        BIND(IF(?used = ?run, "motion", "twin") AS ?kind) } ORDER BY ?kind""",
+        performed,
+    )
+    assert [row["kind"] for row in used] == ["motion", "twin"]
+    (known,) = asking.explain("id:run/arm_2.reach irt:Planned_Energy ?", performed)
+    assert known.by.startswith("provider:energy of irtwin ")
+    assert [one.by for one in known.because if one.what == "id:run/arm_2.reach"] == ["what was planned"]
+
+
+def test_planned_is_held_against_measured(performed: Path) -> None:
+    (pair,) = asking.ask("planned_against_measured", performed)
+    assert (pair["plan"], pair["run"]) == ("reach", "done")
+    assert pair["difference_percent"] == pytest.approx(100 * (pair["planned_J"] / pair["measured_J"] - 1))
+    assert pair["within_interval"] is (pair["lower_J"] <= pair["measured_J"] <= pair["upper_J"])
+    assert pair["measured_s"] - pair["planned_s"] == pytest.approx(2.0, abs=0.1)
+    assert abs(pair["planned_peak_W"] - pair["measured_peak_W"]) < 0.25 * pair["measured_peak_W"]
+
+
+def test_what_is_planned_is_in_no_sum(performed: Path) -> None:
+    total, *others = asking.ask(
+        """SELECT ?runs ?energy ?time { ?total a irt:Robot_Total ; irt:Run_Count ?runs ; irt:Total_Energy ?energy ;
+        irt:Total_Run_Time ?time }""",
+        performed,
+    )
+    assert not others
+    measured = list(asking.ask("energy_per_run", performed))
+    assert total["runs"] == len(measured) == 4
+    assert total["energy"] == pytest.approx(sum(row["energy_J"] for row in measured))
+    assert total["time"] == pytest.approx(sum(row["time_s"] for row in measured))
+    assert not list(
+        asking.ask(
+            """SELECT * { ?run a irt:Planned_Run { ?run irt:Energy_Consumption ?x } UNION { ?run irt:Idle_Share ?x }
+            UNION { ?of irt:of_Run ?run } UNION { ?twin irt:fitted_on ?run } UNION { ?twin irt:fails_on ?run } UNION
+            { ?total irt:last_Run ?run } UNION { ?run irt:Start_Time ?x } }""",
+            performed,
+        )
+    )
+
+
+def test_the_graph_conforms_and_the_page_shows_both(performed: Path) -> None:
+    with Workspace.existing(performed) as place, rewriting(place, None) as graph:
+        assert list(validate(graph)) == []
+    page = (performed / "reports" / "arm_2.html").read_text(encoding="utf-8")
+    assert ">Planned motions</h3>" in page
+    assert ">Planned against measured</h3>" in page
+    assert "<small>planned as reach</small>" in page
+    assert "Runs of this robot" in page.partition(">Planned motions<")[0]
+    assert '"name":"reach","part":"planned"' in page
+
+
+def test_a_motion_from_a_file_is_kept_as_well(performed: Path, kept: tuple[Path, Said]) -> None:
+    priced = irtwin("predict", "arm_2", kept[0] / "reach.parquet", "--workspace", performed, "--run", "laden",
+                    "--payload-mass", 2)  # fmt: skip
+    assert priced.status == 0, priced.err
+    assert priced.out.startswith('planned run "laden" of arm_2: energy ')
+    rows = {row["run"]: row for row in asking.ask("planned_runs", performed)}
+    assert rows["laden"]["payload_kg"] == 2.0
+    assert f"{rows['laden']['energy_J']:.4g}" in priced.out
+
+
+def refused(said: Said) -> str:
+    assert said.status == 2
+    assert said.out == ""
+    (line,) = said.err.splitlines()
+    return line
+
+
+def test_bad_plans_are_told_and_nothing_is_kept(performed: Path, tmp_path: Path) -> None:
+    before = list(asking.ask("planned_runs", performed))
+    here = ("--workspace", performed)
+    assert 'no robot "arm_3" here; the nearest is "arm_2"' in refused(irtwin("plan", "arm_3", *GOAL, *here))
+    taken = refused(irtwin("plan", "arm_2", *GOAL, *here, "--run", "Reach"))
+    assert taken.endswith('the robot has a run "reach" already; choose another name')
+    assert "outside its limits" in refused(irtwin("plan", "arm_2", "--from", "0,0", "--to", "3,0", *here))
+    assert "give 2 joint positions" in refused(irtwin("plan", "arm_2", "--from", "0,0,0", "--to", "1,0,0", *here))
+    other = swing(arm(3), 1, seconds=2.0)
+    file = tmp_path / "other.csv"
+    names = ["time", *(f"q_joint_{k}" for k in (1, 2, 3))]
+    np.savetxt(file, np.column_stack([other.time, other.q]), delimiter=",", header=",".join(names), comments="")
+    assert 'no moving joint "joint_3"' in refused(irtwin("predict", "arm_2", file, *here))
+    fast = replace(other, time=other.time / 8)
+    np.savetxt(
+        file, np.column_stack([fast.time, fast.q[:, :2]]), delimiter=",", header=",".join(names[:3]), comments=""
+    )
+    assert "above its limit" in refused(irtwin("predict", "arm_2", file, *here))
+    assert "--workspace FOLDER" in refused(irtwin("predict", "arm_2", file))
+    assert "give --workspace FOLDER too" in refused(
+        irtwin("predict", "arm_2", file, "--run", "x", "--out", tmp_path / "x")
+    )
+    assert list(asking.ask("planned_runs", performed)) == before
+
+
+def test_a_robot_without_a_twin_prices_nothing(tmp_path: Path) -> None:
+    with Workspace(tmp_path):
+        pass
+    with pytest.raises(InputError, match='no robot "arm_2" here'):
+        plans.plan("arm_2", Task(np.zeros(2), np.ones(2)), tmp_path, name="x")
+
+
+def toml_with(folder: Path, text: str) -> Path:
+    logs = write(folder / "logs", recorded())
+    toml = (logs / "dataset.toml").read_text()
+    (logs / "dataset.toml").write_text(toml.replace("[[run]]\n", f"[[run]]\n{text}\n", 1))
+    return logs
+
+
+def test_a_plan_that_nobody_made_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'run "swing_1" performs = "nothing", which is no planned run, here or in'):
+        workflow.run(toml_with(tmp_path, 'performs = "nothing"'), tmp_path / "workspace")
+
+
+def test_performs_names_a_plan_not_another_run(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'run "swing_1" performs = "swing_2", which is not a planned run'):
+        read_data_set(toml_with(tmp_path, 'performs = "swing_2"'))
