@@ -80,7 +80,7 @@
     return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
   }
 
-  const PARTS = { planned: "planned: this motion was not carried out", held_out: "held out: no sample of it was fitted", both: "fitted in part, the rest held out", fit: "took part in the fit" };
+  const PARTS = { planned: "planned: what the twin expects of it", held_out: "held out: no sample of it was fitted", both: "fitted in part, the rest held out", fit: "took part in the fit" };
 
   function drawRun(index) {
     const run = page.explorer.runs[index];
