@@ -3,8 +3,9 @@
 python bench/live_page.py WORKSPACE LOG ROBOT [SECONDS] [--picture FILE]
 
 `irtwin live` plays the log at true speed, `irtwin serve` serves the page, Chromium shows it without a screen and draws
-by software. The stamp of a sample is the time at which it is played, so one clock measures all: the lag to the page is
-that to its script, the lag to the picture that to the end of the frame in which the robot stands there.
+by software. The stamp of a sample is the time at which it is played, so one clock measures all. `lag` is that to the
+page's script, `picture` that to the end of the frame in which the robot stands there; `frame` is from frame to frame,
+`script` the page's own part of it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import psutil
 from playwright.sync_api import Page, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium"
@@ -35,6 +37,12 @@ def irtwin(*arguments: object) -> Iterator[subprocess.Popen[str]]:
         process.wait(60)
 
 
+def processor_time(name: str) -> float:
+    """Return the seconds that this process' descendants of a name have worked."""
+    mine = [one for one in psutil.Process().children(recursive=True) if name in " ".join(one.cmdline())]
+    return sum(sum(one.cpu_times()[:2]) for one in mine)
+
+
 def measured(page: Page, seconds: float) -> dict[str, list[float]]:
     """Return what the page notes over so many seconds, after the first two."""
     until = time.monotonic() + 60
@@ -42,9 +50,17 @@ def measured(page: Page, seconds: float) -> dict[str, list[float]]:
         assert time.monotonic() < until, "the page shows nothing"
         time.sleep(0.1)
     time.sleep(2.0)
-    page.evaluate("for (const name of ['lags', 'drawnLags', 'frames']) irtwinLive[name].length = 0")
+    page.evaluate("for (const name of ['lags', 'drawnLags', 'frames', 'work']) irtwinLive[name].length = 0")
+    used = processor_time("chromium"), processor_time("irtwin live"), processor_time("irtwin")
     time.sleep(seconds)
-    return dict(page.evaluate("({lag: irtwinLive.lags, picture: irtwinLive.drawnLags, frame: irtwinLive.frames})"))
+    browser, live, all_of_ours = (
+        processor_time(name) - before for name, before in zip(("chromium", "irtwin live", "irtwin"), used, strict=True)
+    )
+    frames = len(page.evaluate("irtwinLive.frames"))
+    print(f"processors: Chromium {browser / seconds:.2f}, {1000 * browser / max(frames, 1):.0f} ms a frame;", end=" ")
+    print(f"irtwin live {live / seconds:.2f}, irtwin serve {(all_of_ours - live) / seconds:.2f}")
+    said = "({lag: irtwinLive.lags, picture: irtwinLive.drawnLags, frame: irtwinLive.frames, script: irtwinLive.work})"
+    return dict(page.evaluate(said))
 
 
 def main() -> None:

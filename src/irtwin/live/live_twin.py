@@ -38,7 +38,8 @@ BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
 AHEAD = 3600.0  # s by which a state's time may be ahead of the clock: clocks differ, years do not
 SHOWN_EVERY = 1.0  # s between two energies of a run in the graph
-FLUSH = 1.0  # s between two flushes of the graph: readers replay its log, of 60 kB a state
+PAUSE = 0.04  # s between two states of a run in the graph at least: readers see two a second
+FLUSH = 2.0  # s between two flushes of the graph: readers replay its log, of 60 kB a state
 MOST_WAITING = 200_000  # samples held for storage; beyond, the source waits
 
 
@@ -212,7 +213,9 @@ class LiveTwin:
                         return
                     self._news.wait()
                 run = self._due.popleft()
-                run.due = False
+            self._stop.wait(max(0.0, run.shown_at + PAUSE - time.monotonic()))
+            with self._lock:
+                run.due, run.shown_at = False, time.monotonic()
                 tables = run.tables(self.waited)
             with self._showing:
                 if not run.over:

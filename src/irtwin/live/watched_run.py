@@ -39,6 +39,7 @@ class WatchedRun:
     count: int = 0
     superseded: int = 0
     due: bool = False  # the graph lacks the newest state
+    shown_at: float = -math.inf  # by the monotonic clock
     over: bool = False
     waiting: list[State] = field(default_factory=list)
     unworked: list[State] = field(default_factory=list)

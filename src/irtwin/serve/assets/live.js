@@ -6,8 +6,9 @@
   const here = "/live/" + encodeURIComponent(robotId), iri = "<https://w3id.org/irtwin/id/robot/" + encodeURIComponent(robotId) + ">";
   const SHOWN = 30, KEPT = 4096; // s of the curve; lags and frames that are remembered
   const SLOW_RATIO = 0.5; // of the screen's points are drawn where the processor draws
+  const CURVE_EVERY = 45; // ms
   const find = (id) => document.getElementById(id);
-  const seen = (window.irtwinLive = { events: 0, states: 0, drawn: 0, lags: [], drawnLags: [], frames: [], time: null });
+  const seen = (window.irtwinLive = { events: 0, states: 0, drawn: 0, lags: [], drawnLags: [], frames: [], work: [], time: null });
   const clock = () => performance.timeOrigin + performance.now();
   const note = (list, value) => { list.push(value); if (list.length > KEPT) list.splice(0, KEPT / 2); };
   const written = (value, digits) => value.toFixed(digits).replace("-", "−");
@@ -96,7 +97,7 @@
 
   // ---- the robot
 
-  let robot = null, viewer = null, frameBefore = 0;
+  let robot = null, viewer = null, frameBefore = 0, curveAt = 0;
 
   async function build() {
     const said = find("drawing"), answer = await fetch(here + "/robot.json");
@@ -116,17 +117,22 @@
     if (frameBefore) note(seen.frames, stamp - frameBefore);
     frameBefore = stamp;
     if (fresh) {
+      const began = performance.now();
       fresh = false;
       if (robot) {
         find("drawing").textContent = "";
         robot.pose(newest.q);
         viewer.render();
       }
-      draw();
+      if (stamp - curveAt > CURVE_EVERY) {
+        curveAt = stamp;
+        draw();
+      }
       if (measured.power.length) find("measured").value = written(measured.power[measured.power.length - 1], 0);
       if (modelled.power.length) find("modelled").value = written(modelled.power[modelled.power.length - 1], 0);
       seen.drawn += 1;
       note(seen.drawnLags, clock() - 1000 * newest.time);
+      note(seen.work, performance.now() - began);
     }
     requestAnimationFrame(frame);
   }
