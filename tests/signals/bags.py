@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
@@ -50,18 +50,27 @@ def numbers(
     return [(topic, kind, START + first + row * step, {"data": float(one)}) for row, one in enumerate(values)]
 
 
-def write(path: Path, *messages: Sequence[Message]) -> Path:
-    """Write messages as the bag that the path's end asks for; return where it is."""
+def write(path: Path, *messages: Sequence[Message], compression: str | None = None) -> Path:
+    """Write messages as the bag that the path's end asks for; return where it is.
+
+    compression: of the chunks, "bz2" or "lz4" in ROS 1, "zstd" in MCAP.
+    """
     rows = sorted((message for some in messages for message in some), key=lambda message: message[2])
     if path.suffix == ".bag":
         types = get_typestore(Stores.ROS1_NOETIC)
-        with Writer1(path) as bag:
+        one = Writer1(path)
+        if compression is not None:
+            one.set_compression(Writer1.CompressionFormat[compression.upper()])
+        with one as bag:
             _fill(bag, types, types.serialize_ros1, rows, {"seq": 0})
         return path
     types = get_typestore(Stores.ROS2_HUMBLE)
     folder = path.with_name(f"{path.name}.folder") if path.suffix == ".mcap" else path
     plugin = StoragePlugin.MCAP if path.suffix == ".mcap" else StoragePlugin.SQLITE3
-    with Writer2(folder, version=8, storage_plugin=plugin) as bag:
+    two = Writer2(folder, version=8, storage_plugin=plugin)
+    if compression is not None:
+        two.set_compression(CompressionMode.STORAGE, CompressionFormat[compression.upper()])
+    with two as bag:
         _fill(bag, types, types.serialize_cdr, rows, {})
     if path.suffix == ".mcap":
         next(folder.glob("*.mcap")).rename(path)

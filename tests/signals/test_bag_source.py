@@ -42,6 +42,14 @@ def test_a_bag_is_read_to_the_last_bit(form: str, tmp_path: Path) -> None:
     assert signals.power is not None and np.array_equal(signals.power, POWER)
 
 
+@pytest.mark.parametrize(("form", "compression"), [("run.bag", "bz2"), ("run.bag", "lz4"), ("run.mcap", "zstd")])
+def test_compressed_chunks_are_inflated(form: str, compression: str, tmp_path: Path) -> None:
+    path = write(tmp_path / form, states(Q, effort=TORQUE), numbers("/power", POWER), compression=compression)
+    signals, _ = read_signals(path, ROBOT)
+    assert np.array_equal(signals.q, Q)
+    assert signals.power is not None and np.array_equal(signals.power, POWER)
+
+
 def test_a_file_of_a_bag_folder_is_a_bag(tmp_path: Path) -> None:
     write(tmp_path / "run", states(Q, effort=TORQUE))
     signals, _ = read_signals(tmp_path / "run" / "run.db3", ROBOT)
