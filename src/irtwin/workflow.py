@@ -64,7 +64,7 @@ def run(
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
     with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
-        robot_id = _take_in(place, data_set, announce)
+        robot_id = take_in(place, data_set, announce)
         graph.load_ontology()
         map_rows(place, graph)
         conclude(graph, announce)
@@ -219,7 +219,7 @@ def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     refresh(graph, place.engine, documents, place.mapped_rows)
 
 
-def _take_in(place: Workspace, data_set: DataSet, announce: Announce) -> str:
+def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda line: None) -> str:
     """Ingest a data set and populate what follows from it, all or nothing; return the robot_id."""
     robot_id = identifier(data_set.robot.name)
     check_name(place, data_set.robot.name)

@@ -53,7 +53,7 @@ def cli() -> None:
 
 
 for command in (
-    *(twin.check, twin.run, twin.demo, twin.diagnose, twin.adopt, twin.improve),
+    *(twin.check, twin.run, twin.demo, twin.case_study, twin.diagnose, twin.adopt, twin.improve),
     *(motion.plan, motion.predict, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
     *(service.serve, service.live),

@@ -96,6 +96,14 @@ def angle(radians: float | None, kind: str | None) -> str:
     return f"{given(round(math.degrees(radians), 1))}°"
 
 
+def position(value: float | None, kind: str | None) -> str:
+    """Write a joint's position to a tenth of a degree, or of a millimetre."""
+    if value is None:
+        return "–"
+    text = f"{1000 * value:.1f} mm" if kind == "prismatic" else f"{math.degrees(value):.1f}°"
+    return "0.0" + text[4:] if text.startswith("-0.0") else text.replace("-", "−")
+
+
 def angular_speed(speed: float | None, kind: str | None) -> str:
     """Write a joint's speed: degrees a second, or millimetres a second where it is prismatic."""
     text = angle(speed, kind)

@@ -131,8 +131,8 @@ def environment(folder: Path) -> jinja2.Environment:
     )
     words = (
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
-        wording.angle, wording.angular_speed, wording.moment, wording.local_name, wording.short_checksum,
-        wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
+        wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
+        wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment

@@ -1,0 +1,32 @@
+"""How long `irtwin case-study` takes, in a process of its own, and how near its plan came.
+
+In bench/: `python case_study.py`
+"""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from irtwin.asking import ask
+
+
+def main() -> None:
+    """Run the command once; print time, size of the page, and energies."""
+    with tempfile.TemporaryDirectory() as folder:
+        workspace = Path(folder) / "study"
+        began = time.monotonic()
+        subprocess.run([sys.executable, "-m", "irtwin", "case-study", "--workspace", str(workspace)], check=True)
+        wall, used = time.monotonic() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+        (row,) = ask("planned_against_measured", workspace).rows
+        size = (workspace / "reports" / "case_study.html").stat().st_size
+        print(f"{wall:.1f} s, {used.ru_utime + used.ru_stime:.1f} s of processor, {used.ru_maxrss / 1e3:.0f} MB")
+        print(f"page {size / 1e6:.2f} MB; planned {row['planned_J']:.1f} J, measured {row['measured_J']:.1f} J")
+
+
+if __name__ == "__main__":
+    main()

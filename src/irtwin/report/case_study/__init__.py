@@ -1,0 +1,1 @@
+"""The page of the seed paper's case study."""

@@ -1,0 +1,65 @@
+"""Figures of the case study as Plotly data and layout, made from series of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from irtwin.report.energy.figures import MEASURED, MODELLED, PALETTE, Figure, plain
+from irtwin.report.explorer import Columns
+from irtwin.report.questions import Row
+from irtwin.signals.channels import CHANNELS
+
+_TIME = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
+_ACCENT = "#0b5a8c"
+
+
+def figures(plan: Columns, run: Columns, joints: Sequence[Row]) -> dict[str, Figure]:
+    """Return the figures by name: the motion as planned and as measured, and power and energy over it."""
+    return {
+        "planned_motion": _motion(plan, joints),
+        "measured_motion": _motion(run, joints),
+        "power": _compared(plan, run, "power", "power", "W"),
+        "energy": _compared(plan, run, "energy", "energy used so far", "J"),
+    }
+
+
+def _motion(series: Columns, joints: Sequence[Row]) -> Figure:
+    """Draw joint positions over time, rotations in degrees."""
+    data = []
+    for colour, row in zip(_cycled(len(joints)), joints, strict=True):
+        slides = row["kind"] == "prismatic"
+        values = series[CHANNELS["q"].column(row["joint"])]
+        drawn = values if slides else np.degrees(values)
+        data.append(_line(plain(row["joint"]), series, drawn, "m" if slides else "°", colour))
+    return {"data": data, "layout": {"xaxis": _TIME, "yaxis": {"title": {"text": "joint position, °"}}}}
+
+
+def _compared(plan: Columns, run: Columns, name: str, title: str, unit: str) -> Figure:
+    """Draw what was measured, what the twin makes of the measured motion, and what it made of the plan."""
+    data = [
+        _line("measured", run, run[name], unit, MEASURED),
+        _line("modelled, along the measured motion", run, run[f"{name}_model"], unit, MODELLED),
+        _line("planned, before it moved", plan, plan[f"{name}_model"], unit, _ACCENT, dash="dot"),
+    ]
+    axis = {"title": {"text": f"{title}, {unit}"}, "rangemode": "tozero"}
+    return {"data": data, "layout": {"xaxis": _TIME, "yaxis": axis}}
+
+
+def _line(
+    name: str, series: Columns, values: np.ndarray, unit: str, colour: str, dash: str = "solid"
+) -> dict[str, Any]:
+    time = series["time"] - series["time"][0]
+    known = np.isfinite(values)
+    return {
+        "type": "scatter", "mode": "lines", "name": name,
+        "x": [round(float(at), 4) for at in time[known]], "y": [float(f"{value:.5g}") for value in values[known]],
+        "line": {"color": colour, "width": 2, "dash": dash},
+        "hovertemplate": f"{name}: %{{y:.4~g}} {unit}<extra></extra>",
+    }  # fmt: skip
+
+
+def _cycled(count: int) -> list[str]:
+    return [PALETTE[index % len(PALETTE)] for index in range(count)]

@@ -1,0 +1,78 @@
+"""The page of the case study: what the seed paper shows in its figures 9 to 13, and the same here."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from irtwin import resources
+from irtwin.errors import InputError
+from irtwin.packing import Fragment, embedded_json, packed_scripts
+from irtwin.report.case_study.figures import figures
+from irtwin.report.energy.page import DrawScene, content_policy, environment
+from irtwin.report.explorer import Columns, ReadSeries
+from irtwin.report.questions import Answers, Graph, ask, read_questions
+from irtwin.storage.files import write
+
+# Yan 2018, equations (13) to (15)
+SEED_MODELLED, SEED_MEASURED, SEED_ERROR = 559.59, 598.78, 6.54  # J, J, %
+
+
+def render(graph: Graph, robot_iri: str, read_series: ReadSeries, out: Path, draw_scene: DrawScene) -> None:
+    """Write the page of a robot's plan and the run that carried it out to `out`.
+
+    Every number of ours comes from the questions in `reports/case_study`; samples come from the series that they name.
+    Raises InputError where the graph knows of no plan that was carried out.
+    """
+    questions = read_questions(resources.folder("reports") / "case_study")
+    case = ask(graph, {"case": questions["case"]}, {"robot": robot_iri})["case"].first
+    if case is None:
+        raise InputError(f"{robot_iri}: the graph has no plan that was carried out; run `irtwin case-study`")
+    bindings = {"robot": robot_iri} | {name: case[name] for name in ("plan", "run", "twin")}
+    answers = ask(graph, questions, bindings)
+    read = cache(read_series)
+    series = {
+        row["of"]: (row["name"], Columns.of(read(row["file"], row["checksum"]))) for row in answers["series"].rows
+    }
+    scene = draw_scene([series["plan"], series["run"]], 0)
+    write(out, _page(answers, bindings, {name: columns for name, (_, columns) in series.items()}, scene).encode())
+
+
+def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment) -> str:
+    folder = resources.folder("reports")
+    drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
+    scripts = packed_scripts(
+        [
+            get_plotlyjs(),
+            (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
+            (folder / "case_study" / "configurations.js").read_text(encoding="utf-8"),
+        ]
+    )
+    styles = [folder / "layout" / "style.css", folder / "case_study" / "style.css"]
+    return environment(folder).get_template("case_study/page.html.jinja").render(
+        answers=answers,
+        bindings=bindings,
+        case=answers["case"].first,
+        twin=answers["twin"].first,
+        configurations=answers["configurations"].rows,
+        individuals=_individuals(answers),
+        seed_modelled=SEED_MODELLED,
+        seed_measured=SEED_MEASURED,
+        seed_error=SEED_ERROR,
+        scene=scene.html,
+        data=embedded_json({"figures": drawn, "explorer": None}),
+        style=Markup("\n".join(style.read_text(encoding="utf-8") for style in styles)),
+        scripts=scripts.html,
+        policy=content_policy([*scripts.scripts, *scene.scripts]),
+    )  # fmt: skip
+
+
+def _individuals(answers: Answers) -> list[tuple[str, str, list[Any]]]:
+    """Return each individual with its class and the rows of its properties."""
+    grouped = groupby(answers["individual"].rows, key=lambda row: (row["individual"], row["class"]))
+    return [(individual, kind, list(rows)) for (individual, kind), rows in grouped]

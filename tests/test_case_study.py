@@ -1,0 +1,125 @@
+"""The case study: one command from logs to a page that says what the graph says."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from irtwin import case_study
+from irtwin.asking import ask
+from irtwin.errors import InputError
+from irtwin.planning.plan import Plan
+from irtwin.signals.motion import Motion
+from tests.data_sets import Said, irtwin
+
+pytest.importorskip("ompl")
+pytest.importorskip("toppra")
+pytestmark = pytest.mark.slow
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run"]
+Done = tuple[Said, Path]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    workspace = tmp_path_factory.mktemp("case") / "study"
+    return irtwin("case-study", "--workspace", workspace), workspace
+
+
+@pytest.fixture(scope="module")
+def text(done: Done) -> str:
+    page = (done[1] / "reports" / "case_study.html").read_text(encoding="utf-8")
+    page = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", page, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page).replace("\N{NO-BREAK SPACE}", " ").replace("\u202f", " "))
+
+
+def test_the_command_says_each_step_and_where_the_page_is(done: Done) -> None:
+    said, workspace = done
+    assert said.status == 0
+    assert [line[:2] for line in said.err.splitlines() if line[:1].isdigit()] == ["1.", "2.", "3.", "4."]
+    assert str(workspace / "reports" / "case_study.html") in said.out
+
+
+def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not_fitted(done: Done, text: str) -> None:
+    (row,) = ask("planned_against_measured", done[1]).rows
+    assert (row["plan"], row["run"]) == (case_study.PLANNED, case_study.MEASURED)
+    assert abs(row["difference_percent"]) < 6.54
+    part = "PREFIX irt: <https://w3id.org/irtwin#> SELECT ?part { ?run irt:performs ?plan ; irt:Part_In_Twin ?part }"
+    assert [found["part"] for found in ask(part, done[1]).rows] == ["held_out"]
+    assert f"planned to take {row['planned_J']:.1f} J and took {row['measured_J']:.1f} J" in text
+    assert f"off by {abs(row['difference_percent']):.1f} %" in text and "off by 6.54 %" in text
+
+
+@pytest.mark.parametrize(
+    "figure", ["figure 9 and equations 13 to 15", "figure 10", "figure 11", "figure 12", "figure 13"]
+)
+def test_each_figure_of_the_seed_has_its_counterpart(text: str, figure: str) -> None:
+    assert f"Seed, {figure}" in text
+
+
+def test_the_page_shows_the_individual_and_both_configurations(text: str) -> None:
+    for property_ in ("irt:IR_Name KUKA_KR6_R700", "irt:Controlled_Axes 6", "irt:Run_Time 1.2 s", "irt:Planned_Energy"):
+        assert property_ in text
+    assert "joint_a2 −90.0° −45.0°" in text and "joint_a6 0.0° 90.0°" in text
+    assert "The measurement is simulated." in text
+
+
+def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
+    again = irtwin("case-study", "--workspace", done[1])
+    assert again.status == 2
+    assert "is not empty; remove it, or name a new folder by --workspace" in again.err
+
+
+def test_without_the_planners_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(case_study, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r'pip install "irtwin\[plan\]"'):
+        case_study.case_study(tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_log_of_another_motion_is_refused(tmp_path: Path) -> None:
+    data_set = case_study.unpack(tmp_path)
+    still = np.zeros((101, 6))
+    motion = Motion(np.linspace(0, 1.2, 101), still, still, still, run="still")
+    names = tuple(f"joint_a{number}" for number in range(1, 7))
+    with pytest.raises(InputError, match=r"is the log of another motion, .* rad off"):
+        case_study.add_measurement(data_set, Plan(names, motion, None, 0.0, True, (), 1.2))
+    assert case_study.MEASURED not in (data_set / "dataset.toml").read_text()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    if not CHROMIUM:
+        pytest.skip("no Chromium on this machine")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as session:
+        yield session.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+
+
+@pytest.mark.system
+def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any) -> None:
+    file = done[1] / "reports" / "case_study.html"
+    assert file.stat().st_size < 6_000_000
+    page = browser.new_page(viewport={"width": 400, "height": 900})
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(file.as_uri())
+    page.wait_for_selector("#figure-energy .scatterlayer .trace")
+    page.wait_for_function("document.querySelector('.pose[data-at=last] img').src")
+    first, last = (page.get_attribute(f".pose[data-at={at}] img", "src") for at in ("first", "last"))
+    assert first and last and first != last
+    assert page.locator("#figure-power .scatterlayer .trace").count() == 3
+    assert page.locator(".is-run option").all_inner_texts() == [case_study.PLANNED, case_study.MEASURED]
+    page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time: 1e9}}))")
+    (row,) = ask("planned_against_measured", done[1]).rows
+    assert float(page.inner_text(".is-energy")) == pytest.approx(row["planned_J"], abs=0.6)
+    assert page.evaluate("document.documentElement.scrollWidth") == 400
+    assert complaints == []
