@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from sqlalchemy import select
 
 from irtwin import asking, plans, workflow
 from irtwin.errors import InputError
@@ -16,6 +18,7 @@ from irtwin.planning.plan import Task
 from irtwin.signals.channels import from_columns
 from irtwin.signals.log import Run, read_data_set
 from irtwin.signals.motion import Motion
+from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.workflow import rewriting
 from tests import data_sets
@@ -215,3 +218,41 @@ def test_a_plan_that_nobody_made_is_told(tmp_path: Path) -> None:
 def test_performs_names_a_plan_not_another_run(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'run "swing_1" performs = "swing_2", which is not a planned run'):
         read_data_set(toml_with(tmp_path, 'performs = "swing_2"'))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"swing_1": "planned", "swing_2": "planned", "swing_3": "planned"}, "every run is planned"),
+        ({"swing_1": "plan"}, 'role = "plan"; use observed, reference, simulated, planned'),
+    ],
+)
+def test_roles_of_plans_are_checked(tmp_path: Path, changes: dict[str, str], said: str) -> None:
+    logs = write(tmp_path / "logs", recorded())
+    toml = (logs / "dataset.toml").read_text()
+    for name, role in changes.items():
+        before = f'file = "runs/{name}.parquet"\nrole = "observed"'
+        assert before in toml
+        toml = toml.replace(before, f'file = "runs/{name}.parquet"\nrole = "{role}"')
+    (logs / "dataset.toml").write_text(toml)
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_data_set(logs)
+
+
+def test_a_plan_has_no_hole_and_is_repeated_by_nobody(tmp_path: Path) -> None:
+    first, *others = recorded()
+    torn = replace(first, role="planned", signals=first.signals.rows(np.r_[0:100, 300:800]))
+    with pytest.raises(InputError, match=r"swing_1\.parquet: has a hole in time after 0\.99 s; plan the motion whole"):
+        read_data_set(write(tmp_path / "torn", [torn, *others]))
+    again = replace(others[0], repeat_of="swing_1")
+    with pytest.raises(InputError, match=r'"swing_1" is a planned run; write performs = "swing_1"'):
+        read_data_set(write(tmp_path / "again", [replace(first, role="planned"), again, others[1]]))
+
+
+def test_a_planned_motion_that_the_robot_cannot_make_stores_nothing(tmp_path: Path) -> None:
+    first, *others = recorded()
+    far = replace(first, role="planned", signals=replace(first.signals, q=4 * first.signals.q))
+    with pytest.raises(InputError, match=r"outside its limits.*nothing of this data set was stored"):
+        workflow.run(write(tmp_path / "logs", [far, *others]), tmp_path / "workspace")
+    with Workspace(tmp_path / "workspace") as place, place.reading() as session:
+        assert session.scalars(select(schema.Run)).all() == []

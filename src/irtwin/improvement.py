@@ -14,7 +14,7 @@ from irtwin.providers.records import find_robot, keep_run, load_robot, load_twin
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
-from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, write_report
+from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, sound, write_report
 
 Announce = Callable[[str], None]
 
@@ -57,11 +57,10 @@ def improve(
         robot_id = find_robot(place, robot)
         load_twin(place, robot_id)
         known = load_robot(place, robot_id)
-        runs, said = read_log(
+        logged = read_log(
             new_log, known, payload_mass=payload_mass, payload_com=payload_com, performs=performs, repair=repair
         )
-        for line in said:
-            announce(f"  {line}")
+        runs = sound(logged, announce).runs
         with rewriting(place, graph_url) as graph:
             graph.load_ontology()
             limit = _limit(graph)

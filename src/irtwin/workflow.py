@@ -186,6 +186,11 @@ def _read(folder: Path, repair: bool, announce: Announce) -> DataSet:
     """Read a data set and check it; say what was dropped, found and mended. Raises InputError on what must be cured."""
     data_set = read_data_set(folder, repair=repair)
     _check_effects(data_set)
+    return sound(data_set, announce)
+
+
+def sound(data_set: DataSet, announce: Announce) -> DataSet:
+    """Return a data set, mended where that leaves no doubt; say what was. Raises InputError on what must be cured."""
     for line in data_set.repairs:
         announce(f"  {line}")
     found = checked(data_set)

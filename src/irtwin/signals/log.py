@@ -129,8 +129,8 @@ def read_log(
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
     performs: str | None = None,
     repair: bool = False,
-) -> tuple[list[Run], list[str]]:
-    """Read a log of no data set as one observed run, or several where it has holes in time; say what was repaired.
+) -> DataSet:
+    """Read a log alone, as a data set of one observed run, or of several where it has holes in time.
 
     payload_mass in kg, payload_com in m in the flange frame. Raises InputError as `read_data_set` does.
     """
@@ -149,10 +149,18 @@ def read_log(
         signals=signals,
         performs=performs,
     )
-    return [_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)], [
-        *dropped,
-        *(each.say for each in sampled),
-    ]
+    return DataSet(
+        folder=file.parent,
+        robot=robot,
+        runs=tuple(_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)),
+        effects=None,
+        ambient_temperature=None,
+        power_at="mains",
+        simulated=False,
+        notes={},
+        repairs=tuple(dropped),
+        findings=tuple(sampled),
+    )
 
 
 def check_plan(signals: Signals, file: Path) -> None:
