@@ -41,7 +41,7 @@ def _announce(address: str) -> None:
 @database_option
 @graph_option
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
-@click.option("--replay", type=click.Path(path_type=Path, dir_okay=False), help="Play this log of a robot instead.")
+@click.option("--replay", type=click.Path(path_type=Path), help="Play this log of a robot instead.")
 @click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
 @click.option("--robot", metavar="NAME", help="Whose log or controller it is.")
 @click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")

@@ -14,7 +14,7 @@ from irtwin.errors import InputError
 from irtwin.live.joint_stream import STREAMED, State
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
-from irtwin.signals.log import payload_told
+from irtwin.signals.log import payload_told, topics_told
 from irtwin.signals.samples import read_signals
 
 _GAP = 0.01  # s between the end of the robot's last run and the first state of a log that is played right after it
@@ -26,7 +26,7 @@ class Replay:
     def __init__(self, log: Path, robot: Robot, robot_id: str, speed: float = 1.0) -> None:
         """Read a log. Raises InputError where it is no run of the robot."""
         self.speed = speed
-        self.signals, _ = read_signals(log, robot)
+        self.signals, _ = read_signals(log, robot, topics=topics_told(log, robot))
         self.robot_id, self._joints = robot_id, len(robot.joints)
         self._payload, self._payload_com = payload_told(log)
 
