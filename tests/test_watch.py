@@ -114,8 +114,11 @@ def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
 
 def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
     for given, message in (
-        (("--rtde", "127.0.0.1:9"), "--rtde and --robot go together."),
-        (("--rtde", "127.0.0.1:9", "--robot", "KUKA KR6 R700", "--port", "0"), "Give --port or --rtde, not both."),
+        (("--rtde", "127.0.0.1:9"), "--robot goes with --replay or --rtde"),
+        (
+            ("--rtde", "127.0.0.1:9", "--robot", "KUKA KR6 R700", "--port", "0"),
+            "Give one of --port, --replay and --rtde.",
+        ),
     ):
         told = in_this_process("live", *given, "--workspace", workspace)
         assert (told.status, message in told.err) == (2, True), told.err
@@ -123,3 +126,27 @@ def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
     _, said = process.communicate(timeout=120)
     assert process.returncode == 2
     assert 'no robot "UR5" here; the nearest is "KUKA KR6 R700"' in said
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--robot", "arm"], "--robot goes with --replay or --rtde"),
+        (["--speed", "2"], "--speed is for --replay"),
+        (["--replay", "log.csv"], "--robot goes with --replay or --rtde"),
+        (["--replay", "log.csv", "--robot", "arm", "--port", "0"], "Give one of --port, --replay and --rtde"),
+        (["--replay", "log.csv", "--robot", "arm", "--speed", "0"], "0.01<=x<=1000.0"),
+    ],
+)
+def test_options_that_do_not_go_together(tmp_path: Path, options: list[str], said: str) -> None:
+    found = in_this_process("live", "--workspace", tmp_path / "w", *options)
+    assert found.status == 2
+    assert said in found.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_log_of_a_robot_that_is_not_there(workspace: Path) -> None:
+    process = irtwin("live", "--workspace", workspace, "--replay", "log.csv", "--robot", "nobody")
+    assert 'no robot "nobody" here' in process.communicate(timeout=120)[1]
+    assert process.returncode == 2
+    assert not list((workspace / "live").iterdir())

@@ -65,8 +65,8 @@ def live(
 
     if sum(source is not None for source in (port, replay, rtde)) > 1:
         raise click.UsageError("Give one of --port, --replay and --rtde.")
-    if robot is not None and replay is None and rtde is None:
-        raise click.UsageError("--robot is for --replay and --rtde.")
+    if (robot is None) != (replay is None and rtde is None):
+        raise click.UsageError("--robot goes with --replay or --rtde: it says whose log or controller it is.")
     if speed != 1.0 and replay is None:
         raise click.UsageError("--speed is for --replay.")
     watch(

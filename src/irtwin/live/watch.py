@@ -63,7 +63,7 @@ def watch(
         Broadcast(place.folder / LIVE) as broadcast,
         LiveTwin(place, graph, announce, broadcast) as twin,
     ):
-        replay = None if replayed is None else _replay(place, replayed, robot, speed)
+        replay = None if replayed is None or robot is None else _replay(place, replayed, robot, speed)
         reader = StateReader(twin.joints, twin.names)
 
         def take(lines: Iterable[bytes]) -> None:
@@ -73,7 +73,7 @@ def watch(
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
             after = twin.stored_until(replay.robot_id)
             replay.play(_refusing(twin.receive, refuse), done, after=after, ahead=AHEAD)
-        elif rtde is not None:
+        elif rtde is not None and robot is not None:
             _follow(_arm(place, rtde, robot), twin, refuse, done, announce)
         else:
             _read(take, port, twin, done, announce)
@@ -109,9 +109,7 @@ def _follow(
     arm.follow(twin.receive, refuse_of_arm, done, announce)
 
 
-def _replay(place: Workspace, log: Path, robot: str | None, speed: float) -> Replay:
-    if robot is None:
-        raise InputError(f"{log}: whose log is it? Name its robot by --robot")
+def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
     robot_id = find_robot(place, robot)
     return Replay(log, load_robot(place, robot_id), robot_id, speed)
 
@@ -128,8 +126,6 @@ def _refusing(take: Callable[[State], None], refuse: Callable[[str], None]) -> C
     return take_or_refuse
 
 
-def _arm(place: Workspace, address: str, robot: str | None) -> Rtde:
-    if robot is None:
-        raise InputError(f"{address}: whose controller is it? Name its robot by --robot")
+def _arm(place: Workspace, address: str, robot: str) -> Rtde:
     robot_id = find_robot(place, robot)
     return Rtde(address, load_robot(place, robot_id), robot_id)
