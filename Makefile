@@ -13,7 +13,7 @@ check: $(VENV)/test lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not slow and not system"
 
 test: $(VENV)/test lint
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
 # Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test

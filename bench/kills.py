@@ -37,7 +37,8 @@ class Command:
     arguments: Callable[[Path], list[object]]
     base: Path
     fed: bytes = b""
-    grows: tuple[str, ...] = field(default=())  # what a killed one may rightly leave more of: journals that became runs
+    # what a killed one may rightly leave more of: journals that became runs, and their energies
+    grows: tuple[str, ...] = field(default=())
 
 
 def main(kills: int, names: list[str], seed: int = 1) -> int:
@@ -68,7 +69,7 @@ def prepared(folder: Path) -> dict[str, Command]:
     fed = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
     return {
         "run": Command(lambda place: ["run", second, "--workspace", place], base),
-        "live": Command(lambda place: ["live", "--workspace", place], base, fed, ("triples", "runs")),
+        "live": Command(lambda place: ["live", "--workspace", place], base, fed, ("triples", "runs", "answers")),
         "diagnose": Command(lambda place: ["diagnose", third, "--json", folder / "d.json", "--workspace", place], base),
         "restore": Command(lambda place: ["restore", folder / "kept.zip", "--workspace", place], folder / "none"),
         "repair": Command(lambda place: ["repair", "--workspace", place], base),

@@ -21,6 +21,7 @@ from irtwin.providers.records import identifier, robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.case_study.page import render
 from irtwin.report.energy.scene import draw_scene
+from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
 
@@ -104,7 +105,7 @@ def add_measurement(data_set: Path, plan: Plan) -> float:
     table, motion = pq.read_table(log), plan.motion
     time = table["time"].to_numpy()
     planned = np.column_stack([np.interp(time, motion.time, column) for column in motion.q.T])
-    measured = np.column_stack([table[f"q_{joint}"].to_numpy() for joint in plan.joint_names])
+    measured = np.column_stack([table[name].to_numpy() for name in CHANNELS["q"].columns(plan.joint_names)])
     off = float(np.abs(measured - planned).max())
     if off > _OFF:
         raise InputError(f"{log}: is the log of another motion, {off:.3f} rad off; make it by bench/case_study_log.py")

@@ -18,6 +18,7 @@ OTHER_MEANINGS = {
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows
     "gap/localisation/locations.py": {"mechanical_power"},
     "live/joint_stream.py": {"payload"},  # a field of a message
+    "live/rtde.py": {"payload"},
     "signals/log.py": {"rotor_inertia"},  # a key of the data sheet
     "twin/files.py": {"rotor_inertia"},
 }

@@ -242,7 +242,7 @@ def _modelled_series(joints: tuple[str, ...], stretches: list[Stretch], began: f
         for name, values in columns.items():
             parts[name].append(values[new])
     table = {name: np.concatenate(values) for name, values in parts.items()}
-    held_out = {"time": table.pop("time"), "held_out": np.ones(len(table["q_" + joints[0]]), dtype=bool)}
+    held_out = {"time": table.pop("time"), "held_out": np.ones(len(table[CHANNELS["q"].column(joints[0])]), dtype=bool)}
     return pa.table(held_out | table)
 
 
