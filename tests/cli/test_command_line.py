@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import sqlite3
 import subprocess
 import sys
@@ -13,7 +12,6 @@ import pyarrow.parquet as pq
 import pytest
 from tests.data_sets import few_runs_of_the_demo
 
-from irtwin.knowledge.vocabulary import GRAPH_OWL_RL
 from irtwin.workflow import unpack_demo
 
 pytestmark = pytest.mark.slow
@@ -225,23 +223,6 @@ def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
     individuals, inconsistent = map(int, done.stdout.split())
     assert individuals > 100
     assert inconsistent == 0
-
-
-@pytest.mark.slow
-def test_owlrl_concludes_what_the_native_engine_does(workspace, tmp_path):
-    copy = shutil.copytree(workspace, tmp_path / "copy")
-
-    def conclusions() -> set[str]:
-        question = f"SELECT ?s ?p ?o {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }}"
-        asked = irtwin("query", question, "--workspace", copy, "--format", "csv")
-        assert asked.returncode == 0, asked.stderr
-        return set(asked.stdout.splitlines())
-
-    native = conclusions()
-    done = irtwin("reason", "--engine", "owlrl", "--workspace", copy)
-    assert done.returncode == 0, done.stderr
-    assert f"{len(native) - 1} triples from OWL by owlrl" in done.stderr
-    assert conclusions() == native
 
 
 def test_reason_says_what_goes_together(tmp_path):
