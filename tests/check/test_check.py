@@ -150,6 +150,16 @@ def test_held_torques_are_joined_by_lines():
     assert np.abs(mended - smooth)[:, 1].mean() < before
 
 
+def test_what_stands_is_not_joined_over():
+    def stands(signals: Signals) -> Signals:
+        torque = np.array(signals.torque)
+        torque[600:1000, 1] = torque[600, 1]
+        return replace(signals, torque=torque)
+
+    mended = checked(spoilt(spoilt(healthy(), stands), one("torque", 1, held))).data_set.runs[0].signals.torque
+    assert np.ptp(mended[603:996, 1]) == 0
+
+
 def test_a_robot_that_stands_has_nothing_to_say():
     still = spoilt(healthy(), lambda signals: replace(signals, q=np.zeros_like(signals.q)))
     assert found(still) == set()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -77,7 +78,12 @@ def _by_column(data_set: DataSet) -> list[Finding]:
 
 def _mended(data_set: DataSet, findings: Sequence[Finding]) -> DataSet:
     reversed_torques = {finding.channel for finding in findings if finding.fault == "sign" and finding.mended}
-    held = {finding.channel for finding in findings if finding.fault == "held_samples" and finding.mended}
+    at_reading = {(finding.fault, finding.channel) for finding in _by_column(data_set)}  # and mended there
+    held = {
+        finding.channel: round(finding.evidence["samples"])
+        for finding in findings
+        if finding.fault == "held_samples" and (finding.fault, finding.channel) not in at_reading
+    }
     speeds = {channel for finding in findings if finding.mended for channel in finding.channel.split(" <-> ")}
     speeds &= set(CHANNELS["dq"].columns(data_set.robot.joint_names))
     torques = reversed_torques & set(CHANNELS["torque"].columns(data_set.robot.joint_names))
@@ -89,14 +95,15 @@ def _mended(data_set: DataSet, findings: Sequence[Finding]) -> DataSet:
         columns = columns_of(replace(signals, dq=None if speeds else signals.dq), joints)
         for name in columns.keys() & torques:
             columns[name] = -columns[name]
-        for name in columns.keys() & held:
-            columns[name] = _joined(signals.time, columns[name])
+        for name in columns.keys() & held.keys():
+            columns[name] = _joined(signals.time, columns[name], held[name])
         return from_columns(columns, joints)
 
     return replace(data_set, runs=tuple(replace(run, signals=mend(run.signals)) for run in data_set.runs))
 
 
-def _joined(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return a held column with straight lines between its updates."""
-    updates = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1])
+def _joined(time: np.ndarray, values: np.ndarray, pace: int) -> np.ndarray:
+    """Return a column held for `pace` samples with straight lines between its updates; what stands longer stays."""
+    changes = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1, [len(values)]])
+    updates = np.concatenate([np.arange(start, stop, pace) for start, stop in pairwise(changes.tolist())])
     return np.asarray(np.interp(time, time[updates], values[updates]))
