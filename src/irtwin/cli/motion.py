@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import DAY, Number, database_option, graph_option, say
+from irtwin.cli.options import DAY, Number, database_option, graph_option, payload_com_option, payload_mass_option, say
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,15 +60,8 @@ def _kept(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--seconds", type=Number(min=0.0, min_open=True), help="Duration, s. Default: the shortest.")
 @click.option("--rate", type=Number(10.0, 10_000.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
 @click.option("--search", type=Number(0.1, DAY), default=10.0, show_default=True, help="Limit to find a path, s.")
-@click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
-@click.option(
-    "--payload-com",
-    type=Number(-10.0, 10.0),
-    nargs=3,
-    default=(0.0, 0.0, 0.0),
-    metavar="X Y Z",
-    help="Payload's centre of mass in the flange frame, m.",
-)
+@payload_mass_option
+@payload_com_option
 @_kept
 def plan(
     source: str,

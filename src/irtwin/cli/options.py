@@ -43,6 +43,15 @@ graph_option = click.option(
     envvar="IRTWIN_GRAPH",
     help="Query URL of a SPARQL 1.1 server for the graph. Default: a folder in the workspace.",
 )
+payload_mass_option = click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
+payload_com_option = click.option(
+    "--payload-com",
+    type=Number(-10.0, 10.0),
+    nargs=3,
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    help="Payload's centre of mass in the flange frame, m.",
+)
 
 
 def say(line: str) -> None:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import Number, database_option, graph_option, say, workspace_option
+from irtwin.cli.options import (
+    database_option,
+    graph_option,
+    payload_com_option,
+    payload_mass_option,
+    say,
+    workspace_option,
+)
 
 if TYPE_CHECKING:
     from irtwin.signals.finding import Finding
@@ -147,15 +154,8 @@ def diagnose(
 @click.argument("robot")
 @click.argument("new_log", metavar="LOG", type=click.Path(path_type=Path))
 @workspace_option
-@click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
-@click.option(
-    "--payload-com",
-    type=Number(-10.0, 10.0),
-    nargs=3,
-    default=(0.0, 0.0, 0.0),
-    metavar="X Y Z",
-    help="Payload's centre of mass in the flange frame, m.",
-)
+@payload_mass_option
+@payload_com_option
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the log carried out.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @database_option
