@@ -189,6 +189,12 @@ def test_bad_plans_are_told_and_nothing_is_kept(performed: Path, tmp_path: Path)
         file, np.column_stack([fast.time, fast.q[:, :2]]), delimiter=",", header=",".join(names[:3]), comments=""
     )
     assert "above its limit" in refused(irtwin("predict", "arm_2", file, *here))
+    torn = np.flatnonzero((other.time < 0.5) | (other.time > 1.5))
+    rows = np.column_stack([other.time, other.q[:, :2]])[torn]
+    np.savetxt(file, rows, delimiter=",", header=",".join(names[:3]), comments="")
+    out = tmp_path / "torn.parquet"
+    assert "has a hole in time" in refused(irtwin("predict", "arm_2", file, *here, "--out", out))
+    assert not out.exists()
     assert "--workspace FOLDER" in refused(irtwin("predict", "arm_2", file))
     assert "give --workspace FOLDER too" in refused(
         irtwin("predict", "arm_2", file, "--run", "x", "--out", tmp_path / "x")

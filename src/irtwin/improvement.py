@@ -10,7 +10,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.next_experiment import NextExperiment, next_experiment
 from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin
-from irtwin.providers.records import find_robot, keep_run, load_robot, load_twin
+from irtwin.providers.records import check_run_name, find_robot, keep_run, load_robot, load_twin
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
@@ -60,6 +60,8 @@ def improve(
         logged = read_log(
             new_log, known, payload_mass=payload_mass, payload_com=payload_com, performs=performs, repair=repair
         )
+        for run in logged.runs:
+            check_run_name(place, robot_id, run.name)
         runs = sound(logged, announce).runs
         with rewriting(place, graph_url) as graph:
             graph.load_ontology()

@@ -129,11 +129,17 @@ def expect(
     for motion in motions:
         check_motion(known, motion, collisions, run.file)
     cost = price(known, motions)
+    expected = Expectation(run, table, cost, collisions.checks_itself)
     if out is not None:
-        buffer = io.BytesIO()
-        pa.parquet.write_table(table, buffer)
-        write(Path(out), buffer.getvalue())
-    return Expectation(run, table, cost, collisions.checks_itself)
+        write_expectation(expected, Path(out))
+    return expected
+
+
+def write_expectation(expected: Expectation, out: Path) -> None:
+    """Write torque and power of a motion as Parquet."""
+    buffer = io.BytesIO()
+    pa.parquet.write_table(expected.table, buffer)
+    write(out, buffer.getvalue())
 
 
 def read_twin(source: Path) -> Twin:
@@ -149,13 +155,23 @@ def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, r
     source: a twin or its file, a URDF, or the folder of a data set. Raises InputError as `planning.plan.plan` does.
     """
     if out is not None:
-        check_place(Path(out))
-        if Path(out).suffix.lower() not in (".csv", ".parquet"):
-            raise InputError(f"{out}: a plan is written as .csv or .parquet; name such a file")
+        check_plan_file(Path(out))
     found = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
     if out is not None:
-        write(Path(out), _as_log(found.motion, found.joint_names, csv=Path(out).suffix.lower() == ".csv"))
+        write_plan(found, Path(out))
     return found
+
+
+def check_plan_file(out: Path) -> None:
+    """Raise InputError where no plan can be written to a file of this name."""
+    check_place(out)
+    if out.suffix.lower() not in (".csv", ".parquet"):
+        raise InputError(f"{out}: a plan is written as .csv or .parquet; name such a file")
+
+
+def write_plan(made: Plan, out: Path) -> None:
+    """Write a plan as a log, CSV or Parquet by its ending."""
+    write(out, _as_log(made.motion, made.joint_names, csv=out.suffix.lower() == ".csv"))
 
 
 def _as_log(motion: Motion, joints: Sequence[str], *, csv: bool) -> bytes:

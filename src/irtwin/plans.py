@@ -15,6 +15,7 @@ from irtwin.providers.records import check_run_name, find_robot, keep_run, load_
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import PLANNED, Run, check_plan
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
 from irtwin.twin.price import Price
 from irtwin.twin.twin import Twin
@@ -60,12 +61,17 @@ def plan(
     """
 
     def make(twin: Twin) -> tuple[Plan, Run]:
-        made = modelling.plan(twin, task, out, rate)
+        made = modelling.plan(twin, task, rate=rate)
         motion = made.motion
         signals = Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq)
         return made, _run(name, signals, task.payload_mass, task.payload_com)
 
-    return _keep(robot, name, make, Path(workspace), database, graph_url)
+    if out is not None:
+        modelling.check_plan_file(out)
+    made, kept = _keep(robot, name, make, Path(workspace), database, graph_url)
+    if out is not None:
+        modelling.write_plan(made, out)
+    return made, kept
 
 
 def predict(
@@ -86,12 +92,17 @@ def predict(
     """
 
     def make(twin: Twin) -> tuple[Expectation, Run]:
-        expected = modelling.expect(twin, motion, out, payload_mass=payload_mass, payload_com=payload_com)
+        expected = modelling.expect(twin, motion, payload_mass=payload_mass, payload_com=payload_com)
         run = expected.run
         check_plan(run.signals, motion)
         return expected, _run(name, run.signals.motion, run.payload_mass, run.payload_com)
 
-    return _keep(robot, name, make, Path(workspace), database, graph_url)
+    if out is not None:
+        check_place(out)
+    expected, kept = _keep(robot, name, make, Path(workspace), database, graph_url)
+    if out is not None:
+        modelling.write_expectation(expected, out)
+    return expected, kept
 
 
 def _keep(

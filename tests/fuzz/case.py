@@ -13,16 +13,20 @@ from tests.fuzz.spoil import spoils
 from tests.fuzz.streams import StreamPlan, streams
 
 BRIEF = ("diagnose",)
+CHECKED = ("check",)
 ALONE = ("diagnose with page and twin", "predict")
 MOTION = ("excite",)
 PLANNED = ("plan",)
-DESCRIBED = ("robot dh", "robot urdf", "robot ik")
+DESCRIBED = ("robot dh", "robot urdf", "robot ik", "robot ros")
 IN_SYMBOLS = ("robot equations",)
 WITH_WORKSPACE = ("run", "query", "export", "live", "diagnose into workspace", "query")
 KEPT_AND_MOVED = ("run", "map", "explain", "export", "reason", "backup", "restore", "repair", "drop")
 ADOPTED = ("run", "diagnose into workspace", "adopt", "query")
-_LONG = (WITH_WORKSPACE, KEPT_AND_MOVED, ADOPTED)
-_TRIED = (BRIEF,) * 36 + (ALONE,) * 16 + (MOTION,) * 4 + (PLANNED,) * 4 + (DESCRIBED,) * 4 + (IN_SYMBOLS,) * 2 + _LONG
+FOR_ROS = ("run", "export for ROS", "export MCAP", "export bag", "live replay")
+BETTERED = ("run", "predict into workspace", "improve", "query")
+_LONG = (WITH_WORKSPACE, KEPT_AND_MOVED, ADOPTED, FOR_ROS, BETTERED)
+_SHORT = (BRIEF,) * 36 + (ALONE,) * 16 + (CHECKED,) * 8 + (MOTION,) * 4 + (PLANNED,) * 4 + (DESCRIBED,) * 4
+_TRIED = (*_SHORT, IN_SYMBOLS, IN_SYMBOLS, *_LONG)
 
 
 @dataclass(frozen=True)

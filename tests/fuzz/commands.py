@@ -41,10 +41,10 @@ _STOPPED = 130  # exit status after Ctrl-C
 MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
 WRITTEN = (
     *("gap.json", "gap.html", "predicted.parquet", "motion.csv", "plan.csv"),
-    *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf"),
+    *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf", "kept.mcap", "kept.bag", "taken.parquet"),
 )
 LONGEST_LINE = 2000  # characters of an error
-_STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step ")  # what a command says while it works
+_STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step |^  ")  # what a command says while it works, and of the log
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
 
 
@@ -115,7 +115,9 @@ def _arguments(case: Case, command: str, folder: Path) -> tuple[list[str] | None
     out = {name: folder / name for name in WRITTEN}
     diagnose = ["diagnose", data, "--json", out["gap.json"]]
     run = next((data / "runs").iterdir())
+    kept = ["--robot", _robot(folder), "--run", run.stem, "--workspace", workspace]
     words, writes = {
+        "check": (["check", data], []),
         "diagnose": (diagnose, [out["gap.json"]]),
         "diagnose with page and twin": (
             [*diagnose, "--report", out["gap.html"], "--save-twin", twin],
@@ -135,6 +137,19 @@ def _arguments(case: Case, command: str, folder: Path) -> tuple[list[str] | None
         "robot ik": (["robot", "ik", data, "--pose", "0.3", "0", "0.4", "0", "1", "0"], []),
         "robot equations": (["robot", "equations", data], []),
         "robot urdf": (["robot", "urdf", data, "--out", out["robot.urdf"]], [out["robot.urdf"]]),
+        "robot ros": (["robot", "ros", data, "--out", folder / "package"], []),
+        "export for ROS": (["export", "--ros", folder / "ros", *kept[:2], *kept[4:]], []),
+        "export MCAP": (["export", "--mcap", out["kept.mcap"], *kept], [out["kept.mcap"]]),
+        "export bag": (["export", "--bag", out["kept.bag"], *kept], [out["kept.bag"]]),
+        "live replay": (
+            ["live", "--replay", run, "--robot", _robot(folder), "--speed", "1000", "--workspace", workspace],
+            [],
+        ),
+        "predict into workspace": (
+            ["predict", _robot(folder), run, "--out", out["taken.parquet"], "--run", "taken", "--workspace", workspace],
+            [out["taken.parquet"]],
+        ),
+        "improve": (["improve", _robot(folder), _again(run, folder), "--workspace", workspace], []),
         "run": (["run", data, "--workspace", workspace, "--repair"], []),
         "query": (["query", "energy_per_joint", "--workspace", workspace], []),
         "export": (["export", "--owl", out["all.owl"], "--workspace", workspace], [out["all.owl"]]),
@@ -173,6 +188,13 @@ def _robot(folder: Path) -> str:
     """Return the robot in the workspace."""
     pages = sorted((folder / "workspace" / "reports").glob("*.html"))
     return pages[0].stem if pages else "arm"
+
+
+def _again(run: Path, folder: Path) -> Path:
+    """Return the run under another name, as a new log."""
+    copy = folder / f"again{run.suffix}"
+    copy.write_bytes(run.read_bytes())
+    return copy
 
 
 def _main(arguments: list[str]) -> None:

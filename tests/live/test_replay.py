@@ -26,7 +26,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def played(replay: Replay, after: float = 0.0, ahead: float = 3600.0) -> list[State]:
     states: list[State] = []
-    replay.play(states.append, threading.Event(), after=after, ahead=ahead)
+    replay.play(states.append, threading.Event(), replay.start(after=after, ahead=ahead))
     return states
 
 
@@ -60,7 +60,7 @@ def test_it_stops_when_told(log: Path) -> None:
         states.append(state)
         done.set()
 
-    Replay(log, ROBOT, "arm", speed=0.01).play(take, done, after=0.0, ahead=3600.0)
+    Replay(log, ROBOT, "arm", speed=0.01).play(take, done, time.time())
     assert len(states) == 1
 
 

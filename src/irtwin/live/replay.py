@@ -35,20 +35,24 @@ class Replay:
         """How long the log is."""
         return float(self.signals.time[-1] - self.signals.time[0])
 
-    def play(self, take: Callable[[State], None], done: threading.Event, *, after: float, ahead: float) -> None:
-        """Give each state on at its time, until the last, or `done`.
+    def start(self, *, after: float, ahead: float) -> float:
+        """Return when the first state is to be, s since 1970.
 
         after: the time from which on the robot has no stored run; ahead: s by which a state may be ahead of the clock.
         At a speed above one the times run ahead of the clock, as the motion stays as fast as it was.
         Raises InputError where they would run too far ahead.
         """
-        began = time.monotonic()
         start = max(time.time(), after + _GAP)
         lead = start - time.time() + self.seconds * (1 - 1 / self.speed)
         if lead > ahead:
             raise InputError(
                 f"at {self.speed:g} times its speed the log ends {lead:.0f} s ahead of the clock: play it slower"
             )
+        return start
+
+    def play(self, take: Callable[[State], None], done: threading.Event, start: float) -> None:
+        """Give each state on at its time, the first at `start`, until the last, or `done`."""
+        began = time.monotonic()
         for state in self.states(start):
             pause = (state.time - start) / self.speed - (time.monotonic() - began)
             if pause > 0 and done.wait(pause):

@@ -70,9 +70,9 @@ def watch(
             feed(lines, reader, twin.receive, refuse)
 
         if replay is not None:
+            start = replay.start(after=twin.stored_until(replay.robot_id), ahead=AHEAD)
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
-            after = twin.stored_until(replay.robot_id)
-            replay.play(_refusing(twin.receive, refuse), done, after=after, ahead=AHEAD)
+            replay.play(_refusing(twin.receive, refuse), done, start)
         elif rtde is not None and robot is not None:
             _follow(_arm(place, rtde, robot), twin, refuse, done, announce)
         else:
