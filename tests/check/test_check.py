@@ -12,7 +12,9 @@ import pytest
 from tests.data_sets import irtwin, write
 from tests.synthetic import arm, as_run, measure, swing
 
+from irtwin.check import arrangement
 from irtwin.check.check import check, checked
+from irtwin.check.rigid_body import Rows
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, read_data_set
@@ -101,6 +103,12 @@ def test_a_reversed_position_is_no_reversed_torque(joint):
     change = one("q", joint, np.negative)
     faulty = spoilt(spoilt(healthy(), change), one("dq", joint, np.negative))
     assert found(faulty) == {("sign", f"q_joint_{joint + 1}")}
+
+
+def test_no_arrangement_is_tried_of_a_robot_of_many_axes(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(arrangement, "_MOST_JOINTS", 3)
+    monkeypatch.setattr(Rows, "unexplained", lambda *_: pytest.fail("a fit a joint and fault"))
+    assert check(healthy()).findings == ()
 
 
 def test_torques_in_a_circle_are_in_another_order():

@@ -26,6 +26,7 @@ _FACTORS = (2.0, 0.5)
 _FITTED = 0.8  # of a torque's deviation: an exchange must leave less at each joint
 _EXCHANGED = "stand in each other's columns: name them by their joints"
 _ALL_PAIRS = 8  # joints; of more, neighbours alone
+_MOST_JOINTS = 12  # of more, no fault is looked for: one takes a fit a joint, and there are four faults a joint
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,8 @@ class _Fault:
 
 def arrangement_findings(robot: Robot, moving: Moving) -> list[Finding]:
     """Return the clearest such fault alone: others are seen once it is cured."""
+    if len(robot.joint_names) > _MOST_JOINTS:
+        return []
     rows = rows_of(robot, moving, _ROWS)
     if rows is None or len(rows.q) < _FEWEST:
         return []
