@@ -44,7 +44,9 @@ WRITTEN = (
     *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf", "kept.mcap", "kept.bag", "taken.parquet"),
 )
 LONGEST_LINE = 2000  # characters of an error
-_STEP = re.compile(r"^\s*\d+\.\d s  |^\s*\d+ s  step |^  ")  # what a command says while it works, and of the log
+_STEP = re.compile(  # what a command says while it works, and of the log
+    r"^\s*\d+\.\d s  |^\s*\d+ s  step |^  |^\w+ \((cure first|doubtful|mended)\): "
+)
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
 
 

@@ -150,11 +150,14 @@ def _slope(model: pin.Model, motion: Motion) -> np.ndarray:
 
 
 def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
-    """Return (N, n, 10) the regressor of the body that carries the flange."""
+    """Return (N, n, 10) the regressor of the body that carries the flange; zeros where no joint moves it."""
     model = robot.model
     data = model.createData()
-    first = 10 * (flange_frame(robot).parentJoint - 1)
-    columns = np.empty((*motion.q.shape, 10))
+    carrier = flange_frame(robot).parentJoint
+    columns = np.zeros((*motion.q.shape, 10))
+    if carrier == 0:
+        return columns
+    first = 10 * (carrier - 1)
     for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         columns[row] = np.atleast_2d(pin.computeJointTorqueRegressor(model, data, *state))[:, first : first + 10]
     return columns

@@ -37,6 +37,7 @@ _SHRINK, _TRIES = 0.7, 6
 _CHECKED = 200  # poses on the way
 LONGEST = 600.0  # s of one programme
 _MOST_SAMPLES = 100_000  # of one programme
+_FEWEST_SAMPLES = 12  # of a motion; a quintic spline takes six
 _RATE = 5.0  # samples a period of the cutoff: enough of what the filter lets through
 
 
@@ -151,8 +152,8 @@ class _Yard:
         return None
 
     def within(self, seconds: float) -> bool:
-        """Return whether a programme may last so long."""
-        return seconds <= LONGEST and seconds * self.rate <= _MOST_SAMPLES
+        """Return whether a programme may last so long: neither too many samples nor too few to differentiate."""
+        return seconds <= LONGEST and _FEWEST_SAMPLES <= seconds * self.rate <= _MOST_SAMPLES
 
     def _above_floor(self, made: Programme) -> bool:
         q = np.concatenate([motion.q for motion in made.motions])

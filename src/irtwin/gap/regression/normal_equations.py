@@ -13,12 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.effect import Effect, Term
+from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
+_MOST_BYTES = 750_000_000  # of all groups' products; with what is worked out of them, 1.5 GB
 _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
 
 
@@ -138,7 +140,16 @@ class System:
         return found
 
     def moments(self, noise: np.ndarray) -> list[np.ndarray]:
-        """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,)."""
+        """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,).
+
+        Raises InputError where they would take too much memory.
+        """
+        size = 8 * self.groups * (self._size + 1) ** 2
+        if size > _MOST_BYTES:
+            raise InputError(
+                f"trying every effect on {len(self.pattern)} joints takes {2 * size / 1e9:.1f} GB of memory, and "
+                f"{2 * _MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
+            )
         return [self._weighted([group], noise) for group in range(self.groups)]
 
     def _weighted(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> np.ndarray:
