@@ -26,6 +26,7 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.backup import backup as keep
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
+from irtwin.knowledge.vocabulary import shorten
 from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
@@ -271,6 +272,8 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
         announce(
             f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"
         )
+    for robot, contradiction in inferred.set_aside:
+        announce(f"  nothing is concluded of {shorten(robot)}: {contradiction}")
     for violation in validate(graph):
         announce(f"  {violation}")
 

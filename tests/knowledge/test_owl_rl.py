@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Store, Triple, parse
 
 from irtwin.errors import InputError
+from irtwin.knowledge.owl_rl import by_owlrl
 from irtwin.knowledge.owl_rl import closure as owl_rl
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -134,6 +135,24 @@ _KINDS = st.tuples(
 def test_agrees_with_owlrl_on_drawn_graphs(statements: list[tuple[str, str, str]]) -> None:
     premise = triples(" ".join(f"{' '.join(statement)} ." for statement in statements))
     assert _own({*premise, *Closure(premise).inferred()}) == _own(_closed_by_owlrl(premise))
+
+
+def test_what_an_individual_is_to_itself_is_kept() -> None:
+    said = triples("ex:p a owl:SymmetricProperty . ex:a ex:p ex:b . ex:b owl:sameAs ex:a .")
+    assert triples("ex:a ex:p ex:a . ex:b ex:p ex:b .") <= Closure(said).worth_keeping()
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.one_of(_STATEMENTS, _KINDS), min_size=3, max_size=9))
+def test_what_is_kept_is_what_owlrl_finds(statements: list[tuple[str, str, str]]) -> None:
+    premise = triples(" ".join(f"{' '.join(statement)} ." for statement in statements))
+    kept = by_owlrl.worth_keeping(premise)
+    assert _of_examples(Closure(premise).worth_keeping()) == _of_examples(kept)
+
+
+def _of_examples(found: Iterable[Triple]) -> set[Triple]:
+    return {one for one in found if "example.org" in one.subject.value and "example.org" in one.object.value}
 
 
 def _own(found: Iterable[Triple]) -> set[Triple]:

@@ -93,6 +93,7 @@ def of_robot(robot: str) -> list[Quad]:
     one, two = individual("run", robot + ".1"), individual("run", robot + ".2")
     body, energy, joint = (individual(kind, robot) for kind in ("robot", "energy", "joint"))
     return [
+        quad(body, TYPE, term("Industrial_Robot")),
         quad(body, term("has_RunProcess"), one),
         quad(two, term("run_of"), body),
         quad(one, TYPE, term("IR_RunProcess")),
@@ -242,19 +243,32 @@ def test_a_part_that_goes_takes_its_conclusions_along() -> None:
     assert inferred(graph) == inferred(anew(of_robot("r")))
 
 
-def test_a_contradiction_in_one_part_is_named_as_in_the_whole() -> None:
-    wrong = quad(individual("run", "r.1"), OWL + "differentFrom", individual("run", "r.1"))
+@pytest.mark.parametrize("wrong_robots", [("r",), ("r", "s")])
+def test_a_robot_that_contradicts_itself_is_set_aside_and_the_others_are_concluded_of(wrong_robots) -> None:
+    runs = {robot: individual("run", f"{robot}.1") for robot in wrong_robots}
+    wrong = {quad(run, OWL + "differentFrom", run) for run in runs.values()}
     graph = anew(FACTS)
-    graph.change((), {wrong})
-    with pytest.raises(Contradiction) as parted:
-        reason(graph)
-    with pytest.raises(Contradiction) as whole:
-        anew([*FACTS, wrong])
-    assert str(parted.value) == str(whole.value)
-    assert inferred(graph) == {}
-    graph.change({wrong}, ())
-    reason(graph)
+    graph.change((), wrong)
+    done = reason(graph)
+    assert [robot for robot, _ in done.set_aside] == [individual("robot", robot) for robot in wrong_robots]
+    assert all("eq-diff1" in why and runs[robot] for robot, (_, why) in zip(runs, done.set_aside, strict=True))
+    others = [one for robot in ROBOTS if robot not in wrong_robots for one in of_robot(robot)]
+    assert conclusions(graph) == conclusions(anew(others))
+    assert reason(graph).set_aside == done.set_aside
+
+    share = quad(individual("run", "s.2"), term("Idle_Share"), Literal(0.9))
+    graph.change((), {share})
+    assert reason(graph).set_aside == done.set_aside
+    graph.change({share}, ())
+    graph.change(wrong, ())
+    assert reason(graph).set_aside == ()
     assert inferred(graph) == inferred(anew(FACTS))
+
+
+def test_a_contradiction_that_is_no_robots_is_refused() -> None:
+    wrong = quad(LIMITS, OWL + "differentFrom", LIMITS)
+    with pytest.raises(Contradiction, match="eq-diff1"):
+        anew([*FACTS, wrong])
 
 
 def test_an_update_that_tells_no_individuals_has_all_done_anew() -> None:

@@ -28,12 +28,13 @@ from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.terms import Node
 from irtwin.knowledge.store.changes import is_asserted
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_REASONED, OWL, RDF
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_REASONED, OWL, RDF, term
 
 Name = NamedNode | BlankNode
 
 _TYPE = NamedNode(RDF + "type")
 _INVERSE_FUNCTIONAL = NamedNode(OWL + "InverseFunctionalProperty")
+_ROBOT = NamedNode(term("Industrial_Robot"))
 _HAS_KEY = NamedNode(OWL + "hasKey")
 
 
@@ -96,6 +97,24 @@ def parted(ontology: Ontology, triples: Iterable[Triple]) -> Callable[[Name], Na
         if len(nodes) == 2:
             above[top(nodes[0])] = top(nodes[1])
     return top
+
+
+def groups(ontology: Ontology, triples: Iterable[Triple]) -> tuple[set[Triple], list[set[Triple]]]:
+    """Return what is said of no part, and what is said of each."""
+    said = list(triples)
+    part_of = parted(ontology, said)
+    common, of_parts = set[Triple](), dict[Name, set[Triple]]()
+    for triple in said:
+        nodes = ontology.nodes(triple)
+        (of_parts.setdefault(part_of(nodes[0]), set()) if nodes else common).add(triple)
+    return common, sorted(of_parts.values(), key=lambda part: min(map(str, part)))
+
+
+def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
+    """Return the robots of a part; where it has none, its first node."""
+    said = list(part)
+    found = {one.subject for one in said if one.predicate == _TYPE and one.object == _ROBOT}
+    return sorted(found or [min((node for one in said for node in ontology.nodes(one)), key=str)], key=str)
 
 
 def join(ontology: Ontology, closure: Closure, count: int) -> str | None:

@@ -19,7 +19,7 @@ from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 from irtwin.knowledge import engines, parts
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.java import java
-from irtwin.knowledge.owl_rl.closure import Closure
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.shacl import rules as shacl_rules
 from irtwin.knowledge.store.blank_nodes import has_blank_node
@@ -52,6 +52,7 @@ _OWL_RL = NamedNode(GRAPH_OWL_RL)
 _ATTRIBUTED_TO = NamedNode(PROV + "wasAttributedTo")
 _PELLET = NamedNode(REASONER + "pellet")
 _RULE_NOT_RUN = NamedNode(term("Rule_Not_Run"))
+_CONTRADICTION = NamedNode(term("Contradiction"))
 
 _NOT_CLOSED = (GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
 
@@ -68,7 +69,8 @@ class Inferences:
     """How many triples each kind of reasoning holds, and the IRIs of the named graphs that changed.
 
     `not_run` are the names of the SWRL rules that did not run for want of Java. `joined_by` is a statement that makes
-    the graph one part, so that all of it was reasoned over; None where none is.
+    the graph one part, so that all of it was reasoned over; None where none is. `set_aside` are the IRIs of the robots
+    of which nothing is concluded, as statements about them contradict each other, and which these are.
     """
 
     owl_rl: int
@@ -77,6 +79,7 @@ class Inferences:
     changed: tuple[str, ...]
     not_run: tuple[str, ...] = ()
     joined_by: str | None = None
+    set_aside: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass
@@ -105,8 +108,9 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
     The closure comes first, so that rules see types and inverses that nobody wrote; then the rules; then the
-    closure of what they concluded. SWRL rules are left out where there is no Java. InputError names a contradiction,
-    and what was inferred before is dropped. Engines other than the native one close the graph as one part, and leave
+    closure of what they concluded. SWRL rules are left out where there is no Java. A robot of which statements
+    contradict each other is set aside. InputError names a contradiction that is no robot's, and what was inferred
+    before is dropped. Engines other than the native one close the graph as one part, take no contradiction, and leave
     what was inferred before as it is where they fail.
     """
     ontology = Ontology(graph)
@@ -149,7 +153,10 @@ def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad])
     region = parts.around(graph, ontology, nodes_of(changed))
     if region is None:
         return None
-    found = _infer(ontology, region.asserted, region.concluded)
+    try:
+        found = _infer(ontology, region.asserted, region.concluded)
+    except Contradiction:
+        return None
     old = region.concluded
     new = {quad for quad in found.quads() if ontology.nodes(quad.triple)}
     nodes = {node for quad in new if _graph(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
@@ -171,12 +178,12 @@ def _reason_over_all(
         quad for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED) for quad in in_graph(graph.triples(name), name)
     }
     if engine == NATIVE:
-        found = _infer(ontology, premises - ontology.triples, old)
+        found = _infer_without_contradiction(ontology, premises - ontology.triples, old)
     else:
         found = _infer_by(engine, ontology, premises, old)
     in_parts = engine == NATIVE and changed is not None and not found.joined_by
     found.made_of[_OWL_RL] = content_name(ontology.triples) if in_parts else everything
-    found.made_by = _made_by(engine)
+    found.made_by |= _made_by(engine)
     new = found.quads()
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
@@ -212,6 +219,38 @@ def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_
     found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     found.joined_by = joined_by
     return found
+
+
+def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
+    """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
+    try:
+        return _infer(ontology, premises, before)
+    except Contradiction:
+        common, of_parts = parts.groups(ontology, premises)
+        bad = _contradictory(ontology, common, of_parts, before)
+        found = _infer(ontology, premises.difference(*(part for part, _ in bad)), before)
+        said = ((robot, reason) for part, reason in bad for robot in parts.robots(ontology, part))
+        found.made_by = {Triple(robot, _CONTRADICTION, Literal(reason)) for robot, reason in said}
+        return found
+
+
+def _contradictory(
+    ontology: Ontology, common: set[Triple], of_parts: list[set[Triple]], before: set[Quad]
+) -> list[tuple[set[Triple], str]]:
+    """Return the parts that contradict themselves, and how, by halves: most do not."""
+    try:
+        _infer(ontology, common.union(*of_parts), before)
+    except Contradiction as clash:
+        if not of_parts:
+            raise
+        if len(of_parts) == 1:
+            return [(of_parts[0], str(clash))]
+        half = len(of_parts) // 2
+        return [
+            *_contradictory(ontology, common, of_parts[:half], before),
+            *_contradictory(ontology, common, of_parts[half:], before),
+        ]
+    return []
 
 
 def _infer_by(engine: str, ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
@@ -301,4 +340,8 @@ def _rules() -> bytes:
 def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
     counts = graph.query(_COUNT).rows[0]
     names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
-    return Inferences(counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), _not_run(), joined_by)
+    said = graph.triples(GRAPH_REASONED)
+    aside = sorted((it.subject.value, it.object.value) for it in said if it.predicate == _CONTRADICTION)
+    return Inferences(
+        counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), _not_run(), joined_by, tuple(aside)
+    )

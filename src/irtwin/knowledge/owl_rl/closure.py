@@ -14,9 +14,13 @@ from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number
 from irtwin.knowledge.owl_rl.terms import Node
-from irtwin.knowledge.vocabulary import OWL, XSD, shorten
+from irtwin.knowledge.vocabulary import OWL, RDFS, XSD, shorten
 
 _TRIVIAL = (OWL + "Thing", OWL + "Nothing")
+_REFLEXIVE = (  # what everything, every class or every property is to itself
+    *(OWL + "sameAs", OWL + "equivalentClass", OWL + "equivalentProperty"),
+    *(RDFS + "subClassOf", RDFS + "subPropertyOf"),
+)
 MOST_CONCLUSIONS = 100_000_000  # each time that a rule draws one counts
 MOST_FACTS = 5_000_000  # beside those that were given; they take 1.1 GB
 
@@ -74,15 +78,18 @@ class Closure:
     def worth_keeping(self) -> set[Triple]:
         """Return what follows and is worth keeping in a graph.
 
-        Left out is what holds of everything (x sameAs x, C subClassOf owl:Thing), what is inferred of anonymous class
+        Left out is what holds of everything (x sameAs x, C subClassOf C or owl:Thing), what is inferred of anonymous class
         expressions and of datatypes, and one more way to write a literal that stands there already.
         """
         terms, helpers = self._terms, self._helpers()
         hidden = {number for number, forms in enumerate(terms.forms) if forms and _is_hidden(forms[0])}
+        reflexive = {terms.number(NamedNode(iri)) for iri in _REFLEXIVE}
         kept: set[Triple] = set()
         for fact in self._round.keys() - self._given - _truisms():
             subject, predicate, object = fact
-            if subject != object and subject not in hidden and object not in hidden and predicate not in helpers:
+            if subject == object and predicate in reflexive:
+                continue
+            if subject not in hidden and object not in hidden and predicate not in helpers:
                 kept.update(list(terms.triples(fact))[:1])
         return kept
 
@@ -249,7 +256,9 @@ def _truisms() -> frozenset[Fact]:
 
 def says_something(triple: Triple) -> bool:
     """Whether a conclusion is worth keeping in a graph, as `Closure.worth_keeping` has it."""
-    return triple.subject != triple.object and not _is_hidden(triple.subject) and not _is_hidden(triple.object)
+    if triple.subject == triple.object and triple.predicate.value in _REFLEXIVE:
+        return False
+    return not _is_hidden(triple.subject) and not _is_hidden(triple.object)
 
 
 def _is_hidden(term: Node) -> bool:
