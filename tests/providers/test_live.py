@@ -19,6 +19,7 @@ from tests import rows
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.live import live_twin as live
@@ -129,6 +130,19 @@ def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: Knowledg
     energy = graph.query(f"SELECT (series:integral(id:run\\/{run.run_id}, 'power', 0, 10) AS ?e) {{}}")
     assert energy[0]["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
     assert not list((place.folder / "live").iterdir())
+
+
+def test_a_run_of_one_sample_breaks_no_shape(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        twin.receive(state(0))
+        wait_for(lambda: graph.query(NOW))
+        while_it_lasts = validate(graph)
+    run = live_run(place)
+    assert (run.run_time_s, run.sample_count, run.sample_rate_hz) == (0.0, 1, None)
+    assert quads(graph) == mapped(place)
+    for violations in (while_it_lasts, validate(graph)):
+        assert [one for one in violations if one.node.endswith(f"/run/{run.run_id}")] == []
+    assert not graph.query("ASK { ?run a irt:Live_Run ; irt:Sample_Rate|irt:Energy_Consumption ?any }")[0]["answer"]
 
 
 def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: KnowledgeGraph) -> None:

@@ -114,7 +114,7 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
     idle = still.all(axis=1)
     tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
     length = at.time - began
-    tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else 0.0}
+    tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else None}
     tables["activity"][0] |= {"ended": _moment(at.time)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
     table = columns | {"time": time - began}
