@@ -156,7 +156,7 @@ def test_bad_logs_are_told_and_change_nothing(improved: tuple[Path, Said], tmp_p
     assert 'no robot "arm_9" here' in refused("arm_9", file, *here)
     taken = new_log(tmp_path, log(5, 1.0, "again"))
     assert refused("arm_2", taken, *here).endswith('the robot has a run "again" already; choose another name')
-    assert 'performs "reach", which is no planned run in' in refused("arm_2", file, "--performs", "reach", *here)
+    assert 'the robot has no planned run "reach"; it has none' in refused("arm_2", file, "--performs", "reach", *here)
     motion = replace(log(5, 1.0, "bare"), signals=log(5, 1.0).signals.motion)
     assert "has neither torque nor power" in refused("arm_2", new_log(tmp_path, motion), *here)
     other = arm(3)

@@ -138,6 +138,7 @@ def adopt(
             populate_apart(apart, lambda line: None)
         graph.load_ontology()
         map_rows(place, graph)
+        populate_others(place, graph, lambda line: None)  # live runs by the new twin
         reason(graph)
         next_experiment(place, graph, robot_id)
         return write_report(place, graph, robot_id)

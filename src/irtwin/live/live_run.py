@@ -88,6 +88,7 @@ def rows(
         "start_time_from": "log",
         "run_time_s": at.time - began,
         "sample_count": count,
+        **({} if header.performs is None else {"performs": header.performs}),
     }
     made = {"run_id": header.run_id, "activity_id": activity_id}
     return {
