@@ -19,7 +19,12 @@ _FILES = {
     "series": [("path", "series_id")],
     "twin": [("file", "sha256")],
     "link_shape": [("mesh_file", "mesh_sha256")],
-    "gap_diagnosis": [("file", "sha256"), ("evidence_file", "evidence_sha256"), ("twin_file", "twin_sha256")],
+    "gap_diagnosis": [
+        ("file", "sha256"),
+        ("evidence_file", "evidence_sha256"),
+        ("twin_file", "twin_sha256"),
+        ("motion_file", "motion_sha256"),
+    ],
 }
 
 
