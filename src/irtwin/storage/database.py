@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -225,14 +224,7 @@ class Workspace:
 
     def read_document(self, path: str, checksum: str) -> bytes:
         """Read a document by its path and SHA-256. Raises InputError where it is gone or another."""
-        again = "run or diagnose its data set again"
-        try:
-            content = inside(self.folder, path).read_bytes()
-        except OSError as error:
-            raise InputError(f"{self.folder / path}: cannot be read ({error.strerror}); {again}") from None
-        if hashlib.sha256(content).hexdigest() != checksum:
-            raise InputError(f"{self.folder / path}: was changed after it was written; {again}")
-        return content
+        return files.read_document(self.folder, path, checksum)
 
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""
