@@ -135,9 +135,10 @@ class LiveTwin:
                 raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours; not stored")
 
     def _take(self, run: WatchedRun, state: State) -> None:
-        if run.health.stale_since is not None:
-            self._announce(f"{self.names[state.robot_id]}: the stream flows again")
+        was_stale = run.health.stale_since is not None
         run.take(state)
+        if was_stale and run.health.stale_since is None:
+            self._announce(f"{self.names[state.robot_id]}: the stream flows again")
         if self._broadcast is not None:
             self._broadcast.state(state)
         self._waiting += 1
@@ -254,7 +255,8 @@ class LiveTwin:
         with self._lock:
             states, run.unworked = run.unworked, []
             if run.health.look():
-                self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; the last good state is kept")
+                kept = "its states are stored" if run.health.frozen else "the last good state is kept"
+                self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; {kept}")
                 self._make_due(run)
         if states:
             stretches = run.work_out(states, self._twin_of(robot_id))
