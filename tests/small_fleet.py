@@ -1,14 +1,15 @@
 """Four robots whose energies are small round numbers, as rows: every named question can be answered of them by hand.
 
 Arm_A was diagnosed as changed, Arm_B as ambiguous, Arm_C as unexplained and burns what its braking gives back;
-Arm_D has a run and no twin. The ledger of each run adds up to its modelled energy.
+Arm_D has a run and no twin. The ledger of each run adds up to its modelled energy. Arm_B is watched just now, far from
+its twin; Arm_D was.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -16,6 +17,7 @@ from sqlalchemy.orm import Session
 from irtwin.knowledge.vocabulary import ID
 from irtwin.storage import experiment_schema as experiment
 from irtwin.storage import gap_schema as gap
+from irtwin.storage import live_schema as live
 from irtwin.storage import schema
 from irtwin.storage import structure_schema as structure
 from irtwin.storage.database import Workspace
@@ -46,6 +48,15 @@ PLANS: list[
     ("Arm_A", "pick", "check_1", 18.0, 9.0, 1900.0, 150.0),
     ("Arm_B", "haul", "work_2", 8.0, 1.0, 700.0, 20.0),
     ("Arm_D", "draft", None, 900.0, 0.0, None, None),
+]
+LIVE = [  # robot, run, start, s, payload kg, stream, stale since, why
+    ("Arm_B", "live_1", "2026-03-03 10:00", 12.0, 1.0, "stale", "2026-03-03 10:00:12", "no state came for 2.0 s"),
+    ("Arm_D", "live_1", "2026-03-05 05:00", 4.0, 2.0, "ended", None, None),
+]
+EXCURSIONS = [  # of Arm_B.live_1: channel, joint, number, began, ended, s, residual, unit, times its band
+    ("torque", "j2", 1, "2026-03-03 10:00:02", "2026-03-03 10:00:06", 4.0, 7.125, "N m", 2.5),
+    ("torque", "j2", 2, "2026-03-03 10:00:07", "2026-03-03 10:00:08", 1.0, 9.5, "N m", 3.25),  # too short for an alarm
+    ("power", None, 1, "2026-03-03 10:00:08", None, 4.0, 80.0, "W", 4.0),
 ]
 LEDGER = {  # run: effect, joint, J
     "Arm_A.fit_1": "rigid_body j1 250, coulomb_friction j1 50, rigid_body j2 150, coulomb_friction j2 30",
@@ -85,6 +96,7 @@ def fill(workspace: Workspace) -> None:
             *_energies(),
             *_prices(),
             *_diagnoses(),
+            *_live_runs(),
         ]:
             session.add(row)
             session.flush()
@@ -281,6 +293,30 @@ def _energies() -> Iterator[Base]:
         for joint in JOINTS[robot]:
             taken = sum(float(joules) for _, at, joules in entries if at == joint)
             yield schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot, energy_j=taken, activity_id=made)
+
+
+def _live_runs() -> Iterator[Base]:
+    for robot, name, start, seconds, payload, stream, stale_since, why in LIVE:
+        run_id, made = f"{robot}.{name}", f"live.{robot}.{name}"
+        yield schema.Run(
+            run_id=run_id, robot_id=robot, name=name, kind="Live_Run", payload_kg=payload, payload_com_x_m=0.0,
+            payload_com_y_m=0.0, payload_com_z_m=0.0, start_time=_moment(start), start_time_from="log",
+            run_time_s=seconds, sample_count=int(100 * seconds), sample_rate_hz=100.0,
+            file=f"series/{run_id}.parquet", sha256=f"log of {run_id}",
+        )  # fmt: skip
+        yield _activity(made, robot, "live", start)
+        if robot == "Arm_B":
+            yield schema.RunState(run_id=run_id, current_state="moving", idle_share=0.2, activity_id=made)
+        yield schema.LiveState(
+            run_id=run_id, state_time=_moment(start) + timedelta(seconds=seconds), stream_state=stream,
+            stale_since=stale_since and _moment(stale_since), stale_reason=why, activity_id=made,
+        )  # fmt: skip
+    for channel, joint, number, began, ended, seconds, residual, unit, ratio in EXCURSIONS:
+        yield live.GapExcursion(
+            run_id="Arm_B.live_1", place=joint or "robot", number=number, twin_id="Arm_B.t1", robot_id="Arm_B",
+            channel=channel, joint=joint, unit=unit, began=_moment(began), ended=ended and _moment(ended),
+            lasted_s=seconds, peak_residual=residual, peak_ratio=ratio, activity_id="live.Arm_B.live_1",
+        )  # fmt: skip
 
 
 _SURE = {  # of a location

@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from irtwin import asking, workflow
+from irtwin.gap.document import form
+from irtwin.gap.experiment.programmes import Programme, programmes
 from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.next_experiment import next_experiment
+from irtwin.providers.gap import record
+from irtwin.signals.channels import Signals
+from irtwin.signals.csv_text import csv_text
 from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
+from irtwin.signals.samples import read_signals
 from irtwin.storage.database import Workspace
 from irtwin.workflow import rewriting
 from tests import data_sets
 from tests.data_sets import Said, irtwin
+from tests.providers.test_gap_provider import NOTHING, diagnosis
 from tests.synthetic import arm, as_run, measure, swing, with_constants
+from tests.test_next_experiment import experiment
 
 pytestmark = pytest.mark.slow
 
@@ -72,6 +85,32 @@ def test_a_flagged_twin_says_what_to_log_next(flagged: tuple[Path, list[str], li
     assert any("misses the energy of swing_4 by " in line for line in words)
     assert any("next_experiment/arm_2.csv on the robot, 20 s from rest to rest" in line for line in words)
     assert any('irtwin improve "arm_2" LOG --workspace' in line for line in words)
+
+
+def test_the_motion_is_that_of_the_programme_that_a_diagnosis_designed(
+    flagged: tuple[Path, list[str], list[str]], tmp_path: Path
+) -> None:
+    shutil.copytree(flagged[0] / "workspace", tmp_path / "w")
+    file = tmp_path / "w" / "next_experiment" / "arm_2.csv"
+    ladder = next(one for one in programmes(ROBOT, ("joint_1",), [swing(ROBOT, 1)]) if one.kind == "speed_ladder")
+    far = replace(ladder.motions[0], q=9.0 * ladder.motions[0].q)
+    with Workspace(tmp_path / "w") as place, KnowledgeGraph.of_workspace(place) as graph:
+
+        def said(programme: Programme | None, motion: Motion | None, *by_hand: str) -> str:
+            proposed = form.to_json(experiment(programme, *by_hand))
+            motion_text = None if motion is None else csv_text(Signals(motion.time, motion.q), ROBOT.joint_names)
+            record(place, "arm_2", diagnosis(next_experiment=proposed), NOTHING, motion=motion_text)
+            following = next_experiment(place, graph, "arm_2")
+            assert following is not None
+            return "\n".join(following.words)
+
+        assert f"Play {file} on the robot, {ladder.seconds:.3g} s from rest to rest" in said(ladder, ladder.motions[0])
+        np.testing.assert_allclose(read_signals(file, ROBOT, measured=False)[0].q, ladder.motions[0].q, atol=1e-9)
+        assert "No motion is written: it is done by hand (hang a known mass)." in said(None, None, "hang a known mass")
+        assert not file.exists()
+        words = said(ladder, far)
+        assert "The robot cannot make the motion of that (" in words
+        assert f"Play {file} on the robot, 20 s from rest to rest" in words
 
 
 def test_rounds_go_on_until_the_limit_holds(improved: tuple[Path, Said]) -> None:
@@ -156,7 +195,7 @@ def test_bad_logs_are_told_and_change_nothing(improved: tuple[Path, Said], tmp_p
     assert 'no robot "arm_9" here' in refused("arm_9", file, *here)
     taken = new_log(tmp_path, log(5, 1.0, "again"))
     assert refused("arm_2", taken, *here).endswith('the robot has a run "again" already; choose another name')
-    assert 'performs "reach", which is no planned run in' in refused("arm_2", file, "--performs", "reach", *here)
+    assert 'the robot has no planned run "reach"; it has none' in refused("arm_2", file, "--performs", "reach", *here)
     motion = replace(log(5, 1.0, "bare"), signals=log(5, 1.0).signals.motion)
     assert "has neither torque nor power" in refused("arm_2", new_log(tmp_path, motion), *here)
     other = arm(3)

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import sqlalchemy
 from sqlalchemy import select
 
 from irtwin import asking, plans, workflow
 from irtwin.errors import InputError
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.planning.plan import Task
+from irtwin.providers.records import ingest
 from irtwin.signals.channels import from_columns
 from irtwin.signals.log import Run, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.staging import staged
 from irtwin.workflow import rewriting
 from tests import data_sets
 from tests.data_sets import Said, irtwin
@@ -154,16 +158,6 @@ def test_the_graph_conforms_and_the_page_shows_both(performed: Path) -> None:
     assert '"name":"reach","part":"planned"' in page
 
 
-def test_a_motion_from_a_file_is_kept_as_well(performed: Path, kept: tuple[Path, Said]) -> None:
-    priced = irtwin("predict", "arm_2", kept[0] / "reach.parquet", "--workspace", performed, "--run", "laden",
-                    "--payload-mass", 2)  # fmt: skip
-    assert priced.status == 0, priced.err
-    assert priced.out.startswith('planned run "laden" of arm_2: energy ')
-    rows = {row["run"]: row for row in asking.ask("planned_runs", performed)}
-    assert rows["laden"]["payload_kg"] == 2.0
-    assert f"{rows['laden']['energy_J']:.4g}" in priced.out
-
-
 def refused(said: Said) -> str:
     assert said.status == 2
     assert said.out == ""
@@ -200,6 +194,91 @@ def test_bad_plans_are_told_and_nothing_is_kept(performed: Path, tmp_path: Path)
         irtwin("predict", "arm_2", file, "--run", "x", "--out", tmp_path / "x")
     )
     assert list(asking.ask("planned_runs", performed)) == before
+
+
+@pytest.fixture(scope="module")
+def also_priced(performed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
+    """A copy of the workspace, in which the robot was watched while it carried "reach" out, and what priced "laden"."""
+    workspace = tmp_path_factory.mktemp("watched") / "w"
+    shutil.copytree(performed, workspace)
+    log = performed.parent / "logs_2" / "runs" / "done.parquet"
+    live = ("live", "--replay", log, "--robot", "arm_2", "--speed", 1000, "--workspace", workspace)
+    for plan, said in (("reech", 'no planned run "reech"; the nearest is "reach"'), ("done", 'no planned run "done"')):
+        assert said in refused(irtwin(*live, "--performs", plan))
+    ended = irtwin(*live, "--performs", "reach")
+    assert ended.status == 0, ended.err
+    reach = performed.parent / "reach.parquet"
+    priced = irtwin("predict", "arm_2", reach, "--workspace", workspace, "--run", "laden", "--payload-mass", 2)
+    return workspace, priced
+
+
+@pytest.fixture(scope="module")
+def watched(also_priced: tuple[Path, Said]) -> Path:
+    return also_priced[0]
+
+
+def test_a_motion_from_a_file_is_kept_as_well(also_priced: tuple[Path, Said]) -> None:
+    workspace, priced = also_priced
+    assert priced.status == 0, priced.err
+    assert priced.out.startswith('planned run "laden" of arm_2: energy ')
+    rows = {row["run"]: row for row in asking.ask("planned_runs", workspace)}
+    assert rows["laden"]["payload_kg"] == 2.0
+    assert f"{rows['laden']['energy_J']:.4g}" in priced.out
+
+
+def test_a_live_run_is_held_against_the_plan_that_it_carried_out(watched: Path) -> None:
+    pairs = list(asking.ask("planned_against_measured", watched))
+    live, done = sorted(pairs, key=lambda row: row["run"] == "done")
+    assert (live["plan"], live["run"][:5], done["run"]) == ("reach", "live_", "done")
+    assert live["measured_J"] == pytest.approx(done["measured_J"], rel=0.01)
+    page = (watched / "reports" / "arm_2.html").read_text(encoding="utf-8")
+    assert page.count("<small>planned as reach</small>") == 2
+
+
+def test_a_live_run_outlasts_the_plan_of_an_earlier_data_set(watched: Path, tmp_path: Path) -> None:
+    shutil.copytree(watched, tmp_path / "w")
+    with Workspace(tmp_path / "w") as place:
+        with place.engine.begin() as connection:
+            later = sqlalchemy.update(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)
+            connection.execute(later.values(performs="arm_2.later"))
+        with staged(place, "arm_2") as apart:
+            ingest(apart, read_data_set(write(tmp_path / "logs", recorded())))
+        with place.reading() as session:
+            runs = {run.name: run for run in session.scalars(select(schema.Run))}
+    assert "later" not in runs
+    assert [run.performs for name, run in runs.items() if name.startswith("live_")] == [None]
+
+
+def test_one_run_is_dropped_and_the_others_stay(watched: Path) -> None:
+    here = ("drop", "arm_2", "--workspace", watched, "--run")
+    (live,) = (row["run"] for row in asking.ask("planned_against_measured", watched) if row["run"] != "done")
+    for name, said in (
+        ("done", "stands in the robot's data set; take it out there and run that again"),
+        ("later", "stands in the robot's data set"),
+        ("reach", 'carried out "reach"'),
+        ("rech", 'the robot has no run "rech"; the nearest is "reach"'),
+    ):
+        assert said in refused(irtwin(*here, name))
+    before, files = told(watched), len(list((watched / "series").iterdir()))
+    for name in ("laden", live):
+        gone = irtwin(*here, name)
+        assert (gone.status, gone.out, gone.err) == (0, "", "")
+    after = told(watched)
+    assert not {triple for triple in after if "laden" in triple or live in triple}
+    assert {one for one in before if "laden" not in one and live not in one} == after
+    assert len(list((watched / "series").iterdir())) == files - 3  # the motion of "laden" is that of "reach"
+    with Workspace(watched) as place, place.reading() as session:
+        assert {run.name for run in session.scalars(select(schema.Run))} >= {"reach", "later", "done", "swing_1"}
+        for table in schema.Base.metadata.sorted_tables:
+            assert not [row for row in session.execute(select(table)) if "laden" in str(row) or live in str(row)]
+    assert "laden" not in (watched / "reports" / "arm_2.html").read_text(encoding="utf-8")
+
+
+def told(workspace: Path) -> set[str]:
+    """What the graph says of runs, with the graph that says it: from rows of the database, not of sums."""
+    query = """SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } FILTER(CONTAINS(STR(?s), "/id/run/"))
+        FILTER(REGEX(STR(?g), "/graph/(source|activity)/")) }"""
+    return {" ".join(map(str, row.values())) for row in asking.ask(query, workspace)}
 
 
 def test_a_robot_without_a_twin_prices_nothing(tmp_path: Path) -> None:

@@ -133,6 +133,7 @@ def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
     [
         (["--robot", "arm"], "--robot goes with --replay or --rtde"),
         (["--speed", "2"], "--speed is for --replay"),
+        (["--performs", "reach"], "--performs goes with --replay or --rtde; lines of a stream say it by themselves"),
         (["--replay", "log.csv"], "--robot goes with --replay or --rtde"),
         (["--replay", "log.csv", "--robot", "arm", "--port", "0"], "Give one of --port, --replay and --rtde"),
         (["--replay", "log.csv", "--robot", "arm", "--speed", "0"], "0.01<=x<=1000.0"),

@@ -14,7 +14,7 @@ from irtwin.providers.records import check_run_name, find_robot, keep_run, load_
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
-from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, sound, write_report
+from irtwin.workflow import conclude, map_rows, populate_apart, populate_others, rewriting, sound, write_report
 
 Announce = Callable[[str], None]
 
@@ -72,6 +72,7 @@ def improve(
                 improved = improve_twin(apart, robot_id, [run.name for run in runs], limit, announce)
                 populate_apart(apart, announce)
             map_rows(place, graph)
+            populate_others(place, graph, announce)  # live runs by the new twin
             conclude(graph, announce)
             report = write_report(place, graph, robot_id)
             following = next_experiment(place, graph, robot_id)

@@ -5,11 +5,9 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
-from csv import writer
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
@@ -25,6 +23,7 @@ from irtwin.robot.collision import CollisionModel
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, columns_of
 from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.csv_text import csv_text
 from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled
@@ -175,13 +174,9 @@ def write_plan(made: Plan, out: Path) -> None:
 
 
 def _as_log(motion: Motion, joints: Sequence[str], *, csv: bool) -> bytes:
-    columns = columns_of(Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq), joints)
+    signals = Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq)
     if csv:
-        text = io.StringIO()
-        lines = writer(text, lineterminator="\n")
-        lines.writerow(columns)
-        lines.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(list(columns.values())))
-        return text.getvalue().encode()
+        return csv_text(signals, joints).encode()
     buffer = io.BytesIO()
-    pa.parquet.write_table(pa.table(columns), buffer)
+    pa.parquet.write_table(pa.table(columns_of(signals, joints)), buffer)
     return buffer.getvalue()

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sqlalchemy import select
+
+from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
+from irtwin.gap.diagnosis import Diagnosis
+from irtwin.gap.document.document import Document
+from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.identification.excitation import excite
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.modelling import expect
+from irtwin.planning.admission import check_motion
+from irtwin.planning.plan import nominal_twin
 from irtwin.providers.records import load_robot, load_twin
 from irtwin.robot.collision import CollisionModel
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import Signals
+from irtwin.signals.csv_text import csv_text
+from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import write
+from irtwin.storage.gap_schema import GapDiagnosis
 
 FOLDER = "next_experiment"
 _SECONDS = 20.0
@@ -31,8 +46,8 @@ class NextExperiment:
 def next_experiment(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> NextExperiment | None:
     """Write what to log next of a robot that the rules say is to be identified again; None of any other.
 
-    The words are those of its diagnosis where one proposed an experiment. The motion excites every base parameter
-    within the robot's limits.
+    Where its diagnosis proposed an experiment, the words are its, and the motion is that of its programme; none where
+    that is done by hand. Else the motion excites every base parameter within the robot's limits.
     """
     robot = load_robot(place, robot_id)
     missed = [row for row in ask(graph, "to_reidentify") if row["robot"] == robot.name]
@@ -53,21 +68,114 @@ def next_experiment(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> N
         if row["robot"] == robot.name and row["experiment"]
     ]
     folder.mkdir(exist_ok=True)
-    try:
-        excite(robot, _SECONDS, iterations=_ITERATIONS).write_csv(motion)
-    except InputError as error:
-        motion.unlink(missing_ok=True)
-        words.append(
-            f"No motion could be designed ({error}). Move all joints, slowly and fast, over their whole range."
-        )
-    else:
-        itself = "" if CollisionModel(robot).checks_itself else "; whether it meets itself was not checked"
-        words.append(
-            f"Play {motion} on the robot, {_SECONDS:g} s from rest to rest within its limits. Check the way first: "
-            f"nothing is known of what stands about it{itself}."
-        )
+    words += _designed(place, robot_id, motion) or _exciting(robot, motion)
     power = "" if load_twin(place, robot_id)[1].knows_power else "; without power nothing can be judged"
     words.append(f"Log positions, torque or motor currents, and power{power}.")
     words.append(f'Then: irtwin improve "{robot.name}" LOG --workspace {place.folder}')
     write(text, "".join(f"{line}\n" for line in words).encode())
     return NextExperiment(tuple(words), text, motion if motion.exists() else None)
+
+
+def save_motion(found: Diagnosis, out: Path) -> str:
+    """Write the motion of a diagnosis' next experiment as CSV; say what to do with it, or why there is none.
+
+    Raises InputError where the file cannot be written.
+    """
+    proposed, motion = found.experiment, found.planned
+    if proposed is None or proposed.programme is None or motion is None:
+        return f"{out} was not written: {_by_hand(proposed)}"
+    twin = found.twin or nominal_twin(found.description)
+    collisions = CollisionModel(twin.robot)
+    try:
+        for mass in sorted(set(proposed.programme.payload_mass)):
+            com = proposed.programme.payload_com or (0.0, 0.0, 0.0)
+            check_motion(twin, replace(motion, payload_mass=mass, payload_com=com), collisions, out)
+    except InputError as error:
+        return f"The motion of the next experiment was not written, as the robot cannot make it: {error}"
+    write(out, _csv(motion, twin.robot).encode())
+    return " ".join(_how_to_play(proposed.programme, out, collisions.checks_itself))
+
+
+def motion_text(found: Diagnosis) -> str | None:
+    """Return the motion of a diagnosis' next experiment as CSV, None where there is none."""
+    return None if found.planned is None else _csv(found.planned, found.description)
+
+
+def _csv(motion: Motion, robot: Robot) -> str:
+    return csv_text(Signals(motion.time - motion.time[0], motion.q, dq=motion.dq, ddq=motion.ddq), robot.joint_names)
+
+
+def _designed(place: Workspace, robot_id: str, out: Path) -> list[str]:
+    """Write the motion of the diagnosis' programme; return how to play it. Nothing where no diagnosis designed any."""
+    with place.reading() as session:
+        of_robot = select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id)
+        found = session.scalars(of_robot).one_or_none()
+    if found is None:
+        return []
+    proposed = Document.from_json(json.loads(place.read_document(found.file, found.sha256))).next_experiment
+    if proposed is None:
+        return []
+    if proposed.programme is None or found.motion_file is None or found.motion_sha256 is None:
+        out.unlink(missing_ok=True)
+        return [f"No motion is written: {_by_hand(proposed)}."]
+    twin = load_twin(place, robot_id)[1]
+    write(out, place.read_document(found.motion_file, found.motion_sha256))
+    try:
+        for mass in sorted(set(proposed.programme.payload_mass)):
+            com = proposed.programme.payload_com or (0.0, 0.0, 0.0)
+            checked = expect(twin, out, payload_mass=mass, payload_com=com)
+    except InputError as error:
+        return [f"The robot cannot make the motion of that ({error}).", *_exciting(twin.robot, out)]
+    return _how_to_play(proposed.programme, out, checked.checks_itself)
+
+
+def _by_hand(proposed: Experiment | None) -> str:
+    if proposed is None:
+        return "the diagnosis proposes no experiment"
+    tests = "; ".join(proposed.motions)
+    return f"it is done by hand ({tests})" if tests else f"no motion helps ({proposed.note or proposed.purpose})"
+
+
+def _how_to_play(programme: Programme, motion: Path, checks_itself: bool) -> list[str]:
+    """Say how a programme's motion is played, run by run."""
+    seconds = programme.seconds / len(programme.payload_mass)
+    off = [catalogue()[name].taken_off for name in programme.taken_off]
+    runs = [_of_run(programme, number) for number in range(len(programme.payload_mass))]
+    words = [_play(motion, f"{seconds:.3g}", checks_itself)]
+    if off:
+        words.append(f"Play it {', '.join(filter(None, off))}.")
+    if any(runs):
+        words.append(f"Play it {len(runs)} times, each a log of its own: {'; '.join(runs)}.")
+    return words
+
+
+def _of_run(programme: Programme, number: int) -> str:
+    """Say what is different in one of a programme's runs; nothing where nothing is."""
+    said = []
+    if any(programme.payload_mass):
+        mass, com = programme.payload_mass[number], programme.payload_com or (0.0, 0.0, 0.0)
+        at = " ".join(f"{value:g}" for value in com)
+        load = f"with {mass:g} kg at the flange, as the controller is told (--payload-mass {mass:g} --payload-com {at})"
+        said.append(load if mass else "without load")
+    if programme.temperatures:
+        state = "cold" if number == 0 else f"warm, after {programme.set_up_seconds / 60:g} minutes of work"
+        said.append(f"{state}, joints at some {programme.temperatures[number]:g} degC, their temperatures logged")
+    return ", ".join(said)
+
+
+def _exciting(robot: Robot, motion: Path) -> list[str]:
+    """Write a motion that excites every base parameter; return how to play it, or what to do where there is none."""
+    try:
+        excite(robot, _SECONDS, iterations=_ITERATIONS).write_csv(motion)
+    except InputError as error:
+        motion.unlink(missing_ok=True)
+        return [f"No motion could be designed ({error}). Move all joints, slowly and fast, over their whole range."]
+    return [_play(motion, f"{_SECONDS:g}", CollisionModel(robot).checks_itself)]
+
+
+def _play(motion: Path, seconds: str, checks_itself: bool) -> str:
+    itself = "" if checks_itself else "; whether it meets itself was not checked"
+    return (
+        f"Play {motion} on the robot, {seconds} s from rest to rest within its limits. Check the way first: "
+        f"nothing is known of what stands about it{itself}."
+    )

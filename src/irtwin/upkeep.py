@@ -1,4 +1,4 @@
-"""A workspace kept in order: a robot taken out, a damaged graph made anew."""
+"""A workspace kept in order: a robot or a run taken out, a damaged graph made anew."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pyoxigraph import Quad
+from sqlalchemy import select
 
 from irtwin.asking import WORKSPACE
 from irtwin.errors import InputError
@@ -18,14 +19,14 @@ from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
 from irtwin.next_experiment import FOLDER
-from irtwin.providers.records import find_robot
+from irtwin.providers.records import find_robot, find_run, run_iri
 from irtwin.storage import files
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import left_behind, of_robot
 from irtwin.storage.rows import named_files
-from irtwin.storage.schema import LIVE
+from irtwin.storage.schema import LIVE, LIVE_RUN, MEASURED_RUN, Run
 from irtwin.storage.series import is_whole
-from irtwin.workflow import Announce, conclude, map_rows, populate_others, rewriting
+from irtwin.workflow import Announce, conclude, map_rows, populate_others, rewriting, write_report
 
 _DAMAGED = "graph.damaged"
 
@@ -55,6 +56,65 @@ def drop(
         map_rows(place, graph)
         reason(graph)
         validate(graph)  # what was wrong with it goes too
+
+
+def drop_run(
+    robot: str,
+    run: str,
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+) -> None:
+    """Forget a plan that was kept, or a live run, of a robot: rows, series, and all that the graph says of it.
+
+    The robot's report is written anew. Raises InputError where there is no such run or it is watched just now, where it
+    stands in a data set or the twin was judged by it, or another run carried it out.
+    """
+    with (
+        Workspace.existing(Path(workspace), database) as place,
+        rewriting(place, graph_url) as graph,
+    ):
+        robot_id = find_robot(place, robot)
+        _drop_run(place, robot_id, run)
+        graph.load_ontology()
+        map_rows(place, graph)
+        reason(graph)
+        validate(graph)
+        if place.report_path(robot_id).exists():
+            write_report(place, graph, robot_id)
+
+
+def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
+    journals = {journal.stem: journal for journal in of_robot(place.folder / LIVE, robot_id)}
+    journal = journals.get(name) or journals.get(f"{robot_id}.{name}")
+    if journal is not None:
+        if journal not in left_behind(place.folder / LIVE):
+            raise InputError(f'{place.folder}: "{name}" is being watched; stop `irtwin live` first')
+        place.mapped_rows.unlink(missing_ok=True)  # the graph may show what no row ever said
+        run_id = journal.stem
+    else:
+        found = find_run(place, robot_id, name)
+        _check_that_it_may_go(place, found)
+        run_id = found.run_id
+    place.drop_run(run_id, run_iri(run_id))
+    if journal is not None:
+        journal.unlink()
+
+
+def _check_that_it_may_go(place: Workspace, run: Run) -> None:
+    if run.role is not None:
+        raise InputError(
+            f'{place.folder}: "{run.name}" stands in the robot\'s data set; take it out there and run that again'
+        )
+    if run.kind == MEASURED_RUN:
+        raise InputError(f'{place.folder}: the twin was bettered or judged by "{run.name}"; it goes with its robot')
+    with place.reading() as session:
+        done = session.scalars(select(Run).where(Run.performs == run.run_id)).first()
+    if done is not None:
+        of_data_set = "take its `performs` out of the data set first"
+        first = "remove that one first" if done.kind == LIVE_RUN else of_data_set if done.role else "both stay"
+        raise InputError(f'{place.folder}: the run "{done.name}" carried out "{run.name}"; {first}')
 
 
 def repair(

@@ -27,7 +27,7 @@ from irtwin.knowledge.store.backup import backup as keep
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
 from irtwin.knowledge.vocabulary import shorten
-from irtwin.next_experiment import next_experiment
+from irtwin.next_experiment import motion_text, next_experiment, save_motion
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.mesh_files import meshes_of_graph
@@ -91,17 +91,19 @@ def diagnose(
     json_file: Path | None = None,
     report: Path | None = None,
     twin_file: Path | None = None,
+    motion_file: Path | None = None,
     announce: Announce = lambda line: None,
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
     `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
     kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
-    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added.
+    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
+    motion of the next experiment, where one is designed.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
-    for file in filter(None, (json_file, report, twin_file)):
+    for file in filter(None, (json_file, report, twin_file, motion_file)):
         check_place(file)
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
@@ -110,6 +112,8 @@ def diagnose(
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
         write(twin_file, to_json(found.twin).encode())
+    if motion_file is not None:
+        announce(f"  {save_motion(found, motion_file)}")
     if report is not None:
         announce("Writing the report")
         render_alone(data_set, found.document, found.curves, report)
@@ -121,7 +125,7 @@ def diagnose(
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
-                record(apart, robot_id, found.document, found.curves, twin)
+                record(apart, robot_id, found.document, found.curves, twin, motion_text(found))
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)
@@ -139,6 +143,7 @@ def adopt(
             populate_apart(apart, lambda line: None)
         graph.load_ontology()
         map_rows(place, graph)
+        populate_others(place, graph, lambda line: None)  # live runs by the new twin
         reason(graph)
         next_experiment(place, graph, robot_id)
         return write_report(place, graph, robot_id)

@@ -101,11 +101,14 @@ def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
 def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_path):
     out, twin, page, workspace = (tmp_path / name for name in ("out.json", "twin.json", "out.html", "workspace"))
     options = ["--json", out, "--save-twin", twin, "--report", page, "--withhold", "viscous_friction"]
+    options += ["--save-motion", tmp_path / "next.csv"]
     done = irtwin("diagnose", small_data_set, *options, "--workspace", workspace)
     assert done.returncode == 0, done.stderr
     found = json.loads(out.read_text())
     assert "viscous_friction" in {cause["effect"] for cause in found["causes"]}
     assert "viscous" in page.read_text()
+    assert ("Play it" in done.stderr or f"Play {tmp_path}/next.csv" in done.stderr) == (tmp_path / "next.csv").exists()
+    assert "next.csv" in done.stderr
     predicted = tmp_path / "predicted.parquet"
     run = small_data_set / "runs/exciting_3.parquet"
     assert irtwin("predict", twin, run, "--out", predicted).returncode == 0

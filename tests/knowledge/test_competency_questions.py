@@ -105,7 +105,8 @@ def test_a_total_is_what_the_runs_come_to(graph: KnowledgeGraph, total: str) -> 
           OPTIONAL {{ ?run irt:Idle_Share ?idle }}
           OPTIONAL {{ ?run irt:Energy_Consumption ?energy ; irt:Modelled_Energy ?modelled ;
                        irt:Standby_Energy ?standby ; irt:Returned_Energy ?returned }}
-          {"FILTER(BOUND(?energy))" if "Total" in total and "Run_Time" not in total else ""}
+          {"FILTER(BOUND(?idle))" if total == "irt:Total_Idle_Time" else ""}
+          {"FILTER(BOUND(?energy))" if "Total" in total and "Time" not in total else ""}
         }} GROUP BY ?arm"""
     )
     kept = graph.query(f"SELECT ?arm ?value {{ ?total a irt:Robot_Total ; irt:total_of ?arm ; {total} ?value }}")

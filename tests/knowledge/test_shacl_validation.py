@@ -37,8 +37,16 @@ def test_two_robots_keep_every_constraint(graph: KnowledgeGraph) -> None:
 @pytest.mark.parametrize(
     ("subject", "name", "value", "message"),
     [
-        (RUN, "Run_Time", Literal(0.0), "a run lasts longer than 0 s (irt:Run_Time is 0"),
-        (RUN, "Run_Time", None, "a run lasts longer than 0 s (irt:Run_Time is absent)"),
+        (RUN, "Run_Time", Literal(0.0), "a run that is not watched has several samples and lasts longer than 0 s"),
+        (RUN, "Run_Time", Literal(-1.0), "a run lasts 0 s or longer (irt:Run_Time is -1"),
+        (RUN, "Run_Time", None, "a run lasts 0 s or longer (irt:Run_Time is absent)"),
+        (
+            RUN,
+            "Sample_Count",
+            Literal(1),
+            "a run that is not watched has several samples and lasts longer than 0 s",
+        ),
+        (RUN, "Sample_Rate", Literal(0.0), "a run's sample rate, if it has one, is above 0 Hz (irt:Sample_Rate is 0"),
         (RUN, "run_of", None, "a run is of one robot (irt:run_of is absent)"),
         (RUN, "run_of", NamedNode(JOINT), "a run is of one robot"),
         (RUN, "Energy_Consumption", Literal(float("nan")), "a run's energy consumption is one finite number"),

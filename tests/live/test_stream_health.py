@@ -51,6 +51,15 @@ def test_without_good_states_it_is_stale_once(
     assert health.said() == {"stream_state": "flowing"}
 
 
+def test_good_states_with_frozen_values_are_stale_once(clock: list[float]) -> None:
+    health = fed(clock)
+    health.good("every value is the same")
+    assert health.look() and not health.look()
+    assert health.said()["stale_reason"] == "every value is the same"
+    health.good()
+    assert health.said() == {"stream_state": "flowing"}
+
+
 def test_a_leap_is_told(clock: list[float]) -> None:
     health = fed(clock)
     health.leaps(-300.0)

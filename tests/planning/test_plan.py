@@ -148,6 +148,25 @@ def test_least_energy_costs_no_more_than_the_slowed_motion(folder):
     assert (np.abs(least.motion.dq) <= 3.0).all()
 
 
+def test_least_energy_along_a_line_changes_its_timing_alone():
+    twin, start = twin_of(SIX), np.array([0.0, 0.6, 1.2, 0.0, 0.7, 0.0])
+    goal = flange_placement(SIX, start)
+    goal.translation = goal.translation + np.array([0.05, 0.2, -0.1])
+    task = Task(start, Pose(tuple(goal.translation), tuple(pin.rpy.matrixToRpy(goal.rotation))), line=True, seconds=1.0)
+    slowed, least = plan(twin, task), plan(twin, replace(task, least_energy=True))
+    assert least.price.energy.value < 0.999 * slowed.price.energy.value
+    assert least.seconds == pytest.approx(slowed.seconds)
+    places = np.array([flange_placement(twin.robot, q).translation for q in least.motion.q])
+    along = (goal.translation - places[0]) / np.linalg.norm(goal.translation - places[0])
+    way = (places - places[0]) @ along
+    assert np.linalg.norm(places - places[0] - np.outer(way, along), axis=1).max() < 1e-4
+    assert (np.diff(way) > -1e-9).all()
+    limits = MotionLimits.of(twin.robot)
+    for state, limit in ((least.motion.dq, limits.speed), (least.motion.ddq, limits.acceleration)):
+        assert np.abs(state[[0, -1]]).max() < 1e-9
+        assert (np.abs(state) <= limit).all()
+
+
 def test_what_is_not_known_is_not_shown(folder):
     said = irtwin("plan", folder / "no_power.json", *ENDS, "--out", folder / "p.csv")
     assert "energy and power are not known" in said.out

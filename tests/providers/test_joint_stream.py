@@ -41,7 +41,7 @@ def test_a_robot_is_said_by_its_name_or_its_identifier(said: str) -> None:
 def test_what_is_not_said_is_nan() -> None:
     state = READER.read(line())
     assert all(map(math.isnan, [*state.of("dq"), *state.of("torque"), *state.of("temperature"), *state.of("power")]))
-    assert state.payload is None
+    assert (state.payload, state.performs) == (None, None)
 
 
 def test_values_follow_the_names() -> None:
@@ -53,6 +53,7 @@ def test_values_follow_the_names() -> None:
     ("said", "message"),
     [
         (b"{", "not JSON"),
+        (line(performs=7), "`performs` is not the name of a planned run"),
         (b"POST /robot HTTP/1.1\r\n", "an HTTP request, which a web page may have sent"),
         (b"\xff\xfe", "not JSON"),
         (b"[" * 60_000, "not JSON"),

@@ -19,13 +19,16 @@ from tests import rows
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
+from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.live import live_twin as live
 from irtwin.live.joint_stream import State
+from irtwin.live.live_run import columns, journal_rows
 from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run
+from irtwin.storage.journal import Header, Journal
+from irtwin.storage.schema import LIVE, PLANNED_RUN, Run
 
 pytestmark = pytest.mark.slow
 
@@ -129,6 +132,48 @@ def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: Knowledg
     energy = graph.query(f"SELECT (series:integral(id:run\\/{run.run_id}, 'power', 0, 10) AS ?e) {{}}")
     assert energy[0]["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
     assert not list((place.folder / "live").iterdir())
+
+
+def test_a_run_of_one_sample_breaks_no_shape(place: Workspace, graph: KnowledgeGraph) -> None:
+    with LiveTwin(place, graph) as twin:
+        twin.receive(state(0))
+        wait_for(lambda: graph.query(NOW))
+        while_it_lasts = validate(graph)
+    run = live_run(place)
+    assert (run.run_time_s, run.sample_count, run.sample_rate_hz) == (0.0, 1, None)
+    assert quads(graph) == mapped(place)
+    for violations in (while_it_lasts, validate(graph)):
+        assert [one for one in violations if one.node.endswith(f"/run/{run.run_id}")] == []
+    assert not graph.query("ASK { ?run a irt:Live_Run ; irt:Sample_Rate|irt:Energy_Consumption ?any }")[0]["answer"]
+
+
+def test_a_run_names_the_plan_that_it_carries_out(place: Workspace, graph: KnowledgeGraph) -> None:
+    place.keep_run(rows.run("reach", kind=PLANNED_RUN, role=None), rows.samples(3))
+    place.ingest(rows.robot(robot_id="Other"), [], [], {})
+    theirs = rows.run("lift", run_id="Other.lift", robot_id="Other", kind=PLANNED_RUN, role=None)
+    place.keep_run(theirs, rows.samples(4))
+    with LiveTwin(place, graph) as twin:
+        for plan, said in (("lift", '"lift"; the nearest is "reach"'), ("work", 'no planned run "work"')):
+            with pytest.raises(InputError, match=said):
+                twin.receive(dataclasses.replace(state(0), performs=plan))
+        twin.receive(dataclasses.replace(state(0), performs="reach"))
+        for number in range(1, 5):
+            twin.receive(state(number))
+        wait_for(lambda: graph.query("SELECT ?plan { ?run a irt:Live_Run ; irt:performs / irt:Run_Name ?plan }"))
+    assert live_run(place).performs == f"{rows.ROBOT}.reach"
+    assert quads(graph) == mapped(place)
+
+
+def test_a_run_of_a_crash_outlasts_its_plan(place: Workspace, graph: KnowledgeGraph) -> None:
+    header = Header(f"{rows.ROBOT}.live_1", rows.ROBOT, 0.0, columns(["joint_a1", "joint_a2"]), performs="gone")
+    journal = Journal(place.folder / LIVE, header)
+    journal.append(journal_rows([state(number) for number in range(5)]))
+    journal.close()
+    said: list[str] = []
+    with LiveTwin(place, graph, said.append):
+        pass
+    assert f"{header.run_id}: its plan gone is no more; kept without" in said
+    assert (live_run(place).performs, live_run(place).sample_count) == (None, 5)
 
 
 def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: KnowledgeGraph) -> None:
@@ -298,6 +343,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from tests.providers.test_live import state
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.live.live_run import columns, journal_rows
 from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 

@@ -6,6 +6,7 @@ import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -217,5 +218,17 @@ def test_a_stream_that_stops_is_marked_and_its_last_state_kept(
         assert row["why"].startswith("no state came for")
         twin.receive(said[100])
         wait_for(lambda: not graph.query(stale))
+        monkeypatch.setattr("irtwin.live.stream_health.STALE", 60.0)
+        step = said[1].time - said[0].time
+        q, _, *others = said[100].values
+        for number in range(1, 401):  # times go on, values do not, though a speed is said
+            twin.receive(State("arm", said[100].time + number * step, (q, (0.5, 0.5), *others)))
+        wait_for(lambda: graph.query(stale))
+        assert graph.query(stale)[0]["why"].endswith("though the speed that is said is not zero")
+        twin.receive(replace(said[101], time=said[100].time + 401 * step))
+        wait_for(lambda: not graph.query(stale))
+    assert twin.stored == 101 + 400 + 1
     assert lines[0].startswith("arm: stale: no state came for")
-    assert lines[1] == "arm: the stream flows again"
+    assert lines[2].startswith("arm: stale: every value has been the same for 3 s")
+    assert lines[2].endswith("; its states are stored")
+    assert lines[1] == lines[3] == "arm: the stream flows again"

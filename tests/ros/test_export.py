@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from tests import mesh_robots
 from tests.data_sets import irtwin
 from tests.endpoint import make_graph
+from tests.mesh_robots import HAND, SLIDE
 from tests.synthetic import arm, as_run, measure, swing
 from tests.virtual.scene_data import kr6
 
@@ -51,6 +54,31 @@ def test_the_package_of_the_graph_is_that_of_the_urdf(workspace: Path, tmp_path:
     said = irtwin("robot", "ros", KR6, "--out", tmp_path / "command")
     assert (said.status, said.err) == (0, "")
     assert files(tmp_path / "graph") == files(tmp_path / "command")
+
+
+def test_meshes_of_the_workspace_go_along(tmp_path: Path) -> None:
+    with Workspace(tmp_path / "w") as place:
+        ingest(place, mesh_robots.write(tmp_path / "data"))
+        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+        with KnowledgeGraph(place.graph_folder) as graph:
+            graph.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    out = tmp_path / "package"
+    said = irtwin("export", "--ros", out, "--workspace", tmp_path / "w")
+    assert said.status == 0, said.err
+    assert (out / "meshes" / "slide.stl").read_bytes() == (tmp_path / "data" / "urdf" / SLIDE).read_bytes()
+    assert (out / "meshes" / "arm.dae").read_bytes() == (tmp_path / "data" / "parts" / "arm.dae").read_bytes()
+    urdf = (out / "urdf" / "Meshed.urdf").read_text()
+    named = [mesh.get("filename") for mesh in ElementTree.fromstring(urdf).iter("mesh")]
+    assert named == [f"package://meshed_description/meshes/{file}" for file in ("slide.stl", "arm.dae")] + [HAND]
+    assert 'scale="0.001 0.001 0.001"' in urdf
+    assert "its meshes are of the ROS package parts, which has to be installed" in said.err  # the one that is missing
+    assert "ROS finds no mesh" not in said.err
+    assert (out / "CMakeLists.txt").read_text().count("DIRECTORY config launch meshes rviz urdf ") == 2
+    next((tmp_path / "w" / "meshes").glob("*.stl")).unlink()
+    said = irtwin("export", "--ros", tmp_path / "again", "--workspace", tmp_path / "w")
+    assert said.status == 2
+    assert "cannot be read" in said.err and said.err.count("\n") == 1
+    assert not (tmp_path / "again").exists()
 
 
 def test_the_only_robot_need_not_be_named(workspace: Path, tmp_path: Path) -> None:

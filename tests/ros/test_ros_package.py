@@ -15,8 +15,10 @@ from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 
+import pinocchio
 import pytest
 from hypothesis import given, settings
+from tests import mesh_robots
 from tests.fuzz.drawn_robots import RobotPlan, robots, urdf
 from tests.providers.test_robot_of_graph import BRANCHED
 from tests.ros.test_description import ODD
@@ -64,6 +66,14 @@ def test_every_file_that_a_file_names_is_there(package: Path) -> None:
     assert all((package / place).is_file() for place in places)
 
 
+def test_meshes_of_one_name_lie_apart(tmp_path: Path) -> None:
+    meshes = {"a/arm.stl": b"1", "package://b/Arm.STL": b"2", "päckchen 1.dae": b"3", "p_ckchen_1.dae": b"4"}
+    write_package(mesh_robots.robot(), tmp_path / "p", meshes)
+    files = [file.name for file in (tmp_path / "p" / "meshes").iterdir()]
+    assert len({name.lower() for name in files}) == len(files) == 4
+    assert all(re.fullmatch(r"[A-Za-z0-9_]+\.(stl|dae)", name) for name in files)
+
+
 def test_its_manifest_serves_both(package: Path) -> None:
     manifest = xml(package / "package.xml")
     assert manifest.findtext("name") == NAME
@@ -92,6 +102,25 @@ def test_moveit_finds_group_home_and_pairs(package: Path) -> None:
     assert pairs["link_1", "link_2"] == "Adjacent"
     assert pairs["base_link", "link_2"] == "Never"
     assert ("base_link", "link_5") not in pairs
+
+
+def test_another_reader_of_srdf_finds_each_name_in_the_urdf(package: Path) -> None:
+    urdf, srdf = (str(package / name) for name in ("urdf/KUKA_KR6_R700.urdf", "config/KUKA_KR6_R700.srdf"))
+    model = pinocchio.buildModelFromUrdf(urdf)
+    bodies = pinocchio.buildGeomFromUrdf(model, urdf, pinocchio.GeometryType.COLLISION)
+    bodies.addAllCollisionPairs()
+    pinocchio.loadReferenceConfigurations(model, srdf, False)
+    assert [entry.key() for entry in model.referenceConfigurations] == ["home"]
+    home = model.referenceConfigurations["home"]
+    assert ((model.lowerPositionLimit <= home) & (home <= model.upperPositionLimit)).all()
+    before = len(bodies.collisionPairs)
+    pinocchio.removeCollisionPairs(model, bodies, srdf, False)
+    listed = [pair.attrib for pair in xml(package / "config" / "KUKA_KR6_R700.srdf").iter("disable_collisions")]
+    links = {frame.name for frame in model.frames if frame.type == pinocchio.FrameType.BODY}
+    assert {pair[end] for pair in listed for end in ("link1", "link2")} <= links
+    assert 0 < len(bodies.collisionPairs) < before
+    data = pinocchio.GeometryData(bodies)
+    assert not pinocchio.computeCollisions(model, model.createData(), bodies, data, home, False)
 
 
 def test_limits_of_acceleration_are_those_that_plans_keep_to(tmp_path: Path) -> None:

@@ -126,6 +126,24 @@ def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path], start, 
             CLIENT.get(running.url)
 
 
+@pytest.mark.slow
+def test_clients_that_hang_are_broken_off_in_one_line(new_graph: Callable[[], Path], start) -> None:
+    with start(new_graph()) as running:
+        parts = urlsplit(running.url)
+        asked = ["GET /live/Arm_A/events HTTP/1.1\r\n"] * 2
+        asked += ["POST /sparql HTTP/1.1\r\nContent-Type: application/sparql-query\r\nContent-Length: 99\r\n"]
+        clients = [socket.create_connection((parts.hostname, parts.port)) for _ in asked]
+        for client, request in zip(clients, asked, strict=True):
+            client.sendall(f"{request}Host: {parts.netloc}\r\n\r\n".encode())
+        for page in clients[:2]:
+            assert b"text/event-stream" in page.recv(1000)
+        os.kill(running.process.pid, signal.SIGINT)
+        assert running.process.wait(timeout=30) == 0
+        assert running.process.stderr.read() == "ERROR:    broken off after 3 s: 1 of the answers under way\n"
+        for client in clients:
+            client.close()
+
+
 PATHS = ("/", "/sparql", "/sparql?query=ASK{}", "/sparql?query=rubbish", "/irtwin", "/assets/page.js", "/nowhere")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from irtwin.storage.journal import DamagedJournal, Header, Journal, of_robot, read_journal
 
-HEADER = Header("R.live_1", "R", 1.5, ("time", "q_a"))
+HEADER = Header("R.live_1", "R", 1.5, ("time", "q_a"), performs="R.plan")
 
 
 @pytest.fixture
@@ -35,6 +35,7 @@ def test_it_comes_back(path: Path) -> None:
         b'{"run_id": 1, "robot_id": "R", "payload_kg": 0, "columns": ["time"]}',
         b'{"run_id": "R.live_1", "robot_id": "R", "payload_kg": "x", "columns": ["time"]}',
         b'{"run_id": "R.live_1", "robot_id": "R", "payload_kg": 0, "columns": []}',
+        b'{"run_id": "R.live_1", "robot_id": "R", "payload_kg": 0, "columns": ["time"], "performs": 0}',
         b'{"run_id": "../R", "robot_id": "R", "payload_kg": 0, "columns": ["time"]}',
     ],
 )  # fmt: skip

@@ -12,7 +12,7 @@ from tests.storage.test_database import WORK, populate, state, workspace
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE, LIVE_RUN, Activity
+from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, Activity
 from irtwin.storage.staging import staged
 
 pytestmark = pytest.mark.slow
@@ -91,6 +91,28 @@ def test_other_robots_and_live_runs_stay(workspace: Workspace) -> None:
     assert workspace.read_series(f"{rows.ROBOT}.live_1").equals(rows.samples(8))
     assert workspace.read_series("Other.alone").equals(rows.samples(4))
     assert len(state(workspace)["joint"]) == 1  # type: ignore[arg-type]
+
+
+def test_what_a_twin_says_of_a_live_run_goes_with_the_twin_alone(workspace: Workspace) -> None:
+    populate(workspace)
+    live = rows.run("live_1", kind=LIVE_RUN, role=None)
+    workspace.keep_live_run(live, rows.samples(8), rows.activity("live.1", LIVE, "run"), [])
+    (energy,) = rows.run_energy("t1")
+    energy.run_id = live.run_id
+    workspace.replace_activity(
+        rows.activity("energy.live", "energy", "live run"), [], [energy], {live.run_id: rows.samples(9)}
+    )
+    before = state(workspace)
+    with staged(workspace, rows.ROBOT) as apart:
+        apart.keep_run(rows.run("plan", kind=PLANNED_RUN, role=None), rows.samples(3))
+    kept = state(workspace)
+    assert (kept["run_energy"], len(kept["run"])) == (before["run_energy"], len(before["run"]) + 1)
+    assert workspace.read_series(live.run_id, "modelled").equals(rows.samples(9))
+    robot, joints, runs, series = rows.data_set()
+    with staged(workspace, rows.ROBOT) as apart:
+        apart.ingest(robot, joints[:1], runs, series)
+    assert not state(workspace)["run_energy"]
+    assert workspace.read_series(live.run_id).equals(rows.samples(8))
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda file: file.write_bytes(b"PAR1")])

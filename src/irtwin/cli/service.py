@@ -45,6 +45,7 @@ def _announce(address: str) -> None:
 @click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
 @click.option("--robot", metavar="NAME", help="Whose log or controller it is.")
 @click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")
+@click.option("--performs", metavar="PLAN", help="Name of the planned run that the robot carries out.")
 def live(
     workspace: Path,
     database: str | None,
@@ -54,12 +55,14 @@ def live(
     rtde: str | None,
     robot: str | None,
     speed: float,
+    performs: str | None,
 ) -> None:
     """Watch robots: store their samples and keep the graph up to date, with power, energy, gap and alarms.
 
     Reads one JSON object per line from standard input. The fields are those of ROS' JointState: robot, time (s since
-    1970), position, velocity, effort, and optionally temperature, power and name. Ctrl-C stops; every sample that was
-    read is stored. While it runs, `irtwin serve` shows the robots at /live.
+    1970), position, velocity, effort, and optionally temperature, power and name; the first line may say in `performs`
+    which plan is carried out. Ctrl-C stops; every sample that was read is stored. While it runs, `irtwin serve` shows
+    the robots at /live.
     """
     from irtwin.live.watch import watch
 
@@ -69,6 +72,8 @@ def live(
         raise click.UsageError("--robot goes with --replay or --rtde: it says whose log or controller it is.")
     if speed != 1.0 and replay is None:
         raise click.UsageError("--speed is for --replay.")
+    if performs is not None and robot is None:
+        raise click.UsageError("--performs goes with --replay or --rtde; lines of a stream say it by themselves.")
     watch(
         workspace,
         database=database,
@@ -78,5 +83,6 @@ def live(
         rtde=rtde,
         robot=robot,
         speed=speed,
+        performs=performs,
         announce=say,
     )

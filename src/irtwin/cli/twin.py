@@ -109,6 +109,11 @@ def case_study(workspace: Path) -> None:
     type=click.Path(path_type=Path, dir_okay=False),
     help="JSON file to write the twin to, with the causes added.",
 )
+@click.option(
+    "--save-motion",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="CSV file to write the motion of the next experiment to.",
+)
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
@@ -120,6 +125,7 @@ def diagnose(
     out: Path,
     report: Path | None,
     save_twin: Path | None,
+    save_motion: Path | None,
     withhold: tuple[str, ...],
     seed: int,
     repair: bool,
@@ -145,6 +151,7 @@ def diagnose(
         json_file=out,
         report=report,
         twin_file=save_twin,
+        motion_file=save_motion,
         announce=say,
     )
     click.echo(line(found.document, found.against))

@@ -11,17 +11,22 @@ from irtwin.cli.options import database_option, graph_option, say, workspace_opt
 
 @click.command()
 @click.argument("robot")
+@click.option("--run", metavar="NAME", help="Remove this run alone: a plan that was kept, or a live run.")
 @workspace_option
 @database_option
 @graph_option
-def drop(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
+def drop(robot: str, run: str | None, workspace: Path, database: str | None, graph_url: str | None) -> None:
     """Remove a ROBOT from the workspace.
 
-    Its runs, twin, diagnosis, live runs and report are deleted, and everything that the graph says about it.
+    Its runs, twin, diagnosis, live runs and report are deleted, and everything that the graph says about it. With
+    --run, one of its runs goes, and the report is written anew. Runs of a data set stay.
     """
     from irtwin import upkeep
 
-    upkeep.drop(robot, workspace, database=database, graph_url=graph_url)
+    if run is None:
+        upkeep.drop(robot, workspace, database=database, graph_url=graph_url)
+    else:
+        upkeep.drop_run(robot, run, workspace, database=database, graph_url=graph_url)
 
 
 @click.command()

@@ -46,6 +46,7 @@ from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
+from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
 
 Progress = Callable[[str], None]
@@ -65,6 +66,7 @@ class Diagnosis:
     curves: Curves
     seed: int = 0
     experiment: Experiment | None = None
+    planned: Motion | None = None  # of the experiment's programme; each of its runs makes this motion
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
     against: str | None = None  # the role of the runs that the observed ones are held against
@@ -174,6 +176,7 @@ def diagnose(
         runs=tuple(sorted(case.observed)),
         seed=seed,
         experiment=None if proposal is None else proposal.experiment,
+        planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
         curves=drawn(left, located, None if proposal is None else proposal.curve),
         twin=closed_twin(case, causes),
         energies=energies,

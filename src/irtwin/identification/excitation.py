@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,7 +19,8 @@ from irtwin.identification.motion_limits import Box, JointLimits, Workspace
 from irtwin.identification.own_body import OwnBody
 from irtwin.identification.threads import one_blas_thread
 from irtwin.robot.description import Robot
-from irtwin.signals.channels import Signals, columns_of
+from irtwin.signals.channels import Signals
+from irtwin.signals.csv_text import csv_text
 
 Progress = Callable[[int, float, float], None]
 """Called with the iteration, the best condition number so far and the seconds since the start."""
@@ -63,13 +63,10 @@ class Excitation:
     def write_csv(self, path: Path) -> None:
         """Write columns time, q_J, dq_J, ddq_J (s, rad, rad/s, rad/s^2) for each joint J. Raises InputError."""
         time, q, dq, ddq = self.sample()
-        columns = columns_of(Signals(time, q, dq=dq, ddq=ddq), self.joint_names)
         part = path.with_name(path.name + ".part")
         try:
             with part.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(columns)
-                writer.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(list(columns.values())))
+                file.write(csv_text(Signals(time, q, dq=dq, ddq=ddq), self.joint_names))
             part.replace(path)
         except OSError as error:
             raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error

@@ -4,9 +4,9 @@
  "temperature": [...], "power": 512.0}
 
 `robot` is its name, or its identifier; `time` in s since 1970 UTC; rad, rad/s, N m, degC, W; positions are a must,
-the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg, and
-`payload_com`, [x, y, z] m in the frame of the flange, count where a run begins. The keys of values are those of the
-table of channels.
+the rest is not. Values are in the order of the robot's joints, base to flange, or in that of `name`. `payload`, kg,
+`payload_com`, [x, y, z] m in the frame of the flange, and `performs`, the name of the planned run that is carried out,
+count where a run begins. The keys of values are those of the table of channels.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class State:
     """A robot at one moment: `time` in s since 1970; `values` of each streamed channel, in the order of `STREAMED`.
 
     A channel has a value for each joint, or one; NaN for what was not said. payload kg and its centre of mass,
-    m in the frame of the flange; None where it was not said.
+    m in the frame of the flange; `performs` the name of the plan that it carries out; None where it was not said.
     """
 
     robot_id: str
@@ -47,6 +47,7 @@ class State:
     values: tuple[tuple[float, ...], ...]
     payload: float | None = None
     payload_com: tuple[float, float, float] | None = None
+    performs: str | None = None
 
     def of(self, field: str) -> tuple[float, ...]:
         """Return the values of a channel, by its field of `Signals`."""
@@ -93,7 +94,10 @@ class StateReader:
                 raise InputError(f"`{STREAMED[field].streamed}` is missing")
         payload = _number(said, "payload") if "payload" in said else None
         values = tuple([_values(said, channel, order) for channel in STREAMED.values()])
-        return State(robot, time, values, payload, _centre(said) if "payload_com" in said else None)
+        performs = said.get("performs")
+        if performs is not None and not isinstance(performs, str):
+            raise InputError("`performs` is not the name of a planned run")
+        return State(robot, time, values, payload, _centre(said) if "payload_com" in said else None, performs)
 
     @property
     def _known(self) -> str:

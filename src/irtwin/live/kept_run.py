@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from irtwin.errors import InputError
@@ -22,14 +23,17 @@ def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announ
     """Put a run into the database, unless it is there; return its rows.
 
     counts: what its live_state says beside. Its energy is worked out from all samples once more, so it is the same
-    after a crash. Where its twin's file is gone, the run is kept without, and that is announced.
+    after a crash. Where its twin's file is gone, or its plan, the run is kept without, and that is announced.
     """
+    if header.performs is not None and not _is_there(place, header.performs):
+        announce(f"{header.run_id}: its plan {header.performs} is no more; kept without")
+        header = replace(header, performs=None)
     tables, series = live_run.closed_rows(header, samples, counts)
     twin = _twin(place, header, announce)
     if twin is None:  # what was measured depends on no twin: it is part of the watching
         tables = live_run.together(tables, _measured(header, samples))
+    kept = _is_there(place, header.run_id)
     with place.reading() as session:
-        kept = session.get(Run, header.run_id) is not None
         known = session.get(RunEnergy, header.run_id) is not None
     if not kept:  # else a crash came right here
         run, activity, made = live_run.records(tables)
@@ -74,6 +78,11 @@ def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float
         "activity_use": [{"activity_id": activity_id, "entity": entity} for entity in uses],
         **made,
     }
+
+
+def _is_there(place: Workspace, run_id: str) -> bool:
+    with place.reading() as session:
+        return session.get(Run, run_id) is not None
 
 
 def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | None:

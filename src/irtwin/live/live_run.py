@@ -88,6 +88,7 @@ def rows(
         "start_time_from": "log",
         "run_time_s": at.time - began,
         "sample_count": count,
+        **({} if header.performs is None else {"performs": header.performs}),
     }
     made = {"run_id": header.run_id, "activity_id": activity_id}
     return {
@@ -114,7 +115,7 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
     idle = still.all(axis=1)
     tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
     length = at.time - began
-    tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else 0.0}
+    tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else None}
     tables["activity"][0] |= {"ended": _moment(at.time)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
     table = columns | {"time": time - began}

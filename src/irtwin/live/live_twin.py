@@ -30,6 +30,7 @@ from irtwin.live.shown import ShownRuns
 from irtwin.live.stored_times import StoredTimes
 from irtwin.live.watched_run import HOLE, WatchedRun
 from irtwin.providers.live_energy import KnownTwin, known_twin
+from irtwin.providers.records import find_plan
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal, Rows, read_journal
 from irtwin.storage.schema import LIVE, Joint, Robot
@@ -62,6 +63,7 @@ class LiveTwin:
         self._folder = place.folder / LIVE
         self._shown = ShownRuns(place, graph)
         self._twins: dict[str, KnownTwin | None] = {}
+        self._plans: dict[tuple[str, str], str] = {}  # run_id of each that was said
         self.joints, self.names = _joints(place), _names(place)
         self.stored = self.superseded = 0
         self.waited = 0.0
@@ -98,10 +100,12 @@ class LiveTwin:
         A state more than a minute before or after the newest is held until the next one: where that goes on from it,
         a new run began; where that goes on from the run, InputError is raised for the one held.
         A state of a time that a stored run of the robot covers is refused, too: a log that comes again is stored once.
+        So is one that says a plan that its robot has not.
         Raises also what ended the work in the background: a full disk, say.
         """
         if state.time > time.time() + AHEAD:
             raise InputError(f"{state.robot_id}: a state more than {AHEAD:g} s ahead of the clock here; not stored")
+        self._plan_of(state)
         with self._lock:
             if self._waiting >= MOST_WAITING:
                 self._wait_for_room()
@@ -131,9 +135,10 @@ class LiveTwin:
                 raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours; not stored")
 
     def _take(self, run: WatchedRun, state: State) -> None:
-        if run.health.stale_since is not None:
-            self._announce(f"{self.names[state.robot_id]}: the stream flows again")
+        was_stale = run.health.stale_since is not None
         run.take(state)
+        if was_stale and run.health.stale_since is None:
+            self._announce(f"{self.names[state.robot_id]}: the stream flows again")
         if self._broadcast is not None:
             self._broadcast.state(state)
         self._waiting += 1
@@ -185,15 +190,23 @@ class LiveTwin:
         robot_id, joints = state.robot_id, self.joints[state.robot_id]
         began = datetime.fromtimestamp(state.time, UTC)
         run_id = f"{robot_id}.{LIVE}_{began:%Y%m%dT%H%M%S%f}"
-        header = Header(
-            run_id, robot_id, state.payload or 0.0, live_run.columns(joints), state.payload_com or (0.0, 0.0, 0.0)
-        )
+        com = state.payload_com or (0.0, 0.0, 0.0)
+        header = Header(run_id, robot_id, state.payload or 0.0, live_run.columns(joints), com, self._plan_of(state))
         try:
             journal = Journal(self._folder, header)
         except FileExistsError:
             raise InputError(f"{robot_id}: another stream of this robot began at the same moment") from None
         self._runs[robot_id] = WatchedRun(header, joints, journal, [0.0] * len(joints))
         return self._runs[robot_id]
+
+    def _plan_of(self, state: State) -> str | None:
+        """Return the run_id of the plan that a state says. Raises InputError where its robot has none of that name."""
+        if state.performs is None:
+            return None
+        of = (state.robot_id, state.performs)
+        if of not in self._plans:
+            self._plans[of] = find_plan(self._place, *of).run_id
+        return self._plans[of]
 
     def _wait_for_room(self) -> None:
         began = time.monotonic()
@@ -242,7 +255,8 @@ class LiveTwin:
         with self._lock:
             states, run.unworked = run.unworked, []
             if run.health.look():
-                self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; the last good state is kept")
+                kept = "its states are stored" if run.health.frozen else "the last good state is kept"
+                self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; {kept}")
                 self._make_due(run)
         if states:
             stretches = run.work_out(states, self._twin_of(robot_id))

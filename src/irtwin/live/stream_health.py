@@ -6,12 +6,17 @@ import time
 from datetime import UTC, datetime
 from typing import Any
 
+from irtwin.live.frozen_values import FROZEN
+
 STALE = 2.0  # s without a good state; of a slow source five times its usual pause
 _PAUSES = 5.0
 
 
 class StreamHealth:
-    """Told of good states and of late ones; `stale_since` is when the last good one came, None while they come."""
+    """Told of good states and of late ones; `stale_since` is when the last good one came, None while they come.
+
+    Good states whose values are frozen make it stale too, from when they were first the same.
+    """
 
     def __init__(self) -> None:
         self.stale_since: datetime | None = None
@@ -19,12 +24,15 @@ class StreamHealth:
         self._heard = self._began = time.monotonic()
         self._count = 0
         self._late: str | None = None
+        self.frozen: str | None = None
 
-    def good(self) -> None:
-        """Note a state that was taken."""
+    def good(self, frozen: str | None = None) -> None:
+        """Note a state that was taken; `frozen`: why its values are none, though it came."""
         self._heard = time.monotonic()
         self._count += 1
-        self._late = self.stale_since = self.reason = None
+        self._late, self.frozen = None, frozen
+        if frozen is None:
+            self.stale_since = self.reason = None
 
     def late(self, said: float, newest: float) -> None:
         """Note a state that is not later than the newest, times in s since 1970."""
@@ -39,12 +47,13 @@ class StreamHealth:
 
     def look(self) -> bool:
         """Note whether the stream is stale now; return whether that is news."""
-        silence = time.monotonic() - self._heard
+        silence = FROZEN if self.frozen else time.monotonic() - self._heard
         usual = (self._heard - self._began) / max(self._count - 1, 1)
-        if self.stale_since is not None or not self._count or silence < max(STALE, _PAUSES * usual):
+        quiet = bool(self.frozen) or silence >= max(STALE, _PAUSES * usual)
+        if self.stale_since is not None or not self._count or not quiet:
             return False
         self.stale_since = datetime.fromtimestamp(time.time() - silence, UTC).replace(tzinfo=None)
-        self.reason = self._late or f"no state came for {silence:.1f} s"
+        self.reason = self.frozen or self._late or f"no state came for {silence:.1f} s"
         return True
 
     def said(self) -> dict[str, Any]:

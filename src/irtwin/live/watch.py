@@ -8,6 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from irtwin.errors import InputError
@@ -17,7 +18,7 @@ from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listeni
 from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
-from irtwin.providers.records import find_robot, load_robot
+from irtwin.providers.records import find_plan, find_robot, load_robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE
@@ -37,6 +38,7 @@ def watch(
     rtde: str | None = None,
     robot: str | None = None,
     speed: float = 1.0,
+    performs: str | None = None,
     announce: Announce = lambda line: None,
 ) -> None:
     """Watch a workspace's robots until the stream on standard input ends, or SIGINT or SIGTERM comes.
@@ -44,6 +46,7 @@ def watch(
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
     With `replayed`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
     With `rtde`: what the controller there says of the robot of this name, until a signal comes.
+    With `performs`: the first run of that robot carries out the plan of this name.
     """
     sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
@@ -64,6 +67,10 @@ def watch(
         LiveTwin(place, graph, announce, broadcast) as twin,
     ):
         replay = None if replayed is None or robot is None else _replay(place, replayed, robot, speed)
+        receive: Callable[[State], None] = twin.receive
+        if performs is not None and robot is not None:
+            find_plan(place, find_robot(place, robot), performs)
+            receive = _performing(receive, performs)
         reader = StateReader(twin.joints, twin.names)
 
         def take(lines: Iterable[bytes]) -> None:
@@ -72,9 +79,9 @@ def watch(
         if replay is not None:
             start = replay.start(after=twin.stored_until(replay.robot_id), ahead=AHEAD)
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
-            replay.play(_refusing(twin.receive, refuse), done, start)
+            replay.play(_refusing(receive, refuse), done, start)
         elif rtde is not None and robot is not None:
-            _follow(_arm(place, rtde, robot), twin, refuse, done, announce)
+            _follow(_arm(place, rtde, robot), receive, twin.check, refuse, done, announce)
         else:
             _read(take, port, twin, done, announce)
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
@@ -99,14 +106,19 @@ def _read(
 
 
 def _follow(
-    arm: Rtde, twin: LiveTwin, refuse: Callable[[str], None], done: threading.Event, announce: Announce
+    arm: Rtde,
+    receive: Callable[[State], None],
+    check: Callable[[], None],
+    refuse: Callable[[str], None],
+    done: threading.Event,
+    announce: Announce,
 ) -> None:
     def refuse_of_arm(reason: str) -> None:
         refuse(reason)
-        twin.check()  # whether it was refused as nothing can be stored any more
+        check()  # whether it was refused as nothing can be stored any more
 
     announce(f"Following {arm.address}: {arm.what}")
-    arm.follow(twin.receive, refuse_of_arm, done, announce)
+    arm.follow(receive, refuse_of_arm, done, announce)
 
 
 def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
@@ -124,6 +136,18 @@ def _refusing(take: Callable[[State], None], refuse: Callable[[str], None]) -> C
             refuse(str(error))
 
     return take_or_refuse
+
+
+def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], None]:
+    """Return what takes states, the first of which says the plan that its run carries out."""
+    said = False
+
+    def take_with_plan(state: State) -> None:
+        nonlocal said
+        take(state if said else replace(state, performs=plan))
+        said = True
+
+    return take_with_plan
 
 
 def _arm(place: Workspace, address: str, robot: str) -> Rtde:

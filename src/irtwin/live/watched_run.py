@@ -10,6 +10,7 @@ from pyoxigraph import Quad
 
 from irtwin.errors import InputError
 from irtwin.live import live_run
+from irtwin.live.frozen_values import FrozenValues
 from irtwin.live.joint_stream import State
 from irtwin.live.shown import AlarmNews, ShownRuns
 from irtwin.live.stream_health import StreamHealth
@@ -47,6 +48,7 @@ class WatchedRun:
     energy_tables: live_run.Tables = field(default_factory=dict)
     worked_at: float = -math.inf  # by the monotonic clock: when the energy was shown last
     health: StreamHealth = field(default_factory=StreamHealth)
+    values: FrozenValues = field(default_factory=FrozenValues)
     alarms: AlarmNews = field(default_factory=AlarmNews)
     shown: set[Quad] | None = field(default_factory=set)
     doubted: State | None = None
@@ -68,7 +70,7 @@ class WatchedRun:
 
     def take(self, state: State) -> None:
         """Take the next state, of a later time than the one before."""
-        before, speed_before = self.newest, self.speed
+        before, speed_before, frozen = self.newest, self.speed, None
         if before is None:
             self.began, self.speed, self.acceleration = state.time, state.of("dq"), (math.nan,) * len(self.joints)
         else:
@@ -76,11 +78,13 @@ class WatchedRun:
             self.speed = live_run.speed_of(state, before)
             self.acceleration = [(now - was) / step for now, was in zip(self.speed, speed_before, strict=True)]
         self.fastest = [max(top, abs(now)) for top, now in zip(self.fastest, self.speed, strict=True)]
+        if before is not None:
+            frozen = self.values.take(state, before, not live_run.moving(self.speed, self.fastest))
         self.newest = state
         self.count += 1
         self.waiting.append(state)
         self.unworked.append(state)
-        self.health.good()
+        self.health.good(frozen)
 
     def tables(self, waited: float) -> live_run.Tables:
         """Return the rows of the run as it is now."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -25,6 +26,17 @@ _ITERATIONS = 25  # for each stiffness
 _STEP = 1e-4  # rad: of differences
 _SHARE = 0.97  # of the limits that the search keeps to at its samples
 _NEAR = 0.05  # m: nearer pairs push
+
+
+class Movement(Protocol):
+    """From rest to rest in `seconds`."""
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes."""
+
+    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
 
 
 @dataclass(frozen=True)
@@ -56,19 +68,19 @@ def cheapest(
     """
     slowed = given.slower(seconds)
     best: SplineMotion | Timed = slowed
-    least = _energy(best, power)
+    least = energy(best, power)
     search = _Search(slowed, limits, torque, power, collisions)
     points = search.start
     for stiffness in _STIFFNESS:
         points = search.improve(points, stiffness * least)
         found = search.motion(points)
-        cost = _energy(found, power)
+        cost = energy(found, power)
         if cost < least and keeps(found, limits, torque, collisions):
             best, least = found, cost
     return best
 
 
-def keeps(motion: SplineMotion | Timed, limits: MotionLimits, torque: Torque, collisions: CollisionModel) -> bool:
+def keeps(motion: Movement, limits: MotionLimits, torque: Torque, collisions: CollisionModel) -> bool:
     """Return whether a motion keeps all limits and touches nothing."""
     time = np.linspace(0, motion.seconds, _DENSE)
     states = motion.motion(time)
@@ -77,7 +89,8 @@ def keeps(motion: SplineMotion | Timed, limits: MotionLimits, torque: Torque, co
     return collisions.first_meeting(time, states[0])[0] is None
 
 
-def _energy(motion: SplineMotion | Timed, power: Power) -> float:
+def energy(motion: Movement, power: Power) -> float:
+    """Return the energy that a motion takes, J."""
     time = np.linspace(0, motion.seconds, _DENSE)
     return float(np.trapezoid(power(time, *motion.motion(time)[:3]), time))
 

@@ -11,7 +11,8 @@ from irtwin.effects.drive import RotorInertia
 from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.planning.energy_optimal import Power, SplineMotion, cheapest, keeps
+from irtwin.planning.energy_on_path import cheapest_on_path
+from irtwin.planning.energy_optimal import Movement, Power, cheapest, keeps
 from irtwin.planning.path import LONGEST_SEARCH, joint_path, line_path
 from irtwin.planning.poses import Pose, joints_for
 from irtwin.planning.timing import MotionLimits, Timed, Torque, fastest, rounded, through
@@ -85,9 +86,10 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
             f"the motion cannot be done in {task.seconds:g} s; the fastest on this way takes {quickest.seconds:.3f} s"
         )
     seconds = task.seconds or quickest.seconds
-    chosen: Timed | SplineMotion = quickest.slower(seconds)
-    if task.least_energy and not task.line:
-        chosen = cheapest(quickest, seconds, limits, _torque(twin, task), _power(twin, task), collisions)
+    chosen: Movement = quickest.slower(seconds)
+    if task.least_energy:
+        search = cheapest_on_path if task.line else cheapest
+        chosen = search(quickest, seconds, limits, _torque(twin, task), _power(twin, task), collisions)
     if not keeps(chosen, limits, _torque(twin, task), collisions):
         raise InputError(f"a motion of {seconds:g} s asks for more torque than the joints have; give another duration")
     collisions.keep_off(0.0)

@@ -68,15 +68,26 @@ class Timed:
 
     def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
+        return along(self.path, *self.place(time))
+
+    def place(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the place on the path and its first three derivatives, (N,) each, at `time`: (N,) s."""
         law_time = time / self.stretch + self.law.x[0] + self.window / 2
         ends = (law_time + self.window / 2, law_time - self.window / 2)
         s, ds, dds, ddds = (
-            ((self.law(ends[0], order) - self.law(ends[1], order)) / self.window / self.stretch**order)[:, None]
+            (self.law(ends[0], order) - self.law(ends[1], order)) / self.window / self.stretch**order
             for order in range(4)
         )
-        place = np.clip(s[:, 0], self.path.t[self.path.k], self.path.t[-self.path.k - 1])
-        p, p1, p2, p3 = (self.path(place, nu) for nu in range(4))
-        return p, p1 * ds, p2 * ds**2 + p1 * dds, p3 * ds**3 + 3 * p2 * ds * dds + p1 * ddds
+        return s, ds, dds, ddds
+
+
+def along(
+    path: BSpline, s: np.ndarray, ds: np.ndarray, dds: np.ndarray, ddds: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return q, dq, ddq and jerk, (N, n) each, at places on a path that change so, (N,) each."""
+    p, p1, p2, p3 = (path(np.clip(s, path.t[path.k], path.t[-path.k - 1]), nu) for nu in range(4))
+    v, a, j = ds[:, None], dds[:, None], ddds[:, None]
+    return p, p1 * v, p2 * v**2 + p1 * a, p3 * v**3 + 3 * p2 * v * a + p1 * j
 
 
 def rounded(corners: np.ndarray, is_clear: Callable[[np.ndarray], bool]) -> BSpline:

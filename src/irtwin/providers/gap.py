@@ -32,17 +32,23 @@ from irtwin.twin.identify import identify
 
 
 def record(
-    workspace: Workspace, robot_id: str, diagnosis: Document, curves: Curves, twin: str | None = None
+    workspace: Workspace,
+    robot_id: str,
+    diagnosis: Document,
+    curves: Curves,
+    twin: str | None = None,
+    motion: str | None = None,
 ) -> gap_schema.GapDiagnosis:
     """Keep a robot's diagnosis, in place of an earlier one; return its row.
 
-    curves: what a page draws of it; twin: text of the twin with the causes added, which `adopt` makes the robot's.
+    curves: what a page draws of it; twin: text of the twin with the causes added, which `adopt` makes the robot's;
+    motion: CSV of what the next experiment plays.
     Raises InputError where the workspace lacks the robot, or a run or joint that the diagnosis names.
     """
     started = datetime.now(UTC)
     runs = _run_ids(workspace, robot_id)
     linear = _linear_joints(workspace, robot_id, diagnosis)
-    row, documents = _row(robot_id, diagnosis, curves, twin)
+    row, documents = _row(robot_id, diagnosis, curves, twin, motion)
     at = Place(row.diagnosis_id, robot_id, partial(_run_id, runs), linear)
     rows = [row, *gap_rows.rows(diagnosis, at)]
     made = Made(robot_id, [run_iri(run_id) for run_id in runs.values()], rows, documents=documents)
@@ -128,14 +134,16 @@ def _linear_joints(workspace: Workspace, robot_id: str, said: Document) -> froze
 
 
 def _row(
-    robot_id: str, said: Document, curves: Curves, twin: str | None
+    robot_id: str, said: Document, curves: Curves, twin: str | None, motion: str | None
 ) -> tuple[gap_schema.GapDiagnosis, dict[str, bytes]]:
-    texts = {"": _text(said.to_json()), ".evidence": _text(curves.to_json())}
-    if twin is not None:
-        texts[".twin"] = twin
+    given = {
+        ".json": _text(said.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
+        ".motion.csv": motion,
+    }  # fmt: skip
+    texts = {kind: text for kind, text in given.items() if text is not None}
     sums = {kind: hashlib.sha256(text.encode()).hexdigest() for kind, text in texts.items()}
-    diagnosis_id = f"{robot_id}.{sums[''][:12]}"
-    files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}.json" for kind in texts}
+    diagnosis_id = f"{robot_id}.{sums['.json'][:12]}"
+    files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}" for kind in texts}
     row = gap_schema.GapDiagnosis(
         diagnosis_id=diagnosis_id,
         robot_id=robot_id,
@@ -143,12 +151,14 @@ def _row(
         created=datetime.now(UTC),
         energy_error_percent=said.gap.energy_error_percent,
         noise_floor_from=said.shrink.noise_floor_from,
-        file=files[""],
-        sha256=sums[""],
-        evidence_file=files[".evidence"],
-        evidence_sha256=sums[".evidence"],
-        twin_file=files.get(".twin"),
-        twin_sha256=sums.get(".twin"),
+        file=files[".json"],
+        sha256=sums[".json"],
+        evidence_file=files[".evidence.json"],
+        evidence_sha256=sums[".evidence.json"],
+        twin_file=files.get(".twin.json"),
+        twin_sha256=sums.get(".twin.json"),
+        motion_file=files.get(".motion.csv"),
+        motion_sha256=sums.get(".motion.csv"),
     )
     return row, {files[kind]: text.encode() for kind, text in texts.items()}
 

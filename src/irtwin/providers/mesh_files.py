@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -51,8 +52,15 @@ def meshes_of_graph(
 
     `read_document` returns a file of the workspace by path and checksum.
     """
-    meshes = {}
-    for row in graph.query(_MESHES, {"arm": robot_iri}).rows:
-        path = row["file"]
-        meshes[row["mesh"]] = read_mesh(read_document(path, row["checksum"]), path[path.rfind(".") :], path)
-    return meshes
+    copies = mesh_copies_of_graph(graph, robot_iri, read_document)
+    return {name: read_mesh(copy.content, Path(copy.path).suffix, copy.path) for name, copy in copies.items()}
+
+
+def mesh_copies_of_graph(
+    graph: KnowledgeGraph, robot_iri: str, read_document: Callable[[str, str], bytes]
+) -> Mapping[str, MeshCopy]:
+    """Return the files that a graph names of a robot's meshes, by the names that its description gives them."""
+    return {
+        row["mesh"]: MeshCopy(row["file"], row["checksum"], read_document(row["file"], row["checksum"]))
+        for row in graph.query(_MESHES, {"arm": robot_iri}).rows
+    }

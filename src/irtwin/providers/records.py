@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 
 from irtwin.errors import InputError
 from irtwin.planning.admission import check_motion
@@ -76,10 +76,8 @@ def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], ru
     check_run_name(workspace, robot_id, run.name)
     row = _run_row(robot_id, run, datetime.now(UTC))
     row.role = None
-    with workspace.reading() as session:
-        plan = None if row.performs is None else session.get(Run, row.performs)
-    if row.performs is not None and (plan is None or plan.kind != PLANNED_RUN):
-        raise InputError(f'{run.file}: performs "{run.performs}", which is no planned run in {workspace.folder}')
+    if run.performs is not None:
+        find_plan(workspace, robot_id, run.performs)
     workspace.keep_run(row, pa.table(columns_of(run.signals, joint_names)))
     return row.run_id
 
@@ -139,6 +137,28 @@ def find_robot(workspace: Workspace, name: str) -> str:
     near = difflib.get_close_matches(name, known.values(), 1, 0.0)
     hint = f'the nearest is "{near[0]}"' if near else "it has none; run a data set first"
     raise InputError(f'{workspace.folder}: no robot "{name}" here; {hint}')
+
+
+def find_run(workspace: Workspace, robot_id: str, name: str) -> Run:
+    """Return a robot's run by its name. Raises InputError, with the nearest name, where there is none."""
+    return _run_of(workspace, name, "run", Run.robot_id == robot_id)
+
+
+def find_plan(workspace: Workspace, robot_id: str, name: str) -> Run:
+    """Return a robot's planned run by its name. Raises InputError, with the nearest name, where there is none."""
+    return _run_of(workspace, name, "planned run", Run.robot_id == robot_id, Run.kind == PLANNED_RUN)
+
+
+def _run_of(workspace: Workspace, name: str, what: str, *where: ColumnElement[bool]) -> Run:
+    with workspace.reading() as session:
+        known = {row.name: row for row in session.scalars(select(Run).where(*where))}
+        session.expunge_all()
+    for row in known.values():
+        if name == row.run_id or identifier(row.name) == identifier(name):
+            return row
+    near = difflib.get_close_matches(name, known, 1, 0.0)
+    hint = f'the nearest is "{near[0]}"' if near else "it has none"
+    raise InputError(f'{workspace.folder}: the robot has no {what} "{name}"; {hint}')
 
 
 def check_name(workspace: Workspace, name: str) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.ros_names import ros_joints, ros_names
-from irtwin.robot.structure import Body, Connection, Structure, structure_of
+from irtwin.robot.structure import Body, Connection, Solid, Structure, structure_of
 from irtwin.robot.urdf import parse_urdf
 from irtwin.robot.urdf_text import urdf_text
 
@@ -25,9 +25,13 @@ class Described:
     said: tuple[str, ...]
 
 
-def described(robot: Robot) -> Described:
-    """Return a robot as ROS takes it. Raises InputError where a shape of it cannot be read."""
+def described(robot: Robot, packaged: Mapping[str, str] | None = None) -> Described:
+    """Return a robot as ROS takes it; `packaged`: the names that ROS finds some of its meshes by.
+
+    Raises InputError where a shape of it cannot be read.
+    """
     structure = structure_of(robot)
+    found = packaged or {}
     moving = ros_joints(robot)
     joints = _fixed(structure, moving) | moving
     links = ros_names((body.name for body in structure.bodies), "link")
@@ -36,7 +40,7 @@ def described(robot: Robot) -> Described:
     renamed = Structure(
         tuple(_body(body, links) for body in structure.bodies),
         tuple(_connection(one, joints, links, limits.get(one.name)) for one in structure.connections),
-        tuple(replace(solid, link=links[solid.link]) for solid in structure.solids),
+        tuple(_solid(solid, links, found) for solid in structure.solids),
     )
     moved = [_limited(replace(joint, name=joints[joint.name])) for joint in robot.joints]
     text = urdf_text(name, renamed, moved)
@@ -49,7 +53,7 @@ def described(robot: Robot) -> Described:
     )
     changed = [("robot", {robot.name: name}), ("joint", joints), ("link", links)]
     said = [f'{what} "{old}" is {new} in ROS' for what, names in changed for old, new in names.items() if old != new]
-    return Described(again, renamed, text, (*said, *_changes(robot), *_meshes(structure)))
+    return Described(again, renamed, text, (*said, *_changes(robot), *_meshes(structure, found)))
 
 
 def _fixed(structure: Structure, moving: dict[str, str]) -> dict[str, str]:
@@ -59,6 +63,11 @@ def _fixed(structure: Structure, moving: dict[str, str]) -> dict[str, str]:
         for one in structure.connections
         if one.name not in moving
     }
+
+
+def _solid(solid: Solid, links: dict[str, str], packaged: Mapping[str, str]) -> Solid:
+    file = None if solid.file is None else packaged.get(solid.file, solid.file)
+    return replace(solid, link=links[solid.link], file=file)
 
 
 def _body(body: Body, links: dict[str, str]) -> Body:
@@ -100,8 +109,8 @@ def _changes(robot: Robot) -> Iterator[str]:
         yield f"joint {joint_name} mimics another: it is fixed in ROS"
 
 
-def _meshes(structure: Structure) -> Iterator[str]:
-    files = sorted({solid.file or "" for solid in structure.solids if solid.kind == "mesh"})
+def _meshes(structure: Structure, packaged: Mapping[str, str]) -> Iterator[str]:
+    files = sorted({solid.file or "" for solid in structure.solids if solid.kind == "mesh"} - packaged.keys())
     packages = sorted({file.split("/")[2] for file in files if file.startswith("package://") and file.count("/") > 2})
     if packages:
         yield f"its meshes are of the ROS package {', '.join(packages)}, which has to be installed"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy import select
@@ -11,12 +12,14 @@ from sqlalchemy import select
 from irtwin.asking import open_graph
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import robot_named
+from irtwin.providers.mesh_files import mesh_copies_of_graph
 from irtwin.providers.records import find_robot, load_robot, load_run
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.ros.bags import write_bag
 from irtwin.ros.ros_package import write_package
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import read_document
 
 _NO_START = datetime(1970, 1, 1, tzinfo=UTC)  # of a plan: its bag begins at 0 s
 
@@ -24,11 +27,14 @@ _NO_START = datetime(1970, 1, 1, tzinfo=UTC)  # of a plan: its bag begins at 0 s
 def export_package(out: Path, workspace: Path, robot: str | None, graph_url: str | None = None) -> list[str]:
     """Write the ROS package of a robot of the graph into a folder; return what one should know of it.
 
-    robot: its name; the only one's where None. Raises InputError where there is no such robot, or no place to write.
+    robot: its name; the only one's where None. Raises InputError where there is no such robot, or no place to write, or
+    a copy of a mesh is gone from the workspace.
     """
     with open_graph(workspace, graph_url) as graph:
-        described = robot_of_graph(graph, robot_named(graph, robot))
-    return write_package(described, out)
+        iri = robot_named(graph, robot)
+        described = robot_of_graph(graph, iri)
+        copies = mesh_copies_of_graph(graph, iri, partial(read_document, workspace))
+    return write_package(described, out, {name: copy.content for name, copy in copies.items()})
 
 
 def export_bag(out: Path, workspace: Path, run: str, robot: str | None, database: str | None = None) -> None:

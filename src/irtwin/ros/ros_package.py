@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 from importlib.resources import files
@@ -16,7 +17,7 @@ from irtwin.identification.motion_limits import FULL_SPEED_AFTER
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements, ranges
-from irtwin.robot.ros_names import ros_package
+from irtwin.robot.ros_names import ros_names, ros_package
 from irtwin.ros.collision_pairs import free_pairs, home
 from irtwin.ros.description import described
 from irtwin.storage.files import write
@@ -25,13 +26,16 @@ _VIEWED = 200  # random poses that the camera is fitted to
 _FIELD = pi / 4  # rad: RViz' field of view, upright
 
 
-def write_package(robot: Robot, folder: Path) -> list[str]:
+def write_package(robot: Robot, folder: Path, meshes: Mapping[str, bytes] | None = None) -> list[str]:
     """Write a robot's ROS package into a new or empty folder; return a line for each thing that one should know.
 
+    meshes: contents of those that are at hand, by the names that the robot's description gives them; they go along.
     Raises InputError where the folder has anything in it but an earlier package of the robot, or cannot be written.
     """
-    made = described(robot)
     name = ros_package(robot.name)
+    contents = meshes or {}
+    places = _places(contents)
+    made = described(robot, {mesh: f"package://{name}/{place}" for mesh, place in places.items()})
     _check_folder(folder, name)
     model = CollisionModel(made.robot)
     chain = _chain(made.robot)
@@ -48,11 +52,25 @@ def write_package(robot: Robot, folder: Path) -> list[str]:
         "home": dict(zip(made.robot.joint_names, home(made.robot, model).tolist(), strict=True)),
         "pairs": list(free_pairs(made.robot, model, made.structure.solids)),
         "view": _view(made.robot),
+        "folders": " ".join(["config", "launch", *(["meshes"] if places else []), "rviz", "urdf"]),
     }
+    for mesh, place in places.items():
+        write(folder / place, contents[mesh])
     write(folder / "urdf" / f"{made.robot.name}.urdf", made.urdf.encode())
     for place, template in _files(made.robot.name).items():
         write(folder / place, _templates().get_template(template).render(said).encode())
     return [*made.said, *_unchecked(model, made.robot)]
+
+
+def _places(meshes: Mapping[str, bytes]) -> dict[str, str]:
+    """Return where in the package each mesh lies: no two under one name, whatever the case of letters."""
+    names = ros_names((Path(name).stem for name in meshes), "mesh")
+    taken: dict[str, str] = {}
+    for number, name in enumerate(meshes):
+        file = f"{names[Path(name).stem]}{Path(name).suffix.lower()}"
+        again = file.lower() in (place.lower() for place in taken.values())
+        taken[name] = f"{number}_{file}" if again else file
+    return {name: f"meshes/{file}" for name, file in taken.items()}
 
 
 def _files(robot: str) -> dict[str, str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.serve.page import FOLDER, POLICY
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
-from irtwin.storage.files import inside
+from irtwin.storage.files import read_document
 from irtwin.virtual.robot_data import robot_data
 
 _MOST_ROBOTS = 64  # that are remembered as drawn
@@ -88,21 +88,13 @@ def _page(name: str) -> Response:
 
 def _drawn(folder: Path, robot_id: str) -> bytes:
     """Return what robot.js builds a robot of, made of what the graph says of it, as JSON. Raises InputError."""
-    workspace = folder.parent
     iri = robot_iri(robot_id)
-
-    def read(path: str, checksum: str) -> bytes:
-        content = inside(workspace, path).read_bytes()
-        if hashlib.sha256(content).hexdigest() != checksum:
-            raise InputError(f"{path}: was changed after it was written")
-        return content
-
     with Snapshot(folder) as snapshot:
         graph = snapshot.current(False)
         if any(sign in iri for sign in '<>"{}|\\^` '):
             raise InputError(f"no robot {robot_id!r} here")
         robot = robot_of_graph(graph, iri)
-        meshes = meshes_of_graph(graph, iri, read)
+        meshes = meshes_of_graph(graph, iri, partial(read_document, folder.parent))
         poses = _poses(graph, iri, robot.joint_names)
     return json.dumps(robot_data(robot, poses, meshes) | {"name": robot.name}, allow_nan=False).encode()
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
+import logging
 import os
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 from starlette.applications import Starlette
@@ -29,6 +32,7 @@ from irtwin.serve.protocol import Refusal
 from irtwin.serve.updates import Updates
 
 _GRACE = 3  # s that answers under way may still take when the server stops
+_LATE = "Cancel %s running task(s), timeout graceful shutdown exceeded"  # uvicorn's
 
 
 def serve(
@@ -64,7 +68,35 @@ def serve(
     # uvicorn stops on these, then raises them again: both are the way to end this command, not a failure of it.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: None)
-    uvicorn.Server(config).run(sockets=[listening])
+    server = _Server(config, app.state.live_pages.samples.close)
+    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
+    server.run(sockets=[listening])
+
+
+class _Server(uvicorn.Server):
+    """Lets pages that look on go as it stops: they would stay as long as they may."""
+
+    def __init__(self, config: uvicorn.Config, let_go: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._let_go = let_go
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Begin to stop; who asks twice breaks off whatever is left, and knows."""
+        super().handle_exit(sig, frame)
+        if self.force_exit:
+            logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop, within the time that answers under way may take."""
+        self._let_go()
+        await super().shutdown(sockets)
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    """Whether a record is said: not that an answer was broken off at the end, which is told of all together."""
+    if record.msg == _LATE:
+        record.msg = f"broken off after {_GRACE} s: %s of the answers under way"
+    return not (record.exc_info and record.exc_info[0] is asyncio.CancelledError)
 
 
 def read_token(file: Path | None) -> str | None:
@@ -98,7 +130,7 @@ def application(
             live.samples.close()
             await pool.close()
 
-    return Starlette(
+    app = Starlette(
         routes=[
             Route("/", lambda request: page.response(), methods=["GET"]),
             Route("/sparql", Endpoint(pool, updates, limits)),
@@ -111,6 +143,8 @@ def application(
         exception_handlers={Refusal: _refused},
         lifespan=lifespan,
     )
+    app.state.live_pages = live
+    return app
 
 
 def _refused(request: Request, error: Exception) -> Response:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,10 +21,12 @@ from irtwin.storage.rows import (
     drop_activities,
     drop_data_set,
     drop_robot,
+    drop_run,
     facts,
     insert_rows,
     named_files,
     part_tables,
+    release_plans,
     values,
     with_dependents,
 )
@@ -129,7 +130,8 @@ class Workspace:
         `parts` are the rows of joints, links, shapes and devices; `series` holds the measured or planned samples of
         each run, by `run_id`; `documents` the files that parts name, by their path in the workspace. The data set that
         is there already changes nothing; another one of the same robot replaces it, and all that was derived from it is
-        dropped. Runs of no data set stay: those that were watched live, plans and logs that were kept on their own.
+        dropped. Runs of no data set stay: those that were watched live, plans and logs that were kept on their own. One
+        whose plan is gone says none.
         """
         missing = {run.run_id for run in runs} ^ set(series)
         if missing:
@@ -146,6 +148,7 @@ class Workspace:
                 files.write(inside(self.folder, path), content)
             stored = [row for run in runs for row in self._store({run.run_id: series[run.run_id]}, _told(run), None)]
             insert_rows(session, [*rows[1 if known else 0 :], *stored])
+            release_plans(session, robot.robot_id)
         self.remove_orphans()
         return "replaced" if known else "new"
 
@@ -199,6 +202,12 @@ class Workspace:
             drop_robot(session, robot_id)
         self.remove_orphans()
 
+    def drop_run(self, run_id: str, subject: str) -> None:
+        """Forget a run that no twin knows, and what providers made of it, their `subject` by its IRI."""
+        with self._writing() as session:
+            drop_run(session, run_id, subject)
+        self.remove_orphans()
+
     def read_series(self, run_id: str, kind: str = MEASURED, columns: Sequence[str] | None = None) -> pa.Table:
         """Read a run's samples, or some columns of them. Raises InputError where there are none."""
         with self.reading() as session:
@@ -215,14 +224,7 @@ class Workspace:
 
     def read_document(self, path: str, checksum: str) -> bytes:
         """Read a document by its path and SHA-256. Raises InputError where it is gone or another."""
-        again = "run or diagnose its data set again"
-        try:
-            content = inside(self.folder, path).read_bytes()
-        except OSError as error:
-            raise InputError(f"{self.folder / path}: cannot be read ({error.strerror}); {again}") from None
-        if hashlib.sha256(content).hexdigest() != checksum:
-            raise InputError(f"{self.folder / path}: was changed after it was written; {again}")
-        return content
+        return files.read_document(self.folder, path, checksum)
 
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""

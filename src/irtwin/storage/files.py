@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import hashlib
 import os
 import shutil
 import tempfile
@@ -91,6 +92,18 @@ def check_place(path: Path) -> None:
     folder = next(folder for folder in path.absolute().parents if folder.exists())
     if not (folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)):
         raise InputError(f"{path}: cannot be written, because {folder} is not a writable folder")
+
+
+def read_document(folder: Path, path: str, checksum: str) -> bytes:
+    """Read a file of a workspace by its path and SHA-256. Raises InputError where it is gone or another."""
+    again = "run or diagnose its data set again"
+    try:
+        content = inside(folder, path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{folder / path}: cannot be read ({error.strerror}); {again}") from None
+    if hashlib.sha256(content).hexdigest() != checksum:
+        raise InputError(f"{folder / path}: was changed after it was written; {again}")
+    return content
 
 
 def _sync(path: Path) -> None:

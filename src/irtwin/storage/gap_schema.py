@@ -31,6 +31,8 @@ class GapDiagnosis(Base):
     evidence_sha256: Mapped[str]
     twin_file: Mapped[str | None]
     twin_sha256: Mapped[str | None]
+    motion_file: Mapped[str | None]  # CSV: what to play in the next experiment
+    motion_sha256: Mapped[str | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

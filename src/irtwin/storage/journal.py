@@ -10,7 +10,7 @@ import fcntl
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ class Header:
     payload_kg: float
     columns: tuple[str, ...]
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, in the flange's frame
+    performs: str | None = None  # run_id of the plan that it carries out
 
 
 class DamagedJournal(ValueError):
@@ -81,16 +82,10 @@ def read_journal(path: Path) -> tuple[Header, Rows]:
 def _header(said: Any) -> Header:
     header = Header(**{**said, "columns": tuple(said["columns"])})
     com = tuple(map(float, header.payload_com))
-    texts = (header.run_id, header.robot_id, *header.columns)
+    texts = (header.run_id, header.robot_id, "" if header.performs is None else header.performs, *header.columns)
     if not all(isinstance(text, str) for text in texts) or header.columns[:1] != ("time",) or len(com) != 3:
         raise TypeError
-    return Header(
-        header.run_id,
-        header.robot_id,
-        float(header.payload_kg),
-        header.columns,
-        com,
-    )
+    return replace(header, payload_kg=float(header.payload_kg), payload_com=com)
 
 
 def of_robot(folder: Path, robot_id: str) -> list[Path]:

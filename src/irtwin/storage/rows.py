@@ -7,8 +7,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, insert, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, exists, insert, select, update
+from sqlalchemy.orm import Session, aliased
 
 from irtwin.storage.schema import LIVE, LIVE_RUN, Activity, Base, Robot, Run, RunEnergy, RunPrice, Series, in_utc
 
@@ -19,7 +19,12 @@ _FILES = {
     "series": [("path", "series_id")],
     "twin": [("file", "sha256")],
     "link_shape": [("mesh_file", "mesh_sha256")],
-    "gap_diagnosis": [("file", "sha256"), ("evidence_file", "evidence_sha256"), ("twin_file", "twin_sha256")],
+    "gap_diagnosis": [
+        ("file", "sha256"),
+        ("evidence_file", "evidence_sha256"),
+        ("twin_file", "twin_sha256"),
+        ("motion_file", "motion_sha256"),
+    ],
 }
 
 
@@ -78,6 +83,14 @@ def recorded_rows(session: Session, robot_id: str) -> Rows:
     }
 
 
+def modelled_of_live_runs(session: Session, robot_id: str) -> Rows:
+    """Return the rows of what a robot's twin says of its live runs."""
+    made = _of_live(robot_id)
+    return {
+        table.name: [dict(row) for row in session.execute(_made_by(table, made)).mappings()] for table in _made_tables()
+    }
+
+
 def named_files(connection: Connection) -> list[NamedFile]:
     """Return the files of the workspace that the database names."""
     found = []
@@ -132,6 +145,26 @@ def drop_robot(session: Session, robot_id: str) -> None:
         session.execute(delete(kind).where(kind.robot_id == robot_id))
 
 
+def drop_run(session: Session, run_id: str, subject: str) -> None:
+    """Drop a run that no twin knows, with its series and all that providers made of it, their `subject` by IRI."""
+    made = select(Activity.activity_id).where(Activity.subject == subject)
+    drop_activities(session, with_dependents(session, set(session.scalars(made))))
+    for kind in (Series, Run):
+        session.execute(delete(kind).where(kind.run_id == run_id))
+
+
+def release_plans(session: Session, robot_id: str) -> None:
+    """Let runs of a robot that carried out a plan which is gone say no plan."""
+    there = aliased(Run)
+    gone = ~exists().where(there.run_id == Run.performs)
+    session.execute(
+        update(Run)
+        .where(Run.robot_id == robot_id, Run.performs.is_not(None), gone)
+        .values(performs=None)
+        .execution_options(synchronize_session=False)
+    )
+
+
 def _drop_parts(session: Session, robot_id: str) -> None:
     for table in part_tables():
         session.execute(delete(table).where(table.columns["robot_id"] == robot_id))
@@ -169,18 +202,27 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
 def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
     """Yield each table with the query of a robot's rows in it, without its live runs'."""
     runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.kind != LIVE_RUN)
-    of_live = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.kind == LIVE_RUN)
     made = select(Activity.activity_id).where(
-        Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(of_live)
+        Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
     )
     for table in Base.metadata.sorted_tables:
         rows = select(table)
         if table.name == Run.__tablename__ or table.name == Series.__tablename__:
             yield table, rows.where(table.columns["run_id"].in_(runs))
         elif "activity_id" in table.columns:
-            yield table, rows.where(table.columns["activity_id"].in_(made))
+            yield table, _made_by(table, made)
         else:
             yield table, rows.where(table.columns["robot_id"] == robot_id)
+
+
+def _of_live(robot_id: str) -> Select[Any]:
+    """Return the query of the activities in which a twin worked out the energy of a robot's live runs."""
+    energies = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.kind == LIVE_RUN)
+    return energies.where(RunEnergy.twin_id.is_not(None))
+
+
+def _made_by(table: Table, activities: Select[Any]) -> Select[Any]:
+    return select(table).where(table.columns["activity_id"].in_(activities))
 
 
 def _owner(row: RowMapping) -> str:

@@ -115,7 +115,7 @@ class Run(Base):
     start_time_from: Mapped[str | None]  # "log" or "ingest"
     run_time_s: Mapped[float]
     sample_count: Mapped[int]
-    sample_rate_hz: Mapped[float]
+    sample_rate_hz: Mapped[float | None]  # none of a single sample
     file: Mapped[str]
     sha256: Mapped[str]
 

@@ -12,7 +12,15 @@ from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import inside
-from irtwin.storage.rows import Rows, drop_recorded, files_of, insert_values, recorded_rows
+from irtwin.storage.rows import (
+    Rows,
+    drop_recorded,
+    files_of,
+    insert_values,
+    modelled_of_live_runs,
+    recorded_rows,
+    release_plans,
+)
 from irtwin.storage.schema import Robot
 from irtwin.storage.series import is_whole
 
@@ -50,12 +58,16 @@ def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> Non
         for path, checksum in files_of(rows).items():
             if is_whole(source.folder, path, checksum):  # else whoever needs it says so
                 _link(source, target, path)
+        of_live = modelled_of_live_runs(session, robot_id)
         drop_recorded(session, robot_id)
         if session.get(Robot, robot_id) is None:
             insert_values(session, rows)
         else:
             session.execute(update(Robot).where(Robot.robot_id == robot_id).values(**rows["robot"][0]))
             insert_values(session, {**rows, "robot": []})
+        if {row["twin_id"] for row in of_live["run_energy"]} <= {row["twin_id"] for row in rows["twin"]}:
+            insert_values(session, of_live)  # it is the same twin: what it says of live runs holds
+        release_plans(session, robot_id)
 
 
 def _link(source: Workspace, target: Workspace, path: str) -> None:
