@@ -56,7 +56,7 @@ def found(one: Case, *, power: bool = True):
         system = torque_system(stack, one.with_torque, one.grouping, tried, plain.below)
         return find("torque", one, system, FLOOR.torque, 0)
     drawn = [shape for name in DRAWN for shape in catalogue()[name].candidates(ROBOT)]
-    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, FLOOR, 0)
+    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, FLOOR, 0)[0]
 
 
 def names(finding) -> list[str]:

@@ -31,6 +31,7 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
 from irtwin.gap.isolation.finding import Finding, find
+from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
@@ -137,7 +138,7 @@ def diagnose(
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
+        found, floor = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
             found = replace(found, power_balances=power_balances(case, power_stack, torque))
@@ -214,14 +215,18 @@ def _torque(
     unknown: Set[str],
     seed: int,
     tell: Progress,
-) -> Finding:
-    """Find the causes of torque; where power was measured too, they have to explain both."""
+) -> tuple[Finding, Floor]:
+    """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
     found = screen(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
     if not case.shows("power"):
         system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
         system = replace(system, transient=found.contact)
-        return find("torque", case, system, floor.torque, seed, without=unknown)
+        first = find("torque", case, system, floor.torque, seed, without=unknown)
+        left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
+        if left is floor:
+            return first, floor
+        return find("torque", case, system, left.torque, seed, without=unknown), left
     both = (tried, _variants(case, "power"))
     return find_beside_power(
         case, stack, both, below, predicted, floor, seed, transient=found.contact, without=unknown, tell=tell

@@ -14,6 +14,7 @@ from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.finding import Finding, estimate_of, hypotheses_of
+from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.forward_selection import Attribution, attribute
 from irtwin.gap.isolation.shares import shares
 from irtwin.gap.regression.candidate_columns import Below
@@ -39,25 +40,31 @@ def find_beside_power(
     transient: Transient | None = None,
     without: Set[str] = frozenset(),
     tell: Tell | None = None,
-) -> Finding:
-    """Find the causes of torque, `without` some effects.
+) -> tuple[Finding, Floor]:
+    """Find the causes of torque, `without` some effects; return them with the floor that they leave.
 
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
-    `predicted` the joint torque by the twin. Losses grow with torque squared: where real torque was found, the search
-    is repeated with power linear about that torque.
+    `predicted` the joint torque by the twin. Where real torque was found, the search is repeated with the floor that is
+    left, and with power linear about that torque if the twin has losses that grow with its square.
     """
 
-    def about(torque: Torque) -> Finding:
-        power = TwinPower(stack, case.with_power, case.grouping, torque)
-        equations = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, tell)
-        equations = replace(equations, whole=replace(equations.whole, transient=transient))
-        return _find(case, equations, floor, seed, without)
+    def about(torque: Torque, power: TwinPower) -> JointEquations:
+        found = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, tell)
+        return replace(found, whole=replace(found.whole, transient=transient))
 
-    first = about(predicted)
+    equations = about(predicted, TwinPower(stack, case.with_power, case.grouping, predicted))
+    first = _find(case, equations, floor, seed, without)
     if not any(cause.variants[0].effect.channel == "torque" for cause in first.causes):
-        return first
-    return about(ExplainedTorque(stack, first, below))
+        return first, floor
+    explained = ExplainedTorque(stack, first, below)
+    power = TwinPower(stack, case.with_power, case.grouping, explained)
+    left = floor_left(case, floor, explained, power)
+    if any(effect.needs == "torque" and not effect.carries_torque for effect, _ in stack.power_terms):
+        equations = about(explained, power)
+    elif left is floor:
+        return first, floor
+    return _find(case, equations, left, seed, without), left
 
 
 def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[str]) -> Finding:
