@@ -14,7 +14,7 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
-from irtwin.gap.regression.cross_fitted import LeftOut, twin_power
+from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.signals.motion import Motion
@@ -56,16 +56,16 @@ def torque_library(case: Case) -> tuple[Library, LeftOut]:
     stack = Stack(case.robot, case.effects)
     left_out = LeftOut(stack, torque_system(stack, case.with_torque, case.grouping, (), None))
     system = torque_system(stack, case.with_torque, case.grouping, _shapes(case, "torque"), left_out.below)
-    return Library("torque", system, _hypotheses(system, case, whole=False)), left_out
+    return Library("torque", system, _hypotheses(system, case)), left_out
 
 
 def power_library(case: Case, torque: Torque) -> Library:
     """Return the library of power on top of a joint torque."""
     stack = Stack(case.robot, case.effects)
-    power_of = twin_power(stack, case.with_power, case.grouping, torque)
+    power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     shapes = _shapes(case, "power")
     system = power_system(stack, case.with_power, case.grouping, shapes, torque, power_of)
-    return Library("power", system, _hypotheses(system, case, whole=True))
+    return Library("power", system, _hypotheses(system, case))
 
 
 class Explained:
@@ -115,8 +115,8 @@ def _shapes(case: Case, signal: str) -> list[Effect]:
     ]
 
 
-def _hypotheses(system: System, case: Case, *, whole: bool) -> tuple[Hypothesis, ...]:
-    found = hypotheses(system.columns, system.base, MISSING, whole=whole, inside=case.effects)
+def _hypotheses(system: System, case: Case) -> tuple[Hypothesis, ...]:
+    found = hypotheses(system.columns, system.base, MISSING, inside=case.effects)
     if system.both:
-        found += hypotheses(system.columns, system.changed, CHANGED, whole=whole)
+        found += hypotheses(system.columns, system.changed, CHANGED)
     return tuple(found)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
@@ -34,12 +34,9 @@ def runs(count=6, noise=0.3, change=None, role="observed", first=0):
         shown = measure(ROBOT, motion, noise=noise, seed=seed)
         if change is not None:
             added = change(motion)
-            shown = replace(
-                shown,
-                torque=shown.torque + added,
-                power=shown.power + (added * motion.dq).sum(axis=1),
-                current=None,
-            )
+            more = 2 * shown.current * added / 8.0 + (added / 8.0) ** 2  # of the current squared
+            power = (added * motion.dq + truth(ROBOT)["R"] * more).sum(axis=1)
+            shown = replace(shown, torque=shown.torque + added, power=shown.power + power, current=None)
         run = as_run(replace(shown, current=None))
         made.append(replace(run, role=role, repeat_of=f"{role}_{seed - 1}" if seed % 2 else None))
     return made

@@ -53,6 +53,30 @@ def found(mix, coefficients):
     return [cause.effect for cause in attribute(*system_of(mix, coefficients), seed=0, limits=DEFAULT).causes]
 
 
+def on_two_joints(coefficients):
+    """Two equations, each with a column of its own, and what the coefficients of these add to it."""
+    generator = np.random.default_rng(1)
+    blocks = []
+    for run in range(RUNS):
+        columns = 10 * generator.standard_normal((ROWS, 2))
+        measured = columns * coefficients + generator.standard_normal((ROWS, 2))
+        both = [triangle(np.column_stack([columns[:, k], measured[:, k]])) for k in range(2)]
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS, ROWS]), tuple(both)))
+    columns = tuple(Column(EFFECT, k, Term(f"k{k}", "1")) for k in range(2))
+    groups, observed = np.arange(RUNS), np.ones(RUNS, dtype=bool)
+    system = System((), columns, np.eye(2, dtype=bool), tuple(blocks), groups, observed)
+    candidates = [
+        Hypothesis(f"effect_{k}", f"joint_{k}", MISSING, (Variant(EFFECT, (k,), (column.term,)),))
+        for k, column in enumerate(columns)
+    ]
+    return [cause.effect for cause in attribute(system, candidates, seed=0, limits=DEFAULT).causes]
+
+
+def test_a_small_cause_is_held_against_a_large_one_where_both_act():
+    assert found(np.eye(2), [3.0, 0.1]) == ["effect_0"]  # it may make up for the form of the large one
+    assert on_two_joints([3.0, 0.1]) == ["effect_0", "effect_1"]
+
+
 def test_what_is_there_is_found_and_nothing_else():
     assert found(np.eye(4), [0.0, 0.3, 0.0, 0.1]) == ["effect_1", "effect_3"]
     assert found(np.eye(4), np.zeros(4)) == []

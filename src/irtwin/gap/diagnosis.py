@@ -26,11 +26,12 @@ from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
 from irtwin.gap.experiment.planned_equations import planned_equations
+from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
 from irtwin.gap.isolation.finding import Finding, find
-from irtwin.gap.isolation.power_consistency import filtered, refuted
+from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
@@ -38,7 +39,7 @@ from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
-from irtwin.gap.regression.cross_fitted import LeftOut, twin_power
+from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
 from irtwin.gap.screening.screen import screen
@@ -139,10 +140,11 @@ def diagnose(
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found = _torque(case, stack, plain, floor, below, frozenset(unknown), seed, tell)
+        found, floor = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
-            torque = _balanced(case, power_stack, torque, below, frozenset(unknown), seed)
+            found = replace(found, power_balances=power_balances(case, power_stack, torque))
+            torque = ExplainedTorque(stack, found, below)
         explained.append(torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
@@ -212,35 +214,32 @@ def _torque(
     plain: System,
     floor: Floor,
     below: Below,
+    predicted: Torque,
     unknown: Set[str],
     seed: int,
     tell: Progress,
-) -> Finding:
+) -> tuple[Finding, Floor]:
+    """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
     found = screen(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
-    system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
-    system = replace(system, transient=found.contact)
-    return find("torque", case, system, floor.torque, seed, without=unknown)
-
-
-def _balanced(
-    case: Case, stack: Stack, explained: ExplainedTorque, below: Below, unknown: Set[str], seed: int
-) -> ExplainedTorque:
-    """Let power speak: drop the rivals that it refutes, and try without causes that it does."""
-    known, finding = catalogue(), explained.finding
-    weighed = power_balances(case, stack, explained)
-    if wrong := refuted(finding.causes, weighed, known):
-        finding = find("torque", case, finding.system, finding.floor, seed, without=wrong | unknown)
-        weighed = power_balances(case, stack, ExplainedTorque(explained.stack, finding, below))
-    causes = tuple(filtered(one, said, known) for one, said in zip(finding.causes, weighed, strict=True))
-    finding = replace(finding, attribution=replace(finding.attribution, causes=causes), power_balances=weighed)
-    return ExplainedTorque(explained.stack, finding, below)
+    if not case.shows("power"):
+        system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
+        system = replace(system, transient=found.contact)
+        first = find("torque", case, system, floor.torque, seed, without=unknown)
+        left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
+        if left is floor:
+            return first, floor
+        return find("torque", case, system, left.torque, seed, without=unknown), left
+    both = (tried, _variants(case, "power"))
+    return find_beside_power(
+        case, stack, both, below, predicted, floor, seed, transient=found.contact, without=unknown, tell=tell
+    )
 
 
 def _power(
     case: Case, stack: Stack, floor: Floor, torque: Torque, unknown: Set[str], seed: int, tell: Progress
 ) -> Explained:
-    power_of = twin_power(stack, case.with_power, case.grouping, torque)
+    power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)

@@ -174,7 +174,10 @@ class Ambiguity:
     apart: float = _threshold(2.0, "a gain so far behind is worse", _ERRORS, "decisions/gap-ambiguity-group.md")
     no_difference: float = _threshold(0.01, "a smaller difference of gains is none", _OF_GAIN, _JUDGEMENT)
     least_share: float = _threshold(
-        0.01, "least gain to be named", "share of the largest cause's", "decisions/gap-bounds-of-a-cause.md"
+        0.01,
+        "least gain to be named",
+        "share of what the largest cause gains in the same equations",
+        "decisions/gap-bounds-of-a-cause.md",
     )
 
 

@@ -72,6 +72,11 @@ class Case:
         return [motion for motion in self.motions.values() if motion.power is not None]
 
     @property
+    def measured(self) -> list[Motion]:
+        """The motions whose torque is known or whose power was measured."""
+        return [one for one in self.motions.values() if one.torque is not None or one.power is not None]
+
+    @property
     def run_offsets(self) -> list[Effect]:
         """What the torque of each run but the first is off by, where the runs are few.
 

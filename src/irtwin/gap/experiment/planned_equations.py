@@ -16,7 +16,7 @@ from irtwin.gap.experiment.separation import dispersion, projected
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
-from irtwin.gap.regression.cross_fitted import PowerOf, twin_power
+from irtwin.gap.regression.cross_fitted import PowerOf, TwinPower
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.gap.regression.normal_equations import least_noise
 from irtwin.gap.regression.residuals import as_filtered
@@ -217,7 +217,7 @@ def planned_equations(
 
     @cache
     def power() -> PowerOf:
-        return twin_power(stacks[1], case.with_power, case.grouping, torque)
+        return TwinPower(stacks[1], case.with_power, case.grouping, torque)
 
     def below_power(whole: Motion) -> Predicted:
         real = torque(whole)

@@ -20,21 +20,44 @@ _Parts = tuple[Variant, ...]
 def causes(
     system: System,
     moments: Sequence[np.ndarray],
+    noise: np.ndarray,
     candidates: Sequence[Hypothesis],
     found: Sequence[Find],
     limits: Thresholds,
 ) -> tuple[Cause, ...]:
-    """Join the finds of one effect and scope into causes, look for rivals of each, and rank them."""
+    """Join the finds of one effect and scope into causes, look for rivals of each, and rank them.
+
+    One that explains next to nothing of what the largest does, in its own equations, is not named: it makes up for the
+    form of the largest. `noise` (g,) is what weighs the `moments`.
+    """
     keys = list(dict.fromkeys((one.hypothesis.effect, one.hypothesis.scope) for one in found))
     joined: list[Cause] = []
     for key in keys:
         members = [one for one in found if (one.hypothesis.effect, one.hypothesis.scope) == key]
         others = [k for one in found if one not in members for k in one.variant.columns]
         joined.append(_cause(system, moments, candidates, members, others, limits))
-    most = max((cause.gain for cause in joined), default=0.0)
-    return tuple(
-        sorted((one for one in joined if one.gain >= limits.ambiguity.least_share * most), key=lambda one: -one.gain)
-    )
+    if not joined:
+        return ()
+    joined.sort(key=lambda one: -one.gain)
+    alone = _in_equations(system, moments, noise, joined)
+    least = [limits.ambiguity.least_share * float(alone[system.equations(one.columns)].sum()) for one in joined]
+    return tuple(one for one, needed in zip(joined, least, strict=True) if one is joined[0] or one.gain >= needed)
+
+
+def _in_equations(
+    system: System, moments: Sequence[np.ndarray], noise: np.ndarray, named: Sequence[Cause]
+) -> np.ndarray:
+    """Return (g,) what the first cause explains of each equation beside the others, a row, on groups left out."""
+    rest = [k for cause in named[1:] for k in cause.columns]
+    every = [*named[0].columns, *rest]
+    total = reduce(np.add, moments)
+    gain = np.zeros(len(system.pattern))
+    for group in np.flatnonzero(judged(system, named[0].scope)).tolist():
+        train = total - moments[group]
+        gain += system.squares(system.solution(rest, train), group) - system.squares(
+            system.solution(every, train), group
+        )
+    return np.asarray(np.maximum(gain, 0.0) / noise**2 / rows(system)[judged(system, named[0].scope)].sum())
 
 
 def _cause(

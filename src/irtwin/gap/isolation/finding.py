@@ -111,22 +111,26 @@ def find(
     without: Set[str] = frozenset(),
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
-    power, inside = name == "power", case.effects
-    places = (None,) if power else case.robot.joint_names
-    if system.both:  # zero in the other runs where these did not measure it: there, missing is changed
-        inside = (*inside, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
-    candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
-    if system.both:
-        candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
-    candidates = [one for one in candidates if one.effect not in without]
-    found = attribute(system, candidates, seed, case.thresholds, floor)
+    places = (None,) if name == "power" else case.robot.joint_names
+    found = attribute(system, hypotheses_of(case, system, without), seed, case.thresholds, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     parts = shares(system, found, seed)
-    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), parts)
+    return Finding(name, places, case.observed, system, found, judged, floor, estimate_of(system, chosen), parts)
 
 
-def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
+def hypotheses_of(case: Case, system: System, without: Set[str]) -> list[Hypothesis]:
+    """Return what may be missing or have changed, `without` some effects; effects on power may act in every joint."""
+    inside = case.effects
+    if system.both:  # zero in the other runs where these did not measure it: there, missing is changed
+        inside = (*inside, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
+    found = hypotheses(system.columns, system.base, MISSING, inside=inside)
+    if system.both:
+        found += hypotheses(system.columns, system.changed, CHANGED)
+    return [one for one in found if one.effect not in without]
+
+
+def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
     """Estimate the twin's terms and the causes' together, with bounds and intervals."""
     used = [*range(system.base), *chosen]
     terms = [system.all_terms[k] for k in used]

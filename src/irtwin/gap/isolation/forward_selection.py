@@ -55,7 +55,7 @@ def attribute(
     moments = system.moments(noise)
     least = search.matters(noise, [one.hypothesis for one in found]) / 2
     found = _backward(system, moments, found, least, limits.selection)
-    named = causes(system, moments, candidates, found, limits)
+    named = causes(system, moments, noise, candidates, found, limits)
     noise = system.residual_rms([k for cause in named for k in cause.columns], noise)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
 

@@ -17,6 +17,7 @@ from irtwin.gap.regression.hypotheses import candidate_columns
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.progress import Tell, with_progress
 from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
 Torque = Callable[[Motion], np.ndarray]
@@ -39,13 +40,7 @@ def torque_system(
     tried = candidate_pattern(robot, effects, columns)
     pattern = np.concatenate([stack.pattern, tried], axis=1)
 
-    def loaded(whole: Motion) -> Predicted:
-        assert below is not None, "candidates are built on what the twin predicts"
-        before = below(whole)
-        load, inertia = load_torque(robot, whole, before), load_inertia(robot, whole, before)
-        return replace(before, load=load, inertia=inertia)
-
-    candidates = Candidates(robot, effects, tried, loaded)
+    candidates = Candidates(robot, effects, tried, with_load(robot, below))
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
@@ -57,7 +52,7 @@ def torque_system(
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
-    return _enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+    return enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
 
 
 def power_system(
@@ -90,10 +85,22 @@ def power_system(
         return Rows([joined], known[:, None], motion.power[:, None])
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
-    return _enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+    return enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
 
 
-def _enough(system: System) -> System:
+def with_load(robot: Robot, below: Below | None) -> Below:
+    """Return what candidates of torque are built on, with what the links take beyond the gears."""
+
+    def loaded(whole: Motion) -> Predicted:
+        assert below is not None, "candidates are built on what the twin predicts"
+        before = below(whole)
+        load, inertia = load_torque(robot, whole, before), load_inertia(robot, whole, before)
+        return replace(before, load=load, inertia=inertia)
+
+    return loaded
+
+
+def enough(system: System) -> System:
     """Return the system; raise InputError where its samples are so few that the twin would fit whatever they say."""
     samples = int(system.rows.sum())
     if samples <= system.base:

@@ -49,25 +49,31 @@ class LeftOut:
         return Predicted(self.torque(whole), bodies=bodies)
 
 
-def twin_power(stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: Torque) -> PowerOf:
-    """Return the power that the twin predicts for a run, (N,) W, and the part that its axes take."""
+class TwinPower:
+    """The power that the twin predicts for a run, (N,) W, and the part that its axes take.
 
-    def none(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(len(torque)), np.zeros(len(torque))
+    `values` (L,): its coefficients of power; `system`: the equation that they were fitted to.
+    """
 
-    system = power_system(stack, motions, grouping, (), torque, none)
-    values = np.array([term.expected for _, term in stack.power_terms])
-    total = np.sum(system.moments(noise_before(system)), axis=0)
-    values[~stack.fixed] = twin_values(system, system.solution((), total))
-    standing = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
+    def __init__(self, stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: Torque):
+        """Fit the twin's terms of power on top of a joint torque."""
 
-    def power_of(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def none(motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return np.zeros(len(torque)), np.zeros(len(torque))
+
+        self._stack = stack
+        self.system = power_system(stack, motions, grouping, (), torque, none)
+        self.values = np.array([term.expected for _, term in stack.power_terms], dtype=float)
+        total = np.sum(self.system.moments(noise_before(self.system)), axis=0)
+        self.values[~stack.fixed] = twin_values(self.system, self.system.solution((), total))
+        self._at_rest = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
+
+    def __call__(self, motion: Motion, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return both for a run or a part of one, by its joint torque (N, n), N m."""
         both = []
         for piece in motion.pieces(_PIECE):
             start = piece.start - motion.start
-            columns = stack.power_columns(piece, torque[start : start + len(piece.time)])
-            both.append((columns @ values, columns @ np.where(standing, 0.0, values)))
+            columns = self._stack.power_columns(piece, torque[start : start + len(piece.time)])
+            both.append((columns @ self.values, columns @ np.where(self._at_rest, 0.0, self.values)))
         power, axes = zip(*both, strict=True)
         return np.concatenate(power), np.concatenate(axes)
-
-    return power_of

@@ -71,13 +71,11 @@ def candidate_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, 
     return tuple(columns)
 
 
-def hypotheses(
-    columns: Sequence[Column], first: int, scope: str, *, whole: bool = False, inside: Sequence[str] = ()
-) -> list[Hypothesis]:
+def hypotheses(columns: Sequence[Column], first: int, scope: str, *, inside: Sequence[str] = ()) -> list[Hypothesis]:
     """Group candidate columns (the first of index `first`) into hypotheses of one scope, joint by joint.
 
-    `whole` adds, for effects that act joint by joint, the hypothesis that they act in every joint at once;
-    effects `inside` the twin cannot be missing.
+    Effects on power that act joint by joint may also act in every joint at once; effects `inside` the twin cannot be
+    missing.
     """
     places: dict[tuple[str, str | None], dict[int, list[int]]] = {}
     for k, column in enumerate(columns):
@@ -85,7 +83,7 @@ def hypotheses(
         if scope == MISSING and effect.id in inside:
             continue
         joint = column.term.joint if column.term.link is None else None
-        keys = [joint, None] if whole and joint else [joint]
+        keys = [joint, None] if joint and effect.signal == "power" else [joint]
         for key in keys:
             places.setdefault((effect.id, key), {}).setdefault(id(effect), []).append(k)
     return [

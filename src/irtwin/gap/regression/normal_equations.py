@@ -31,6 +31,7 @@ class System:
     `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
     whether the block belongs to an observed run. With any that does not, each candidate column stands there twice: as
     it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of a brief candidate.
+    `beside_power`: the last equation is power's, beside those of torque.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -40,6 +41,7 @@ class System:
     group: np.ndarray
     observed: np.ndarray
     transient: Transient | None = None
+    beside_power: bool = False
 
     @property
     def base(self) -> int:
@@ -57,9 +59,12 @@ class System:
         return self.base + len(self.columns)
 
     def equations(self, columns: Sequence[int]) -> np.ndarray:
-        """Return (g,) whether an equation has any of some candidate columns."""
+        """Return (g,) whether an equation of their own signal has any of some candidate columns of one effect."""
         own = [k - len(self.columns) if k >= self.changed else k for k in columns]
-        return np.asarray(self.pattern[:, own].any(axis=1))
+        found = np.asarray(self.pattern[:, own].any(axis=1))
+        if self.beside_power and found[:-1].any():
+            found[-1] = False
+        return found
 
     @property
     def groups(self) -> int:

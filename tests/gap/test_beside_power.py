@@ -1,0 +1,92 @@
+"""Torque and power in one fit: what is real acts in both, what a sensor shows acts in torque alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.synthetic import arm, measure, swing, truth, with_constants
+
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.stack import Stack
+from irtwin.gap.data.case import Case
+from irtwin.gap.data.noise_floor import Floor
+from irtwin.gap.isolation.beside_power import find_beside_power
+from irtwin.gap.isolation.finding import find
+from irtwin.gap.isolation.verdict import AMBIGUOUS, ATTRIBUTED, verdict_of
+from irtwin.gap.regression.channel_equations import torque_system
+from irtwin.gap.regression.cross_fitted import LeftOut
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.signals.channels import Signals
+from irtwin.signals.log import Run
+
+ROBOT = with_constants(arm(2))
+NOISE = 0.3
+TRIED = ("asymmetric_friction", "torque_offset", "cable_drag", "torque_constant_error")
+DRAWN = ("meter_gain", "iron_loss")
+FLOOR = Floor(np.full(2, NOISE), NOISE, None)
+
+
+def case(*, real: float = 0.0, shown: float = 0.0, changed: bool = False, gain: float = 1.0) -> Case:
+    """Runs in which a constant torque, N m, acts on joint 2 or is only shown there; `changed`: not in half of them."""
+    motions, runs = {}, []
+    for k in range(12 if changed else 6):
+        observed = k < 6
+        motion = replace(swing(ROBOT, k, seconds=5.0), run=f"run_{k}")
+        plain = measure(ROBOT, motion, noise=NOISE, seed=k)
+        more = np.zeros_like(motion.dq)
+        more[:, 1] = real * observed
+        current = plain.current
+        loss = truth(ROBOT)["R"] * ((2 * current + more / 8.0) * more / 8.0)
+        power = gain * (plain.power + (more * motion.dq + loss).sum(axis=1))
+        torque = plain.torque + more + np.array([0.0, shown * observed])
+        motions[motion.run] = replace(plain, current=None, torque=torque, power=power)
+        signals = Signals(motion.time, motion.q)
+        role = "observed" if observed else "reference"
+        runs.append(Run(motion.run, motion.run, "", role, 0.0, (0.0, 0.0, 0.0), None, None, {}, signals))
+    return Case(ROBOT, (*BASELINE, "copper_loss"), tuple(runs), motions, (ROBOT, motions), DEFAULT)
+
+
+def found(one: Case, *, power: bool = True):
+    stack = Stack(ROBOT, one.effects)
+    plain = LeftOut(stack, torque_system(stack, one.with_torque, one.grouping, (), None))
+    tried = [shape for name in TRIED for shape in catalogue()[name].candidates(ROBOT)]
+    if not power:
+        system = torque_system(stack, one.with_torque, one.grouping, tried, plain.below)
+        return find("torque", one, system, FLOOR.torque, 0)
+    drawn = [shape for name in DRAWN for shape in catalogue()[name].candidates(ROBOT)]
+    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, FLOOR, 0)[0]
+
+
+def names(finding) -> list[str]:
+    return [f"{cause.effect} {cause.scope} {' '.join(cause.joints)}" for cause in finding.causes]
+
+
+def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
+    finding = found(case(real=3.0))
+    assert names(finding) == ["asymmetric_friction missing joint_2"]
+    terms = [(effect.id, term.joint) for effect, term in finding.system.terms]
+    offset = finding.estimate.values[terms.index(("torque_offset", "joint_2"))]
+    assert offset == pytest.approx(truth(ROBOT)["c"][1], abs=0.3)  # of the sensor alone
+
+
+def test_an_offset_of_a_sensor_costs_none():
+    assert names(found(case(shown=3.0))) == []
+
+
+@pytest.mark.parametrize(
+    ("made", "effect"), [({"real": 3.0}, "asymmetric_friction"), ({"shown": 3.0}, "torque_offset")]
+)
+def test_power_tells_what_torque_alone_cannot(made, effect):
+    changed = case(**made, changed=True)
+    beside = found(changed)
+    assert names(beside) == [f"{effect} changed joint_2"]
+    assert verdict_of([beside], FLOOR, DEFAULT.verdict) == ATTRIBUTED
+    alone = found(changed, power=False)
+    assert {"asymmetric_friction", "torque_offset"} <= {alone.causes[0].effect, *alone.causes[0].rivals}
+    assert verdict_of([alone], FLOOR, DEFAULT.verdict) == AMBIGUOUS
+
+
+def test_a_meter_out_of_scale_is_no_torque():
+    assert names(found(case(gain=1.1))) == []
