@@ -73,9 +73,9 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
-        """Every cause with its channel, the largest first."""
+        """Every cause with its channel, that which closes most first."""
         pairs = [(finding, cause) for finding in self.channels for cause in finding.causes]
-        return tuple(sorted(pairs, key=lambda pair: -pair[1].gain))
+        return tuple(sorted(pairs, key=lambda pair: -pair[0].closing([pair[1]]).size))
 
     @cached_property
     def document(self) -> Document:
@@ -148,7 +148,7 @@ def diagnose(
         explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = verdict_of(findings, floor, thresholds.verdict)
+    verdict = verdict_of(findings, floor, thresholds)
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}

@@ -54,6 +54,12 @@ class Repeats:
     stop_band: float = _threshold(
         1.05, "where the stop band begins, from which noise is taken without repeats", "times the cutoff", "the filter"
     )
+    steepest_fall: float = _threshold(
+        5.0,
+        "a spectrum that falls faster up to half the sampling rate was smoothed: it tells no noise",
+        "power of the frequency",
+        "decisions/gap-smoothed-logs.md",
+    )
 
 
 @dataclass(frozen=True)
@@ -209,6 +215,18 @@ class Verdict:
     )
 
 
+@dataclass(frozen=True)
+class Matters:
+    """Which causes close so much that a person is told of them one by one; the rest are counted."""
+
+    least_share: float = _threshold(
+        0.02, "least that a cause closes", "share of its channel's gap", "decisions/gap-causes-that-matter.md"
+    )
+    least_floors: float = _threshold(
+        0.5, "least that a cause closes at some joint, RMS", "floors", "decisions/gap-causes-that-matter.md"
+    )
+
+
 _LOGIT = "logit"
 _FITTED = "607 causes of 836 development cases; bench/blind/fit_confidence.py"
 
@@ -296,6 +314,7 @@ class Thresholds:
     power_consistency: PowerConsistency = PowerConsistency()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()
+    matters: Matters = Matters()
     confidence: Confidence = Confidence()
     places: Places = Places()
     regimes: Regimes = Regimes()

@@ -11,10 +11,11 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.forward_selection import Attribution, attribute
 from irtwin.gap.isolation.power_consistency import PowerBalance
-from irtwin.gap.isolation.shares import shares
+from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
@@ -28,8 +29,9 @@ class Finding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
-    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
-    part of what they close together, none where they close nothing; `power_balances`: what power says of each.
+    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
+    each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
+    of each; `seed`: of the resampling.
     """
 
     name: str
@@ -40,17 +42,30 @@ class Finding:
     held_out: HeldOut
     floor: np.ndarray | None
     estimate: Estimate
-    shares: tuple[float, ...] = ()
+    closed_squares: np.ndarray
     power_balances: tuple[PowerBalance, ...] = ()
+    seed: int = 0
 
     @property
     def causes(self) -> tuple[Cause, ...]:
         """The channel's causes, ranked."""
         return self.attribution.causes
 
+    @cached_property
+    def shares(self) -> tuple[float, ...]:
+        """Each cause's part of what they close together, none where they close nothing."""
+        return shares(self.system, self.attribution, self.closed_squares)
+
     def share(self, cause: Cause) -> float | None:
         """Return a cause's part of what all close together, None where they close nothing."""
         return self.shares[self.causes.index(cause)] if self.shares else None
+
+    def closing(self, causes: Sequence[Cause]) -> Closing:
+        """Return what some causes close of the channel's gap, beside the others."""
+        closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
+        runs = [variant.effect.runs for cause in causes for variant in cause.variants]
+        acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
+        return closing(closed, acting, self.held_out, self.floor, self.attribution.noise, self.seed)
 
     def balance(self, cause: Cause) -> PowerBalance | None:
         """Return what power says of a cause, None where it was not asked."""
@@ -122,8 +137,10 @@ def find(
     found = attribute(system, candidates, seed, case.thresholds, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
-    parts = shares(system, found, seed)
-    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), parts)
+    closed = closed_squares(system, found, seed)
+    return Finding(
+        name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), closed, seed=seed
+    )
 
 
 def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
