@@ -84,12 +84,15 @@ class Diagnosis:
         acted_on = [(cause.effect, writing.acted_on(robot, cause)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
+        weights = self.thresholds.confidence
+        causes = tuple(writing.cause(robot, *one, gains, self.verdict, weights) for one in named)
         return Document(
             verdict=self.verdict,
             robot=robot.name,
             gap=writing.gap(robot.joint_names, self.channels, self.energies),
             locations=tuple(map(writing.location, self.locations)),
-            causes=tuple(writing.cause(robot, *one, gains, self.verdict, self.thresholds.confidence) for one in named),
+            findings=writing.findings(robot, self.channels, named, causes, self.thresholds),
+            causes=causes,
             not_testable=tuple(map(writing.untestable, self.untestable)),
             shrink=writing.shrink(
                 robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed

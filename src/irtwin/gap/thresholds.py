@@ -185,6 +185,15 @@ class Ambiguity:
 
 
 @dataclass(frozen=True)
+class Changes:
+    """When an effect has changed since the reference runs."""
+
+    before: float = _threshold(
+        0.5, "with so much of its gain in the reference runs, they have it too", "share of the observed", _JUDGEMENT
+    )
+
+
+@dataclass(frozen=True)
 class PowerConsistency:
     """When power decides between mechanics and the torque sensor."""
 
@@ -244,6 +253,12 @@ class Confidence:
     per_share: float = _threshold(0.356, "per natural logarithm of the gain over the largest", _LOGIT, _FITTED)
     per_count: float = _threshold(-2.416, "per natural logarithm of the number of causes", _LOGIT, _FITTED)
     unexplained: float = _threshold(-2.640, "beside the verdict `unexplained`", _LOGIT, _FITTED)
+    of_rivals: float = _threshold(
+        0.5, "what rivals have of what the cause's confidence leaves", "share", "judgement, not calibrated"
+    )
+    family_more: float = _threshold(
+        0.0, "a family beyond its likeliest cause", _LOGIT, "0 is the least there can be; decisions/gap-families.md"
+    )
 
 
 @dataclass(frozen=True)
@@ -311,6 +326,7 @@ class Thresholds:
     ripples: Ripples = Ripples()
     selection: Selection = Selection()
     ambiguity: Ambiguity = Ambiguity()
+    changes: Changes = Changes()
     power_consistency: PowerConsistency = PowerConsistency()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()

@@ -11,6 +11,7 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.changes import shown_before
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.forward_selection import Attribution, attribute
@@ -135,6 +136,9 @@ def find(
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
     candidates = [one for one in candidates if one.effect not in without]
     found = attribute(system, candidates, seed, case.thresholds, floor)
+    while old := shown_before(system, found.causes, found.noise, frozenset(inside), case.thresholds.changes):
+        candidates = [one for one in candidates if not (one.effect in old and one.scope == CHANGED)]
+        found = attribute(system, candidates, seed, case.thresholds, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     closed = closed_squares(system, found, seed)
