@@ -72,5 +72,6 @@ def test_what_a_person_would_not_miss_does_not_matter(one: Closing) -> None:
 
 
 def test_what_a_person_would_miss_matters() -> None:
+    assert closed([2.0, 0.0]).matters(LIMITS) is True
     assert Closing(share=0.03, interval=(0.01, 0.05), floors=0.6, size=0.4).matters(LIMITS)
     assert Closing(share=0.03, interval=(0.01, 0.05), floors=None, size=0.4).matters(LIMITS)

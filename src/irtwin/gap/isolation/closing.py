@@ -70,7 +70,7 @@ def closing(
     half = 0.0
     if groups > 1:
         drawn = share(np.random.default_rng(seed).multinomial(groups, np.full(groups, 1 / groups), _RESAMPLED))
-        deviation = float(drawn.std(ddof=1)) * np.sqrt(groups / (groups - 1))
+        deviation = float(drawn.std(ddof=1) * np.sqrt(groups / (groups - 1)))
         half = float(student_t.ppf(0.975, groups - 1)) * deviation
     squares = closed.sum(axis=0) / np.maximum(rows.sum(axis=0), 1)
     where = closed[acting].sum(axis=0) / np.maximum(rows[acting].sum(axis=0), 1)
