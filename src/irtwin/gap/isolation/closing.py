@@ -10,8 +10,6 @@ from scipy.stats import t as student_t
 from irtwin.gap.regression.held_out import HeldOut
 from irtwin.gap.thresholds import Matters
 
-_RESAMPLED = 1000
-
 
 @dataclass(frozen=True)
 class Closing:
@@ -35,45 +33,29 @@ class Closing:
 
 
 def closing(
-    closed: np.ndarray,
-    acting: np.ndarray,
-    held_out: HeldOut,
-    floor: np.ndarray | None,
-    noise: np.ndarray,
-    seed: int,
+    closed: np.ndarray, acting: np.ndarray, held_out: HeldOut, floor: np.ndarray | None, noise: np.ndarray
 ) -> Closing:
     """Return what squares `closed` (G, g) on groups left out are worth; floor, and noise that is left: (g,) RMS.
 
-    acting: (G,) whether the causes act in a group at all.
-
-    Equations count by their mean square over the floor's, those that have a gap. The interval is Student's, of the
-    deviation under resampling, as groups are few.
+    acting: (G,) whether the causes act in a group at all. Equations count by their mean square over the floor's, those
+    that have a gap. The interval is Student's, of a ratio of sums over groups (linearised): groups are few, and of
+    groups drawn anew some sets have no gap to be a share of.
     """
-    before, rows = held_out.before, held_out.rows
-    mean = before.sum(axis=0) / np.maximum(rows.sum(axis=0), 1)
+    before, rows = held_out.before, np.maximum(held_out.rows.sum(axis=0), 1)
+    mean = before.sum(axis=0) / rows
     level = np.maximum(mean if floor is None else floor**2, np.finfo(float).tiny)
     least = np.zeros_like(mean) if floor is None else floor**2
     gap = mean > least
-    above = ((before - least * rows) / level)[:, gap]
-    won = (closed / level)[:, gap]
-    weights = rows[:, gap]
-
-    def share(count: np.ndarray) -> np.ndarray:
-        """Return the share of (R, G) draws, in which each group stands so often."""
-        total = np.maximum(count @ weights, 1)
-        whole = (count @ above / total).sum(axis=1)
-        part = (count @ won / total).sum(axis=1)
-        return np.asarray(np.divide(part, whole, out=np.zeros(len(count)), where=whole > 0))
-
-    groups = len(before)
-    value = min(float(share(np.ones((1, groups)))[0]), 1.0)
-    half = 0.0
-    if groups > 1:
-        drawn = share(np.random.default_rng(seed).multinomial(groups, np.full(groups, 1 / groups), _RESAMPLED))
-        deviation = float(drawn.std(ddof=1) * np.sqrt(groups / (groups - 1)))
-        half = float(student_t.ppf(0.975, groups - 1)) * deviation
-    squares = closed.sum(axis=0) / np.maximum(rows.sum(axis=0), 1)
-    where = closed[acting].sum(axis=0) / np.maximum(rows[acting].sum(axis=0), 1)
+    above = ((before - least * held_out.rows) / level / rows)[:, gap].sum(axis=1)
+    won = (closed / level / rows)[:, gap].sum(axis=1)
+    whole = float(above.sum())
+    value = min(float(won.sum()) / whole, 1.0) if whole > 0 else 0.0
+    half, groups = 0.0, len(before)
+    if groups > 1 and whole > 0:
+        error = float(np.sqrt(np.sum((won - value * above) ** 2) * groups / (groups - 1))) / whole
+        half = float(student_t.ppf(0.975, groups - 1)) * error
+    squares = closed.sum(axis=0) / rows
+    where = closed[acting].sum(axis=0) / np.maximum(held_out.rows[acting].sum(axis=0), 1)
     floors = None if floor is None else float(np.sqrt(np.max(np.maximum(where, 0.0) / floor**2)))
     size = float((squares / (noise if floor is None else floor) ** 2).sum())
     return Closing(value, (value - half, min(value + half, 1.0)), floors, size)

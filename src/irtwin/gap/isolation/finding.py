@@ -32,7 +32,7 @@ class Finding:
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
     each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
-    of each; `seed`: of the resampling.
+    of each.
     """
 
     name: str
@@ -45,7 +45,6 @@ class Finding:
     estimate: Estimate
     closed_squares: np.ndarray
     power_balances: tuple[PowerBalance, ...] = ()
-    seed: int = 0
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -66,7 +65,7 @@ class Finding:
         closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
         acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
-        return closing(closed, acting, self.held_out, self.floor, self.attribution.noise, self.seed)
+        return closing(closed, acting, self.held_out, self.floor, self.attribution.noise)
 
     def balance(self, cause: Cause) -> PowerBalance | None:
         """Return what power says of a cause, None where it was not asked."""
@@ -142,9 +141,7 @@ def find(
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     closed = closed_squares(system, found, seed)
-    return Finding(
-        name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), closed, seed=seed
-    )
+    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), closed)
 
 
 def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
