@@ -45,7 +45,7 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
 
 
 def shared(system, attribution):
-    return shares(system, attribution, closed_squares(system, attribution, seed=0))
+    return shares(closed_squares(system, attribution, seed=0), system.rows, attribution.noise)
 
 
 def test_independent_causes_share_by_their_squares():

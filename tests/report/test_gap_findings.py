@@ -62,13 +62,20 @@ def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> 
     )
 
 
+def test_guesses_alone_are_said_to_be_guesses() -> None:
+    guesses = [finding("load", confidence=0.4), finding("sensing", confidence=0.2)]
+    assert said("ambiguous", *guesses) == (
+        "Nothing that was found is sure: perhaps load of joint_5 (40 %); perhaps sensing of joint_5 (20 %)."
+    )
+
+
 def test_at_most_three_are_named_and_the_rest_is_counted() -> None:
     many = [finding(joints=(f"joint_{k}",), share=0.1) for k in range(1, 6)]
     told = said("ambiguous", *many, finding(**LITTLE), finding(channel="power", **LITTLE))
     assert "joint_3" in told and "joint_4" not in told
     assert told.endswith(
-        "Beside this, 3 findings together close 20 % of the gap in torque and 1 finding closes 0.040 % of the gap in "
-        "power."
+        "Not named here: 3 findings together close 20 % of the gap in torque and 1 finding closes 0.040 % of the gap "
+        "in power."
     )
 
 
@@ -84,7 +91,7 @@ def test_an_unexplained_gap_says_what_part_is_closed() -> None:
     assert told.startswith(
         "There is a gap in the power, and no effect in the catalogue closes it. Part of it is closed:"
     )
-    assert told.endswith("Beside this, 1 finding closes nothing of the gap in torque.")
+    assert told.endswith("Not named here: 1 finding closes nothing of the gap in torque.")
     assert said("unexplained") == "There is a gap, and no effect in the catalogue closes it."
 
 

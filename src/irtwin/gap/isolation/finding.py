@@ -54,7 +54,8 @@ class Finding:
     @cached_property
     def shares(self) -> tuple[float, ...]:
         """Each cause's part of what they close together, none where they close nothing."""
-        return shares(self.system, self.attribution, self.closed_squares)
+        level = self.attribution.noise if self.floor is None else self.floor
+        return shares(self.closed_squares, self.held_out.rows, level)
 
     def share(self, cause: Cause) -> float | None:
         """Return a cause's part of what all close together, None where they close nothing."""

@@ -41,13 +41,13 @@ def closed_squares(system: System, found: Attribution, seed: int) -> np.ndarray:
     return values
 
 
-def shares(system: System, found: Attribution, closed: np.ndarray) -> tuple[float, ...]:
-    """Return each cause's part of the squares that all close, in units of the noise; `closed` (C, G, g).
+def shares(closed: np.ndarray, rows: np.ndarray, level: np.ndarray) -> tuple[float, ...]:
+    """Return each cause's part of the mean squares that all close, `closed` (C, G, g), in units of a `level` (g,), RMS.
 
-    None of them (an empty tuple) where nothing is closed. A cause that only spoils the fit of held-out runs has a share
-    below zero.
+    rows: (G, g). None of them (an empty tuple) where nothing is closed. A cause that only spoils the fit of held-out
+    runs has a share below zero.
     """
-    values = (closed / np.maximum(found.noise, system.quietest) ** 2).sum(axis=(1, 2))
+    values = (closed.sum(axis=1) / np.maximum(rows.sum(axis=0), 1) / level**2).sum(axis=1)
     together = float(values.sum())
     return tuple(float(value) / together for value in values) if together > 0 else ()
 

@@ -74,7 +74,9 @@ def sentence(verdict: str, findings: Sequence[Finding], where: str, closes: str)
     told = [one for one in findings if one.matters][:_NAMED]
     rest = [one for one in findings if one not in told]
     said = "; ".join(one.sentence for one in told)
-    beside = f" Beside this, {counted(rest)}." if rest else ""
+    if told and all(one.confidence < _LIKELY for one in told):
+        said = f"nothing that was found is sure: {said}"
+    beside = f" Not named here: {counted(rest)}." if rest else ""
     if verdict == "unexplained":
         part = f" Part of it is closed: {said}." if said else ""
         return f"There is a gap{where}, and no effect in the catalogue closes it.{part}{beside}"
