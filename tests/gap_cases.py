@@ -6,6 +6,7 @@ import copy
 import math
 from typing import Any
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 
@@ -27,7 +28,8 @@ def document(verdict: str) -> Document:
 
 def diagnosis(verdict: str) -> dict[str, Any]:
     """The JSON of a diagnosis, to be changed at will."""
-    return copy.deepcopy({"verdict": verdict, "robot": "KR6", "gap": _gap(verdict)} | _NOTHING | _CASES[verdict])
+    said = {"verdict": verdict, "robot": "KR6", "gap": _gap(verdict)} | _NOTHING | _CASES[verdict]
+    return copy.deepcopy(with_findings(said))
 
 
 def curves(verdict: str) -> Curves:
@@ -117,6 +119,42 @@ def _cause(effect: str, confidence: float, share: float, rivals: list[str], scop
     }
 
 
+def findings_of(causes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The findings of causes: those of one family, scope and joints together."""
+    known = catalogue()
+    joined: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for one in causes:
+        joined.setdefault((known[one["effect"]].family, one["scope"], *one["joints"]), []).append(one)
+    return [
+        {
+            "id": "@".join(key),
+            "family": key[0],
+            "scope": key[1],
+            "joints": some[0]["joints"],
+            "channel": some[0]["evidence"]["channel"],
+            "confidence": max(one["confidence"] for one in some),
+            "share": 0.93 * sum(one["evidence"]["share_of_what_is_closed"] for one in some),
+            "share_interval95": [0.21 * some[0]["confidence"], 0.98 * some[0]["confidence"]],
+            "share_of": "the gap above the floor",
+            "matters": True,
+            "members": [
+                {"cause": one["id"], "effect": effect, "family": known[effect].family, "confidence": sure}
+                for one in some
+                for effect, sure in (
+                    (one["effect"], one["confidence"]),
+                    *((rival, 0.3 * one["confidence"]) for rival in one["indistinguishable_from"]),
+                )
+            ],
+        }
+        for key, some in joined.items()
+    ]
+
+
+def with_findings(said: dict[str, Any]) -> dict[str, Any]:
+    """A diagnosis whose findings are those of its causes."""
+    return said | {"findings": findings_of(said["causes"])}
+
+
 def _closeable(*given: float | None) -> dict[str, Any]:
     shares = dict(zip(("closed", "closeable", "by_regression", "nameless"), given, strict=True))
     of_joints = {f"{name}_by_equation": [share] for name, share in shares.items()}
@@ -181,7 +219,7 @@ _CASES: dict[str, dict[str, Any]] = {
     },
     "attributed": {
         "locations": _LOCATED,
-        "causes": [_cause("stribeck_friction", 0.96, 0.3, []), _cause("viscous_friction", 0.7, 0.7, [])],
+        "causes": [_cause("viscous_friction", 0.7, 0.7, []), _cause("stribeck_friction", 0.96, 0.3, [])],
         "not_testable": _UNTESTABLE,
         "shrink": _shrink(
             0.93,

@@ -1,7 +1,8 @@
 """`python -m blind.fit_confidence DIAGNOSES LABELS`: fit the confidence to causes named in development cases.
 
-A cause is right where its effect is one of the label's. Prints the weights for `irtwin.gap.thresholds.Confidence`, and
-the expected calibration error of the shipped weights and, cross-validated over cases, of the fitted ones.
+A cause is right where its effect is one of the label's, a finding where its family is that of one of them. Prints the
+weights for `irtwin.gap.thresholds.Confidence`, the expected calibration error of the shipped weights and,
+cross-validated over cases, of the fitted ones, and by how much the families' confidences are off.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 from scipy.special import expit
 
 from blind.compare import answers
 from blind.score import calibration, ranked
+from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.confidence import confidence
 from irtwin.gap.thresholds import DEFAULT, Confidence
 
@@ -65,6 +67,28 @@ def named(diagnoses: Mapping[str, Any], labels: Mapping[str, Any]) -> Iterator[N
             )
 
 
+def families(diagnoses: Mapping[str, Any], labels: Mapping[str, Any]) -> Iterator[tuple[float, bool]]:
+    """Yield the confidence of each finding of the cases that have a label, and whether its family is right."""
+    known = catalogue()
+    for case in sorted(set(diagnoses) & set(labels)):
+        true = {known[one["effect"]].family for one in labels[case]["effects"] if one["effect"] in known}
+        for finding in diagnoses[case].get("findings", ()):
+            yield finding["confidence"], finding["family"] in true
+
+
+def more(found: list[tuple[float, bool]]) -> float:
+    """Return what findings' confidences lack, in logits: what makes what is there likeliest, drawn towards 0."""
+    given = np.clip([sure for sure, _ in found], 1e-6, 1 - 1e-6)
+    right = np.array([is_right for _, is_right in found], dtype=float)
+    plain = np.log(given / (1 - given))
+
+    def loss(shift: float) -> float:
+        logit = plain + shift
+        return float(np.logaddexp(0.0, logit).sum() - right @ logit + 0.5 * shift**2)
+
+    return float(minimize_scalar(loss, bounds=(-4.0, 4.0), method="bounded").x)
+
+
 def fit(causes: list[Named]) -> Confidence:
     """Return the weights of a logistic regression on causes; the bounds of t and gain stay."""
     none = replace(DEFAULT.confidence, **dict.fromkeys(FITTED, 0.0))
@@ -100,12 +124,16 @@ def main() -> None:
     parser.add_argument("diagnoses", type=Path, help="folder of CASE.json, of a development split")
     parser.add_argument("labels", type=Path)
     given = parser.parse_args()
-    causes = list(named(answers(given.diagnoses), json.loads(given.labels.read_text(encoding="utf-8"))))
+    diagnoses, labels = answers(given.diagnoses), json.loads(given.labels.read_text(encoding="utf-8"))
+    causes, found = list(named(diagnoses, labels)), list(families(diagnoses, labels))
+    if found:
+        print(f"{len(found)} findings, {100 * np.mean([right for _, right in found]):.0f} % of them of a right family")
+        print(f"family_more = {more(found):.3f} beyond what they were given with; error {calibration(found)[0]:.3f}")
     right = sum(one.right for one in causes)
     print(f"{len(causes)} causes, {100 * right / max(len(causes), 1):.0f} % of them right")
-    found = fit(causes)
+    weights = fit(causes)
     for name in FITTED:
-        print(f"{name} = {getattr(found, name):.3f}  (shipped: {getattr(DEFAULT.confidence, name):.3f})")
+        print(f"{name} = {getattr(weights, name):.3f}  (shipped: {getattr(DEFAULT.confidence, name):.3f})")
     shipped = error(causes, [DEFAULT.confidence] * len(causes))
     fitted = error(causes, cross_validated(causes))
     print(f"expected calibration error: shipped {shipped:.3f}, fitted and cross-validated {fitted:.3f}")

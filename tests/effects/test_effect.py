@@ -75,7 +75,7 @@ def test_effects_are_as_the_ontology_says():
     for name, effect in catalogue().items():
         one = individuals[name]
         assert str(graph.value(one, irt.has_Channel)).rpartition("/")[2] == effect.channel
-        assert str(graph.value(one, irt.Effect_Family)) == effect.family
+        assert str(graph.value(one, irt.has_Family)).rpartition("/")[2] == effect.family
         stated = {
             str(graph.value(parameter, irt.Parameter_Name)): QUDT_UNITS[
                 str(graph.value(parameter, unit_of)).rpartition("/")[2]

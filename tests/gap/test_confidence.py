@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals
 from irtwin.gap.thresholds import DEFAULT
 
 PLENTY = {"t": 8.0, "gain": 0.5, "closed": 0.9, "share": 1.0, "count": 1, "weights": DEFAULT.confidence}
@@ -29,3 +32,24 @@ def test_weaker_evidence_lowers_it() -> None:
     for name, weaker in {"t": 1.0, "gain": 0.01, "closed": 0.1, "share": 0.1, "count": 4}.items():
         assert confidence(**(PLENTY | {name: weaker}), unexplained=False) < sure, name
     assert confidence(**PLENTY, unexplained=True) < sure
+
+
+RIVALS = st.dictionaries(st.sampled_from(["a", "b", "c", "d"]), st.floats(-1, 10))
+
+
+@given(own=st.floats(0, 1), gains=RIVALS, more=st.lists(st.floats(0, 1), min_size=1, max_size=4))
+def test_no_rival_is_likelier_than_its_cause_and_no_cause_than_its_family(own, gains, more) -> None:
+    rivals = of_rivals(own, list(gains), gains, DEFAULT.confidence)
+    assert rivals.keys() == gains.keys()
+    assert all(0 <= one <= own for one in rivals.values())
+    assert own + sum(rivals.values()) <= 1 + 1e-9
+    assert max(more) - 1e-9 <= of_family(more, DEFAULT.confidence) <= 1
+
+
+def test_rivals_share_by_their_gains() -> None:
+    rivals = of_rivals(0.6, ["load", "position"], {"load": 3.0, "position": 1.0}, DEFAULT.confidence)
+    assert rivals == pytest.approx({"load": 0.15, "position": 0.05})
+
+
+def test_what_calibration_adds_raises_a_family() -> None:
+    assert of_family([0.5], replace(DEFAULT.confidence, family_more=1.0)) == pytest.approx(0.731, abs=1e-3)

@@ -133,7 +133,7 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("causes", {}, "diagnosis.causes must be an array"),
         ("gap.torque", [], "diagnosis.gap.torque must be an object"),
         ("robot", 7, "diagnosis.robot must be a string"),
-        ("causes.1.id", "stribeck_friction@joint_a3", "diagnosis.causes: two have one id"),
+        ("causes.1.id", "viscous_friction@joint_a3", "diagnosis.causes: two have one id"),
         ("shrink.by_cause.0.cause", "glue", "diagnosis.shrink.by_cause: no cause has the id glue"),
     ],
 )
@@ -167,8 +167,15 @@ def test_ids_are_given_once(causes: list[tuple[str, list[str]]]) -> None:
     assert len(set(ids)) == len(ids)
 
 
-def test_the_largest_cause_of_the_foremost_channel_comes_first() -> None:
-    assert [cause.effect for cause in gap_cases.document("attributed").largest_first] == [
-        "viscous_friction",
-        "stribeck_friction",
-    ]
+def test_findings_are_of_the_causes() -> None:
+    said = gap_cases.diagnosis("attributed")
+    said["findings"][0]["members"] = said["findings"][0]["members"][:1]
+    with pytest.raises(InputError, match=r"diagnosis.findings: stribeck_friction@joint_a3 has to be a cause"):
+        Document.from_json(said)
+
+
+def test_two_findings_with_one_id_are_an_error() -> None:
+    said = gap_cases.diagnosis("attributed")
+    said["findings"] *= 2
+    with pytest.raises(InputError, match=r"diagnosis.findings: two have one id"):
+        Document.from_json(said)

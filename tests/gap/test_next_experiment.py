@@ -73,9 +73,8 @@ def ground_of(motions, tried, cause=None, rivals=()):
     attribution = Attribution(causes, noise, found, np.zeros(len(found)), np.zeros(len(found)))
     nothing = Estimate.__new__(Estimate)
     observed = frozenset(m.run for m in motions)
-    finding = Finding(
-        "torque", ROBOT.joint_names, observed, system, attribution, held_out(system, noise, noise, ()), None, nothing
-    )
+    judged, closed = held_out(system, noise, noise, ()), np.zeros((0, *np.shape(system.rows)))
+    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, judged, None, nothing, closed)
     return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
 
 

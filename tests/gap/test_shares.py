@@ -11,9 +11,10 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.forward_selection import Attribution
-from irtwin.gap.isolation.shares import shares
+from irtwin.gap.isolation.shares import closed_squares, shares
+from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, Column, Variant
-from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.normal_equations import System, noise_before
 from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 400, 5
@@ -43,23 +44,27 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
     return system, Attribution(causes, np.array([noise]), (), np.zeros(0), np.zeros(0))
 
 
+def shared(system, attribution):
+    return shares(closed_squares(system, attribution, seed=0), system.rows, attribution.noise)
+
+
 def test_independent_causes_share_by_their_squares():
-    found = shares(*system_of(np.eye(2), [2.0, 1.0]), seed=0)
+    found = shared(*system_of(np.eye(2), [2.0, 1.0]))
     assert found == pytest.approx([0.8, 0.2], abs=0.02)
 
 
 def test_shares_add_up_to_one_in_any_order_of_the_causes():
     mix = [[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.3, 1.0]]
     system, attribution = system_of(mix, [1.0, 2.0, -1.0])
-    found = shares(system, attribution, 0)
+    found = shared(system, attribution)
     assert sum(found) == pytest.approx(1)
     turned = SimpleNamespace(causes=attribution.causes[::-1], noise=attribution.noise)
-    assert shares(system, turned, 0) == pytest.approx(found[::-1])
+    assert shared(system, turned) == pytest.approx(found[::-1])
 
 
 def test_twins_share_alike():
     """Either closes nearly all alone: the one that is added first would take it."""
-    found = shares(*system_of([[1.0, 0.02], [1.0, -0.02]], [1.0, 1.0]), seed=0)
+    found = shared(*system_of([[1.0, 0.02], [1.0, -0.02]], [1.0, 1.0]))
     assert found == pytest.approx([0.5, 0.5], abs=0.02)
 
 
@@ -67,17 +72,25 @@ def test_twins_share_alike():
 def test_many_causes_are_shared_by_orders_drawn():
     count = 10
     system, attribution = system_of(np.eye(count), np.arange(1.0, count + 1))
-    found = shares(system, attribution, 0)
+    found = shared(system, attribution)
     squares = np.arange(1.0, count + 1) ** 2
     assert found == pytest.approx(squares / squares.sum(), abs=0.01)
-    assert found == shares(system, attribution, 0)
+    assert found == shared(system, attribution)
 
 
 def test_one_cause_has_it_all_and_none_has_nothing():
     system, attribution = system_of([[1.0]], [1.0])
-    assert shares(system, attribution, 0) == (1.0,)
-    assert shares(system, SimpleNamespace(causes=(), noise=attribution.noise), 0) == ()
+    assert shared(system, attribution) == (1.0,)
+    assert shared(system, SimpleNamespace(causes=(), noise=attribution.noise)) == ()
 
 
 def test_where_nothing_is_closed_nothing_is_shared():
-    assert shares(*system_of(np.eye(2), [0.0, 0.0], size=1.0), seed=0) == ()
+    assert shared(*system_of(np.eye(2), [0.0, 0.0], size=1.0)) == ()
+
+
+def test_what_each_closes_adds_up_to_what_all_close():
+    system, attribution = system_of([[1.0, 0.0], [0.6, 0.8]], [1.0, 2.0])
+    chosen = [k for cause in attribution.causes for k in cause.columns]
+    judged = held_out(system, noise_before(system), attribution.noise, chosen)
+    closed = closed_squares(system, attribution, seed=0)
+    assert closed.sum(axis=0) == pytest.approx(judged.before - judged.after)

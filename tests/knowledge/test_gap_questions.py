@@ -50,8 +50,8 @@ def answers(graph: KnowledgeGraph, name: str, columns: str) -> list[tuple[object
 EXPECTED = {
     "attributed": {
         "why_more_energy": [
-            (8.4, "Stribeck friction", "joint_a3", "changed", 0.96, 0.93),
             (8.4, "viscous friction", "joint_a3", "changed", 0.7, 0.93),
+            (8.4, "Stribeck friction", "joint_a3", "changed", 0.96, 0.93),
         ],
         "where_is_the_gap": [("torque", "joint_a3", "low speed", "speed", 0.81), ("power", None, None, None, 0.12)],
         "what_to_do": {
@@ -110,7 +110,8 @@ def test_every_individual_says_who_made_it(diagnosed: tuple[str, KnowledgeGraph]
     _, graph = diagnosed
     orphans = graph.query(
         """SELECT ?thing WHERE {
-          VALUES ?kind { irt:Gap_Diagnosis irt:Gap_Size irt:Gap_Location irt:Gap_Cause irt:Gap_Cause_Parameter
+          VALUES ?kind { irt:Gap_Diagnosis irt:Gap_Size irt:Gap_Location irt:Gap_Finding irt:Gap_Finding_Member
+            irt:Gap_Cause irt:Gap_Cause_Parameter
             irt:Gap_Competitor irt:Gap_Change irt:Gap_Shrinkage irt:Closeable_Gap irt:Untestable_Effect
             irt:Next_Experiment irt:Experiment_Instruction irt:Experiment_Run irt:Experiment_Setting
             irt:Experiment_Question irt:Considered_Experiment }

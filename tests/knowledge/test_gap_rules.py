@@ -71,6 +71,12 @@ def individuals() -> str:
                 f":{robot}_{effect}_{scope} a irt:Gap_Cause ; irt:cause_of :d_{robot} ; "
                 f"irt:caused_by_Effect effect:{effect} ; irt:has_Scope scope:{scope} ."
             )
+    for scope, matters in (("missing", "true"), ("missing", "false"), ("changed", "false")):
+        lines.append(
+            f":{scope}_{matters} a irt:Gap_Cause ; irt:cause_of :d_arm ; irt:caused_by_Effect effect:payload ; "
+            f"irt:has_Scope scope:{scope} . :m_{scope}_{matters} irt:member_by_Cause :{scope}_{matters} ; "
+            f"irt:member_of_Finding :f_{scope}_{matters} . :f_{scope}_{matters} irt:Matters {matters} ."
+        )
     for number, (verdict, closed, saved) in enumerate(VERDICTS):
         lines.append(f":v{number} a irt:Gap_Diagnosis ; irt:diagnosis_of :arm ; irt:has_Verdict verdict:{verdict} .")
         if saved:
@@ -113,3 +119,8 @@ def test_what_a_simulator_lacks_is_mended_there(effect, scope, actions):
 @pytest.mark.parametrize("number", range(len(VERDICTS)), ids=[" ".join(map(str, case)) for case in VERDICTS])
 def test_a_verdict_says_what_to_do(number, actions):
     assert actions.get(f"v{number}", set()) == list(VERDICTS.values())[number]
+
+
+def test_a_cause_that_closes_little_calls_for_nothing(actions):
+    assert actions["missing_true"] == {MODEL, "measure the payload"}
+    assert not {"missing_false", "changed_false"} & set(actions)

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests.individuals import individual
 
-from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph

@@ -54,6 +54,22 @@ def diagnosis(**changes: Any) -> Document:
         "indistinguishable_from": ["stribeck_friction"],
         "evidence": evidence,
     }
+    finding = {
+        "id": "friction@all",
+        "family": "friction",
+        "joints": ["joint_1", "joint_2"],
+        "scope": "missing",
+        "channel": "torque",
+        "confidence": 0.98,
+        "share": 0.9,
+        "share_interval95": [0.8, 1.0],
+        "share_of": "the gap above the floor",
+        "matters": True,
+        "members": [
+            {"cause": cause["id"], "effect": "coulomb_friction", "family": "friction", "confidence": 0.97},
+            {"cause": cause["id"], "effect": "stribeck_friction", "family": "friction", "confidence": 0.01},
+        ],
+    }
     location = {"channel": "torque", "joint": "joint_1", "regime": None, "follows": None, "runs": ["swing_3"]}
     location |= {"share": 0.8, "share_interval95": [0.7, 0.9], "excess": 5.0, "excess_interval95": [4.0, 6.0]}
     said = {
@@ -64,6 +80,7 @@ def diagnosis(**changes: Any) -> Document:
             "torque": {"joint_1": {"rmse": 3.0, "noise_floor": None, "excess": None}},
         },
         "locations": [location | {"concentration": 1.0, "false_discovery_rate": 0.01}],
+        "findings": [finding],
         "causes": [cause],
         "not_testable": [{"effect": "payload", "why": "one payload only"}, {"effect": "payload", "why": "too short"}],
         "shrink": shrink(),

@@ -51,9 +51,9 @@ def verdict_of(page: str) -> str:
         ("no_gap", "There is no gap: the twin explains the data down to the noise floor."),
         (
             "ambiguous",
-            "There is a gap in the torque of joint_a3, mostly in the regime “low speed”, and these data cannot tell"
-            " its causes apart: Stribeck friction on joint_a3 or nonlinear viscous friction on joint_a3 would explain"
-            " it equally well.",
+            "Friction of joint_a3 differs from the twin’s (52 %): Stribeck friction (52 %) or nonlinear viscous"
+            " friction (16 %) and nonlinear viscous friction (44 %) or Stribeck friction (13 %). Adding this to"
+            " the twin closes 90 % of the gap on held-out runs (95 % interval 85 % to 94 %).",
         ),
         (
             "unexplained",
@@ -62,8 +62,8 @@ def verdict_of(page: str) -> str:
         ),
         (
             "attributed",
-            "Viscous friction on joint_a3 (confidence 70 %) and Stribeck friction on joint_a3 (confidence 96 %) changed"
-            " since the reference runs. Adding this to the twin closes 93 % of the gap on held-out runs"
+            "Friction of joint_a3 changed since the reference runs (96 %): viscous friction (70 %) and Stribeck"
+            " friction (96 %). Adding this to the twin closes 93 % of the gap on held-out runs"
             " (95 % interval 88 % to 97 %).",
         ),
     ],
@@ -137,10 +137,23 @@ def test_places_carry_their_intervals(pages: dict[str, Path]) -> None:
 def test_classes_of_several_causes_are_kept_apart(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("ambiguous")
     said["causes"][1] |= {"effect": "payload", "joints": [], "indistinguishable_from": ["base_tilt"]}
-    verdict = verdict_of(page_of(tmp_path, said))
-    assert verdict.endswith(
-        "either Stribeck friction on joint_a3 or nonlinear viscous friction on joint_a3; either payload or base tilt."
-    )
+    said["causes"][1]["confidence"] = 0.61
+    verdict = verdict_of(page_of(tmp_path, gap_cases.with_findings(said)))
+    assert "(52 %): Stribeck friction (52 %) or nonlinear viscous friction (16 %); " in verdict
+    assert "load differs from the twin’s (61 %): payload (61 %) or base tilt (18 %)." in verdict
+
+
+def test_findings_stand_in_a_table_and_what_closes_little_is_folded(tmp_path: Path) -> None:
+    said = gap_cases.diagnosis("attributed")
+    said["causes"][1] |= {"effect": "payload", "joints": []}
+    said = gap_cases.with_findings(said)
+    said["findings"][1] |= {"matters": False, "share": 0.0004}
+    page = html.unescape(page_of(tmp_path, said)).replace("\N{NO-BREAK SPACE}", " ")
+    assert "Friction of joint_a3 changed since the reference runs</th>" in page
+    assert "Load changed" not in page
+    assert '<p class="hint">Not listed: 1 finding closes 0.040 % of the gap in torque.</p>' in page
+    few, little = page.split('id="which"')[1].split("<summary>Causes that close little</summary>")
+    assert "1. Viscous friction on joint_a3</h3>" in few and "2. Payload</h3>" in little.split('id="shrink"')[0]
 
 
 def test_stretches_of_one_run_have_bars_of_their_own(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_every_number_that_matters_is_shown(tmp_path: Path) -> None:
 def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return a cause of one joint, and what it closes."""
     said = gap_cases.diagnosis("attributed")
-    cause, change = said["causes"][0], said["shrink"]["by_cause"][1]
+    cause, change = said["causes"][1], said["shrink"]["by_cause"][1]
     name = f"stribeck_friction@{joint}"
     cause |= {"id": name, "joints": [joint], "confidence": confidence}
     cause["parameters"] = [{"name": "Fs", "joint": joint, "value": 10 * share, "unit": "N m", "interval95": None}]
@@ -130,10 +130,10 @@ def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, 
 
 def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("attributed")
-    pairs = [friction_of("joint_a2", 0.35, 0.61), friction_of("joint_a5", 0.65, 0.72)]
+    pairs = [friction_of("joint_a5", 0.65, 0.72), friction_of("joint_a2", 0.35, 0.61)]
     said["causes"] = [cause for cause, _ in pairs]
     said["shrink"]["by_cause"] = [change for _, change in reversed(pairs)]  # in another order than the causes
-    page = page_of(tmp_path, said)
+    page = page_of(tmp_path, gap_cases.with_findings(said))
     page = html.unescape(page).replace("\N{NO-BREAK SPACE}", " ")
     parts = page.split('id="which"')[1].split("<h3>")[1:]
     assert [part.split("</h3>")[0] for part in parts[:2]] == [

@@ -76,9 +76,9 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
-        """Every cause with its channel, the largest first."""
+        """Every cause with its channel, that which closes most first."""
         pairs = [(finding, cause) for finding in self.channels for cause in finding.causes]
-        return tuple(sorted(pairs, key=lambda pair: -pair[1].gain))
+        return tuple(sorted(pairs, key=lambda pair: -pair[0].closing([pair[1]]).size))
 
     @cached_property
     def document(self) -> Document:
@@ -87,12 +87,15 @@ class Diagnosis:
         acted_on = [(cause.effect, writing.acted_on(robot, cause)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
+        weights = self.thresholds.confidence
+        causes = tuple(writing.cause(robot, *one, gains, self.verdict, weights) for one in named)
         return Document(
             verdict=self.verdict,
             robot=robot.name,
             gap=writing.gap(robot.joint_names, self.channels, self.energies),
             locations=tuple(map(writing.location, self.locations)),
-            causes=tuple(writing.cause(robot, *one, gains, self.verdict, self.thresholds.confidence) for one in named),
+            findings=writing.findings(robot, self.channels, named, causes, self.thresholds),
+            causes=causes,
             not_testable=tuple(map(writing.untestable, self.untestable)),
             shrink=writing.shrink(
                 robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
@@ -152,7 +155,7 @@ def diagnose(
         explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = verdict_of(findings, floor, thresholds.verdict)
+    verdict = verdict_of(findings, floor, thresholds)
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}

@@ -54,6 +54,12 @@ class Repeats:
     stop_band: float = _threshold(
         1.05, "where the stop band begins, from which noise is taken without repeats", "times the cutoff", "the filter"
     )
+    steepest_fall: float = _threshold(
+        5.0,
+        "a spectrum that falls faster up to half the sampling rate was smoothed: it tells no noise",
+        "power of the frequency",
+        "decisions/gap-smoothed-logs.md",
+    )
 
 
 @dataclass(frozen=True)
@@ -182,6 +188,15 @@ class Ambiguity:
 
 
 @dataclass(frozen=True)
+class Changes:
+    """When an effect has changed since the reference runs."""
+
+    before: float = _threshold(
+        0.5, "with so much of its gain in the reference runs, they have it too", "share of the observed", _JUDGEMENT
+    )
+
+
+@dataclass(frozen=True)
 class PowerConsistency:
     """When power decides between mechanics and the torque sensor."""
 
@@ -212,6 +227,18 @@ class Verdict:
     )
 
 
+@dataclass(frozen=True)
+class Matters:
+    """Which causes close so much that a person is told of them one by one; the rest are counted."""
+
+    least_share: float = _threshold(
+        0.02, "least that a cause closes", "share of its channel's gap", "decisions/gap-causes-that-matter.md"
+    )
+    least_floors: float = _threshold(
+        0.5, "least that a cause closes at some joint, RMS", "floors", "decisions/gap-causes-that-matter.md"
+    )
+
+
 _LOGIT = "logit"
 _FITTED = "607 causes of 836 development cases; bench/blind/fit_confidence.py"
 
@@ -229,6 +256,12 @@ class Confidence:
     per_share: float = _threshold(0.356, "per natural logarithm of the gain over the largest", _LOGIT, _FITTED)
     per_count: float = _threshold(-2.416, "per natural logarithm of the number of causes", _LOGIT, _FITTED)
     unexplained: float = _threshold(-2.640, "beside the verdict `unexplained`", _LOGIT, _FITTED)
+    of_rivals: float = _threshold(
+        0.5, "what rivals have of what the cause's confidence leaves", "share", "judgement, not calibrated"
+    )
+    family_more: float = _threshold(
+        0.0, "a family beyond its likeliest cause", _LOGIT, "0 is the least there can be; decisions/gap-families.md"
+    )
 
 
 @dataclass(frozen=True)
@@ -296,9 +329,11 @@ class Thresholds:
     ripples: Ripples = Ripples()
     selection: Selection = Selection()
     ambiguity: Ambiguity = Ambiguity()
+    changes: Changes = Changes()
     power_consistency: PowerConsistency = PowerConsistency()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()
+    matters: Matters = Matters()
     confidence: Confidence = Confidence()
     places: Places = Places()
     regimes: Regimes = Regimes()

@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity, Term
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.document import document
+from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
+from irtwin.gap.isolation.branches import Branch, branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.verdict import UNEXPLAINED
@@ -21,7 +24,7 @@ from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
-from irtwin.gap.thresholds import Confidence
+from irtwin.gap.thresholds import Confidence, Thresholds
 from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
 
@@ -80,6 +83,58 @@ def cause(
         indistinguishable_from=one.rivals,
         evidence=_evidence(finding, one, closed),
     )
+
+
+def findings(
+    robot: Robot,
+    channels: Sequence[Finding],
+    named: Sequence[tuple[Finding, Cause, str]],
+    causes: Sequence[document.Cause],
+    limits: Thresholds,
+) -> tuple[document.Finding, ...]:
+    """Return the causes as a tree, the branch that closes most first; `named`: every cause with its id."""
+    of_all = [(channel, branch) for channel in channels for branch in branches(channel)]
+    of_all.sort(key=lambda pair: -pair[1].closing.size)
+    joints = [_joints(robot, branch) for _, branch in of_all]
+    ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
+    written = {cause.id: cause for cause in causes}
+    found = []
+    for (channel, branch), on, name in zip(of_all, joints, ids, strict=True):
+        own = [written[next(name for _, one, name in named if one is each)] for each in branch.causes]
+        members = [_members(cause, limits.confidence) for cause in own]
+        likely = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
+        found.append(
+            document.Finding(
+                id=name,
+                family=branch.family,
+                joints=on,
+                scope=branch.scope,
+                channel=channel.name,
+                confidence=of_family(likely, limits.confidence),
+                share=branch.closing.share,
+                share_interval95=branch.closing.interval,
+                share_of="the mean square, as no floor is known"
+                if channel.floor is None
+                else "the gap above the floor",
+                matters=branch.closing.matters(limits.matters),
+                members=tuple(one for some in members for one in some),
+            )
+        )
+    return tuple(found)
+
+
+def _joints(robot: Robot, branch: Branch) -> tuple[str, ...]:
+    touched = {joint for cause in branch.causes for joint in acted_on(robot, cause)}
+    return tuple(joint for joint in robot.joint_names if joint in touched)
+
+
+def _members(cause: document.Cause, weights: Confidence) -> list[document.Member]:
+    """Return a cause and what the data cannot tell from it."""
+    rivals = of_rivals(cause.confidence, cause.indistinguishable_from, cause.evidence.gain_of_rivals, weights)
+    return [
+        document.Member(cause=cause.id, effect=effect, family=catalogue()[effect].family, confidence=sure)
+        for effect, sure in {cause.effect: cause.confidence, **rivals}.items()
+    ]
 
 
 def _evidence(finding: Finding, one: Cause, closed: float) -> document.Evidence:

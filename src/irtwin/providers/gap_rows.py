@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.document import Cause, Change, Document, Location
+from irtwin.gap.document.document import Cause, Change, Document, Finding, Location
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.storage import experiment_schema, gap_schema
 from irtwin.storage.schema import Base
@@ -31,6 +31,8 @@ def rows(said: Document, at: Place) -> Iterator[Base]:
     """Yield all rows of a diagnosis but its own."""
     yield from _sizes(said, at)
     yield from _locations(said, at)
+    for rank, finding in enumerate(said.findings, start=1):
+        yield from _finding(finding, rank, at)
     for rank, cause in enumerate(said.causes, start=1):
         yield from _cause(cause, rank, at)
     yield from _changes(said, at)
@@ -88,6 +90,30 @@ def _location_id(one: Location) -> str:
     """Return the name of a place, such as "torque@joint_2:reversal": a diagnosis names each place once."""
     joint = "" if one.joint is None else f"@{one.joint}"
     return f"{one.channel}{joint}" + ("" if one.regime is None else f":{one.regime}")
+
+
+def _finding(said: Finding, rank: int, at: Place) -> Iterator[Base]:
+    key = {"diagnosis_id": at.diagnosis_id, "finding_id": said.id}
+    yield gap_schema.GapFinding(
+        **key,
+        rank=rank,
+        robot_id=at.robot_id,
+        family=said.family,
+        scope=said.scope,
+        channel=said.channel,
+        confidence=said.confidence,
+        share=said.share,
+        share_lower=said.share_interval95[0],
+        share_upper=said.share_interval95[1],
+        share_of=said.share_of,
+        matters=said.matters,
+    )
+    for joint in dict.fromkeys(said.joints):
+        yield gap_schema.GapFindingJoint(**key, joint=joint, robot_id=at.robot_id)
+    for number, one in enumerate(said.members, start=1):
+        yield gap_schema.GapFindingMember(
+            **key, number=number, cause_id=one.cause, effect=one.effect, confidence=one.confidence
+        )
 
 
 def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:

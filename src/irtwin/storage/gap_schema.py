@@ -88,6 +88,53 @@ class GapLocationRun(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+class GapFinding(Base):
+    """Causes of one family and scope whose joints overlap: the answer one level above the effects."""
+
+    __tablename__ = "gap_finding"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    finding_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
+    rank: Mapped[int]
+    robot_id: Mapped[str]
+    family: Mapped[str]  # "friction", "load", ...
+    scope: Mapped[str]  # "missing" or "changed"
+    channel: Mapped[str]  # "torque" or "power"
+    confidence: Mapped[float]  # that the family is right
+    share: Mapped[float]  # of the channel's gap that closes; may be below 0
+    share_lower: Mapped[float]
+    share_upper: Mapped[float]
+    share_of: Mapped[str]  # in words: what the share is of
+    matters: Mapped[bool]  # whether it is worth a word of its own
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapFindingJoint(Base):
+    """A joint of a finding; none for the whole robot."""
+
+    __tablename__ = "gap_finding_joint"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    finding_id: Mapped[str] = mapped_column(primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapFindingMember(Base):
+    """An effect that a finding may be: that of a cause, or one that the data cannot tell from it."""
+
+    __tablename__ = "gap_finding_member"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    finding_id: Mapped[str] = mapped_column(primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    cause_id: Mapped[str]
+    effect: Mapped[str]
+    confidence: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
 class GapCause(Base):
     """An effect held responsible for part of the gap."""
 

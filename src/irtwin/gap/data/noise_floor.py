@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
+from scipy.signal import welch
 
 from irtwin.gap.thresholds import Repeats
 from irtwin.signals.filter import kernel, low_pass
@@ -16,6 +17,7 @@ from irtwin.signals.motion import Motion
 
 REPEATS, OUT_OF_BAND = "repeats", "out_of_band"
 _LEAST = 1e-9  # N m or W: of a channel that repeats itself to the last bit
+_WELCH = 512  # samples of a stretch whose spectrum is averaged
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repe
     A simulator's runs say nothing of it: they have no noise, and repeat themselves.
     `motions`: each run's, by name, filtered alike. Repeats: RMS of the aligned difference / sqrt(2), pooled.
     Above the band: what the filter took away, taken as white, scaled to the band. This misses noise that is
-    coloured, so it is the smaller of the two.
+    coloured, so it is the smaller of the two. A run that was smoothed before it was logged tells nothing.
     """
     runs = [run for run in runs if run.role != "simulated"]
     pairs = [(motions[run.repeat_of], motions[run.name]) for run in runs if run.repeat_of and _has_repeat(run, runs)]
@@ -55,8 +57,11 @@ def _has_repeat(run: Run, runs: Sequence[Run]) -> bool:
 
 
 def _pooled(variances: Sequence[np.ndarray | None]) -> np.ndarray | None:
-    known = [variance for variance in variances if variance is not None]
-    return np.maximum(np.sqrt(np.mean(known, axis=0)), _LEAST) if known else None
+    """Return the RMS of all runs (n,), None where some joint's is known of none."""
+    known = np.array([variance for variance in variances if variance is not None])
+    if not len(known) or np.isnan(known).all(axis=0).any():
+        return None
+    return np.asarray(np.maximum(np.sqrt(np.nanmean(known, axis=0)), _LEAST))
 
 
 def _difference(first: Motion, second: Motion, signal: str, limits: Repeats) -> np.ndarray | None:
@@ -103,7 +108,7 @@ def _shift(first: Motion, second: Motion, largest: float) -> float:
 
 
 def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Repeats) -> np.ndarray | None:
-    """Return the variance in the band of white noise that has, above it, what the filter takes away."""
+    """Return the variance in the band of white noise that has above it what the filter takes away; NaN if smoothed."""
     if signal is None or motion.cutoff is None or len(kernel(motion.rate, motion.cutoff)) == 1:
         return None
     share = min(1.0, limits.stop_band * motion.cutoff / (motion.rate / 2))
@@ -111,4 +116,17 @@ def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: 
         return None
     even = make_interp_spline(time, signal, k=1)(motion.time)
     above = even - low_pass(even, motion.rate, motion.cutoff)
-    return np.atleast_1d(np.median(above**2, axis=0) / 0.4549 * share / (1 - share))
+    variance = np.median(above**2, axis=0) / 0.4549 * share / (1 - share)
+    return np.atleast_1d(np.where(_smoothed(even, motion.rate, share * motion.rate / 2, limits), np.nan, variance))
+
+
+def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Repeats) -> np.ndarray:
+    """Return whether the spectrum of a signal, from `stop` (Hz) on, falls up to its very end: white noise would not."""
+    frequency, density = welch(signal, rate, nperseg=min(_WELCH, len(signal)), axis=0)
+    low, high = max(stop, rate / 8), rate / 2
+    middle = np.sqrt(low * high)
+    lower, upper = (frequency >= low) & (frequency < middle), (frequency >= middle) & (frequency < high)
+    if not (lower.any() and upper.any()):
+        return np.zeros(signal.shape[1:], dtype=bool)
+    first, last = np.median(density[lower], axis=0), np.median(density[upper], axis=0)
+    return np.asarray(first > last * np.sqrt(high / low) ** limits.steepest_fall)

@@ -117,6 +117,47 @@ class Cause:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Member:
+    """An effect that a finding may be: that of a cause, by its id, or one that the data cannot tell from it.
+
+    `confidence`: of a cause as there; of others not calibrated, and never more than the cause's.
+    """
+
+    cause: str
+    effect: str
+    family: str
+    confidence: Share
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """The answer one level up: causes of one family and scope whose joints overlap, in one channel.
+
+    `joints` none: of the whole robot; `confidence`: that the family is right, at least that of any of its causes;
+    `share` of the channel's gap that they close together on groups left out, `share_of` says of what;
+    `matters`: whether that is worth a word of its own. Members of several causes are all there, those of one cause are
+    alternatives.
+    """
+
+    id: str
+    family: str
+    joints: tuple[str, ...]
+    scope: Scope
+    channel: Channel
+    confidence: Share
+    share: float
+    share_interval95: Interval
+    share_of: str
+    matters: bool
+    members: tuple[Member, ...]
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """The ids of its causes."""
+        return tuple(dict.fromkeys(member.cause for member in self.members))
+
+
+@dataclass(frozen=True, kw_only=True)
 class Untestable:
     """An effect that the data cannot show, and why."""
 
@@ -196,12 +237,16 @@ class Shrink:
 
 @dataclass(frozen=True, kw_only=True)
 class Document:
-    """A diagnosis as it is handed out. Raises InputError where the ids of its causes do not fit together."""
+    """A diagnosis as it is handed out. Raises InputError where the ids of its causes do not fit together.
+
+    `findings` and `causes` are ordered by what they close, the largest first.
+    """
 
     verdict: Verdict
     robot: str
     gap: Gap
     locations: tuple[Location, ...]
+    findings: tuple[Finding, ...]
     causes: tuple[Cause, ...]
     not_testable: tuple[Untestable, ...]
     shrink: Shrink
@@ -213,17 +258,11 @@ class Document:
             raise InputError("diagnosis.causes: two have one id; give each an id of its own")
         if unknown := {one.cause for one in self.shrink.by_cause} - ids:
             raise InputError(f"diagnosis.shrink.by_cause: no cause has the id {min(unknown)}; use those of the causes")
-
-    @property
-    def largest_first(self) -> tuple[Cause, ...]:
-        """The causes by the share that they close, channel by channel, that of the foremost cause first."""
-        channels = list(dict.fromkeys(cause.evidence.channel for cause in self.causes))
-        return tuple(
-            sorted(
-                self.causes,
-                key=lambda one: (channels.index(one.evidence.channel), -(one.evidence.share_of_what_is_closed or 0.0)),
-            )
-        )
+        found = [cause for finding in self.findings for cause in finding.causes]
+        if wrong := ids.symmetric_difference(found):
+            raise InputError(f"diagnosis.findings: {min(wrong)} has to be a cause, and one of a finding's members")
+        if len({finding.id for finding in self.findings}) < len(self.findings):
+            raise InputError("diagnosis.findings: two have one id; give each an id of its own")
 
     def to_json(self) -> dict[str, Any]:
         """Return the document as JSON, in the form of `schema()`."""

@@ -19,7 +19,7 @@ Json = dict[str, Any]
 Part = TypeVar("Part")
 
 _GOES_WITH = "goes_with"
-_TYPES = {str: "string", float: "number"}
+_TYPES = {str: "string", float: "number", bool: "boolean"}
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import ExplainedTorque
-from irtwin.gap.isolation.finding import Finding, estimate_of, hypotheses_of
+from irtwin.gap.isolation.finding import Finding, attributed, estimate_of
 from irtwin.gap.isolation.floor_left import floor_left
-from irtwin.gap.isolation.forward_selection import Attribution, attribute
-from irtwin.gap.isolation.shares import shares
+from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.isolation.shares import closed_squares
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
@@ -71,18 +71,18 @@ def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, withou
     whole, torque = equations.whole, equations.torque
     n = len(torque.pattern)
     levels = [np.zeros(n) if floor.torque is None else floor.torque, [floor.power or 0.0]]
-    both = attribute(whole, hypotheses_of(case, whole, without), seed, case.thresholds, np.concatenate(levels))
+    both = attributed(case, whole, np.concatenate(levels), seed, without)
     found = _of_torque(both, equations)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(torque, noise_before(torque), found.noise, chosen)
-    parts = shares(torque, found, seed)
+    closed = closed_squares(torque, found, seed)
     mine = _causes_of_torque(both)
     beside = [cause for cause in both.causes if cause not in mine]
     fitted = estimate_of(whole, [k for cause in (*mine, *beside) for k in cause.columns])
     used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
     fitted = Estimate(fitted.values[used], fitted.covariance[np.ix_(used, used)], fitted.noise[:n], fitted.blocks)
     names = case.robot.joint_names
-    return Finding("torque", names, case.observed, torque, found, judged, floor.torque, fitted, parts)
+    return Finding("torque", names, case.observed, torque, found, judged, floor.torque, fitted, closed)
 
 
 def _causes_of_torque(found: Attribution) -> list[Cause]:

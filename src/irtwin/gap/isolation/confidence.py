@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 from irtwin.gap.thresholds import Confidence
 
@@ -23,3 +24,25 @@ def confidence(
         + weights.per_count * math.log(count)
     )
     return 1 / (1 + math.exp(-logit - weights.unexplained * unexplained))
+
+
+def of_rivals(own: float, rivals: Sequence[str], gains: Mapping[str, float], weights: Confidence) -> dict[str, float]:
+    """Return the chance of each effect that the data cannot tell from a cause, whose own is given.
+
+    They share a part of what that leaves, by their `gains`; none is more likely than the cause.
+    """
+    gain = {rival: max(gains.get(rival, 0.0), 0.0) for rival in rivals}
+    whole = sum(gain.values())
+    return {
+        rival: min(own, (1 - own) * weights.of_rivals * (gain[rival] / whole if whole > 0 else 1 / len(rivals)))
+        for rival in rivals
+    }
+
+
+def of_family(members: Sequence[float], weights: Confidence) -> float:
+    """Return the chance that a family is right: `members`, for each of its causes, that of it or a rival of the family.
+
+    At least the largest of them: causes of one family mostly stand for one another, so they do not add up.
+    """
+    most = max(members)
+    return most if most >= 1 else 1 / (1 + (1 - most) / most * math.exp(-weights.family_more)) if most > 0 else 0.0

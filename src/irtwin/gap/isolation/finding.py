@@ -11,10 +11,12 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.changes import shown_before
+from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.forward_selection import Attribution, attribute
 from irtwin.gap.isolation.power_consistency import PowerBalance
-from irtwin.gap.isolation.shares import shares
+from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
@@ -28,8 +30,9 @@ class Finding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
-    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
-    part of what they close together, none where they close nothing; `power_balances`: what power says of each.
+    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
+    each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
+    of each.
     """
 
     name: str
@@ -40,7 +43,7 @@ class Finding:
     held_out: HeldOut
     floor: np.ndarray | None
     estimate: Estimate
-    shares: tuple[float, ...] = ()
+    closed_squares: np.ndarray
     power_balances: tuple[PowerBalance, ...] = ()
 
     @property
@@ -48,9 +51,22 @@ class Finding:
         """The channel's causes, ranked."""
         return self.attribution.causes
 
+    @cached_property
+    def shares(self) -> tuple[float, ...]:
+        """Each cause's part of what they close together, none where they close nothing."""
+        level = self.attribution.noise if self.floor is None else self.floor
+        return shares(self.closed_squares, self.held_out.rows, level)
+
     def share(self, cause: Cause) -> float | None:
         """Return a cause's part of what all close together, None where they close nothing."""
         return self.shares[self.causes.index(cause)] if self.shares else None
+
+    def closing(self, causes: Sequence[Cause]) -> Closing:
+        """Return what some causes close of the channel's gap, beside the others."""
+        closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
+        runs = [variant.effect.runs for cause in causes for variant in cause.variants]
+        acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
+        return closing(closed, acting, self.held_out, self.floor, self.attribution.noise)
 
     def balance(self, cause: Cause) -> PowerBalance | None:
         """Return what power says of a cause, None where it was not asked."""
@@ -112,18 +128,39 @@ def find(
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
     places = (None,) if name == "power" else case.robot.joint_names
-    found = attribute(system, hypotheses_of(case, system, without), seed, case.thresholds, floor)
+    found = attributed(case, system, floor, seed, without)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
-    parts = shares(system, found, seed)
-    return Finding(name, places, case.observed, system, found, judged, floor, estimate_of(system, chosen), parts)
+    closed = closed_squares(system, found, seed)
+    return Finding(name, places, case.observed, system, found, judged, floor, estimate_of(system, chosen), closed)
 
 
-def hypotheses_of(case: Case, system: System, without: Set[str]) -> list[Hypothesis]:
+def attributed(
+    case: Case, system: System, floor: np.ndarray | None, seed: int, without: Set[str] = frozenset()
+) -> Attribution:
+    """Attribute the gap of a system, `without` some effects; floor: (g,) RMS.
+
+    What the reference runs show as well has not changed.
+    """
+    inside = _inside(case, system)
+    candidates = _hypotheses(system, inside, without)
+    found = attribute(system, candidates, seed, case.thresholds, floor)
+    while old := shown_before(system, found.causes, found.noise, frozenset(inside), case.thresholds.changes):
+        candidates = [one for one in candidates if not (one.effect in old and one.scope == CHANGED)]
+        found = attribute(system, candidates, seed, case.thresholds, floor)
+    return found
+
+
+def _inside(case: Case, system: System) -> tuple[str, ...]:
+    """Return the effects that cannot be missing from the twin."""
+    if not system.both:
+        return tuple(case.effects)
+    # zero in the other runs where these did not measure it: there, missing is changed
+    return (*case.effects, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
+
+
+def _hypotheses(system: System, inside: Sequence[str], without: Set[str]) -> list[Hypothesis]:
     """Return what may be missing or have changed, `without` some effects; effects on power may act in every joint."""
-    inside = case.effects
-    if system.both:  # zero in the other runs where these did not measure it: there, missing is changed
-        inside = (*inside, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
     found = hypotheses(system.columns, system.base, MISSING, inside=inside)
     if system.both:
         found += hypotheses(system.columns, system.changed, CHANGED)

@@ -10,46 +10,44 @@ from math import factorial
 import numpy as np
 
 from irtwin.gap.isolation.forward_selection import Attribution
-from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.normal_equations import System, noise_before
 
 _EXACT = 8  # causes: 256 subsets
 _ORDERS = 40  # drawn, and each reversed, where there are more
 
 
-def shares(system: System, found: Attribution, seed: int) -> tuple[float, ...]:
-    """Return each cause's Shapley value of the squares closed on observed groups left out, as a part of their sum.
+def closed_squares(system: System, found: Attribution, seed: int) -> np.ndarray:
+    """Return what each cause closes of the squares of each observed group left out and equation, (C, G, g).
 
-    Squares count in units of the noise; everything is refitted with every set of causes. Up to eight causes exactly,
-    beyond from random orders, each beside its reverse. None of them (an empty tuple) where nothing is closed. A cause
-    that only spoils the fit of held-out runs has a share below zero.
+    Its Shapley value: everything is refitted with every set of causes, up to eight causes exactly, beyond from random
+    orders, each beside its reverse. They add up to what all causes close.
     """
     players = [cause.columns for cause in found.causes]
-    if not players:
-        return ()
-    if len(players) == 1:
-        return (1.0,)
-    moments = system.moments(found.noise)
     judged = np.flatnonzero(system.group_observed)
-    total = np.sum(moments, axis=0)
-    rest = {int(group): total - moments[group] for group in judged}
+    weighed = {True: system.moments(found.noise), False: system.moments(noise_before(system))}
+    totals = {some: np.sum(moments, axis=0) for some, moments in weighed.items()}
 
     @cache
-    def closed(members: frozenset[int]) -> float:
+    def left(members: frozenset[int]) -> np.ndarray:
         chosen = [k for player in sorted(members) for k in players[player]]
-        inside = np.array([*range(system.base), *chosen], dtype=int)
-        every = np.append(inside, len(total) - 1)
-        left = 0.0
-        for group, train in rest.items():
-            factor = factored(train[np.ix_(inside, inside)])
-            vector = np.append(-solved(factor, train[inside, -1]), 1.0)
-            left += float(vector @ moments[group][np.ix_(every, every)] @ vector)
-        return -left
+        total, moments = totals[bool(members)], weighed[bool(members)]
+        fitted = [(int(group), system.solution(chosen, total - moments[group])) for group in judged]
+        return np.array([system.squares(vector, group) for group, vector in fitted])
 
     count = len(players)
-    values = np.zeros(count)
+    values = np.zeros((count, len(judged), len(system.pattern)))
     for player, before, weight in _exact(count) if count <= _EXACT else _drawn(count, seed):
-        values[player] += weight * (closed(before | {player}) - closed(before))
+        values[player] += weight * (left(before) - left(before | {player}))
+    return values
+
+
+def shares(closed: np.ndarray, rows: np.ndarray, level: np.ndarray) -> tuple[float, ...]:
+    """Return each cause's part of the mean squares that all close, `closed` (C, G, g), in units of a `level` (g,), RMS.
+
+    rows: (G, g). None of them (an empty tuple) where nothing is closed. A cause that only spoils the fit of held-out
+    runs has a share below zero.
+    """
+    values = (closed.sum(axis=1) / np.maximum(rows.sum(axis=0), 1) / level**2).sum(axis=1)
     together = float(values.sum())
     return tuple(float(value) / together for value in values) if together > 0 else ()
 

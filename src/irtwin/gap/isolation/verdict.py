@@ -7,19 +7,29 @@ from collections.abc import Sequence
 import numpy as np
 
 from irtwin.gap.data.noise_floor import REPEATS, Floor
+from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.normal_equations import noise_before, reference_rms
-from irtwin.gap.thresholds import Verdict
+from irtwin.gap.thresholds import Thresholds
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
 
 
-def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Verdict) -> str:
-    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not."""
-    causes = [cause for finding in findings for cause in finding.causes]
+def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Thresholds) -> str:
+    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not.
+
+    Causes that close nothing that matters make no gap.
+    """
+    causes = [
+        cause
+        for finding in findings
+        for branch in branches(finding)
+        if branch.closing.matters(limits.matters)
+        for cause in branch.causes
+    ]
     if floor.source == REPEATS:
         before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
-        if after > max(limits.excess, (1 - limits.closed) * before):
+        if after > max(limits.verdict.excess, (1 - limits.verdict.closed) * before):
             return UNEXPLAINED
     if not causes:
         return NO_GAP

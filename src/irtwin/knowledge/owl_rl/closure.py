@@ -78,8 +78,8 @@ class Closure:
     def worth_keeping(self) -> set[Triple]:
         """Return what follows and is worth keeping in a graph.
 
-        Left out is what holds of everything (x sameAs x, C subClassOf C or owl:Thing), what is inferred of anonymous class
-        expressions and of datatypes, and one more way to write a literal that stands there already.
+        Left out is what holds of everything (x sameAs x, C subClassOf C or owl:Thing), what is inferred of anonymous
+        class expressions and of datatypes, and one more way to write a literal that stands there already.
         """
         terms, helpers = self._terms, self._helpers()
         hidden = {number for number, forms in enumerate(terms.forms) if forms and _is_hidden(forms[0])}

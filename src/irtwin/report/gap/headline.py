@@ -1,23 +1,41 @@
-"""A diagnosis in one line, for the terminal."""
+"""A diagnosis in one line, for the terminal: what the page says first."""
 
 from __future__ import annotations
 
-from irtwin.gap.document.document import Cause, Document
-from irtwin.report.wording import listed
-
-_CHANGED = {"reference": "{} changed since the reference runs", "simulated": "the simulator lacks {}"}
+from irtwin.gap.document.document import Document, Finding
+from irtwin.report.gap import findings
+from irtwin.report.gap.verdict import closes, where
 
 
 def line(diagnosis: Document, against: str | None) -> str:
-    """Return the verdict and its causes, the largest first; `against`: role of the runs compared with, if any."""
-    words = {"missing": "the twin lacks {}", "changed": _CHANGED.get(against or "", "{} changed")}
-    named: dict[str, list[str]] = {}
-    for cause in diagnosis.largest_first:
-        named.setdefault(cause.scope, []).append(_named(cause))
-    said = [words[scope].format(listed(causes)) for scope, causes in named.items()]
-    return f"{diagnosis.verdict}: {'; '.join(said) or 'no cause named'}"
+    """Return the verdict and what the page says of it; `against`: role of the runs compared with, if any."""
+    told = [_told(one, against) for one in diagnosis.findings]
+    place = next(iter(diagnosis.locations), None)
+    closed = diagnosis.shrink.closed_fraction
+    said = findings.sentence(
+        diagnosis.verdict,
+        told,
+        "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime)),
+        "" if closed is None else closes(closed.value, closed.interval95),
+    )
+    return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _named(cause: Cause) -> str:
-    names = " or ".join(name.replace("_", " ") for name in (cause.effect, *cause.indistinguishable_from))
-    return f"{names} on {listed(cause.joints)}" if cause.joints else names
+def _told(one: Finding, against: str | None) -> findings.Finding:
+    members = [[member for member in one.members if member.cause == cause] for cause in one.causes]
+    return findings.Finding(
+        family=one.family,
+        joints=one.joints,
+        against="twin" if one.scope == "missing" else against or "reference",
+        channel=one.channel,
+        confidence=one.confidence,
+        share=one.share,
+        interval=one.share_interval95,
+        of=one.share_of,
+        matters=one.matters,
+        members=tuple(tuple((_words(each.effect), each.confidence) for each in some) for some in members),
+    )
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

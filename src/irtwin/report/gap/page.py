@@ -27,6 +27,7 @@ from irtwin.report.energy.page import content_policy, environment, figure_script
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
+from irtwin.report.gap.findings import counted
 from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_questions
 from irtwin.signals.log import DataSet
@@ -75,12 +76,15 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
     folder = resources.folder("reports")
     follows = gap_figures.foremost_curves(curves.follows, answers)
     drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
+    found = gap_verdict.told(answers)
     scripts = figure_scripts()
     return environment(folder).get_template("gap/page.html.jinja").render(
         answers=answers,
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
         verdict=gap_verdict.sentence(answers),
+        findings=[one for one in found if one.matters],
+        counted=counted([one for one in found if not one.matters]),
         causes=[_cause(row, answers) for row in answers["causes"].rows],
         foremost=gap_figures.foremost_joint(answers),
         follows=follows,
@@ -100,6 +104,7 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
     return {
         **row,
         "name": effect_name(row),
+        "told": gap_verdict.matters(cause, answers),
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
         "parameters": _of(cause, answers, "cause_parameters"),

@@ -5,36 +5,72 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from irtwin.report import wording
+from irtwin.report.gap import findings
+from irtwin.report.gap.findings import Finding
 from irtwin.report.questions import Answers, Row
 
 
 def sentence(answers: Answers) -> str:
-    """Return the verdict in plain words, the largest cause first."""
-    diagnosis = answers["diagnosis"].rows[0]
-    verdict = wording.local_name(diagnosis["verdict"])
-    if verdict == "no_gap":
-        return "There is no gap: the twin explains the data down to the noise floor."
-    if verdict == "unexplained":
-        return f"There is a gap{_where(answers)}, and no effect in the catalogue closes it."
-    if verdict == "ambiguous":
-        return f"There is a gap{_where(answers)}, and these data cannot tell its causes apart: {_classes(answers)}."
-    named: dict[bool, list[str]] = {}  # by whether the twin lacks them, in the order of the largest cause
-    for row in answers["causes"].rows:
-        named.setdefault(row["scope"] == "missing", []).append(_cause(row, answers))
-    text = "; ".join(
-        f"the twin lacks {wording.listed(names)}" if missing else _changed(wording.listed(names), diagnosis)
-        for missing, names in named.items()
+    """Return the verdict in plain words, the largest finding first."""
+    verdict = wording.local_name(answers["diagnosis"].rows[0]["verdict"])
+    place, closed = answers["locations"].first, answers["closed"].first
+    ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
+    return findings.sentence(
+        verdict,
+        told(answers),
+        "" if place is None else where(place["channel"], place["joint"], place["regime"]),
+        "" if closed is None else closes(closed["closed"], ends),
     )
-    return f"{text[:1].upper()}{text[1:]}.{_closes(answers)}"
 
 
-def _changed(named: str, diagnosis: Row) -> str:
-    """Say which runs lack the causes: simulated runs never had them, reference runs did not have them yet."""
+def told(answers: Answers) -> list[Finding]:
+    """Return the findings, the largest first."""
+    return [_finding(row, answers) for row in answers["findings"].rows]
+
+
+def matters(cause: str, answers: Answers) -> bool:
+    """Return whether a cause (its IRI) is of a finding that matters."""
+    of = [one["finding"] for one in answers["finding_members"].rows if one["cause"] == cause]
+    return any(row["matters"] for row in answers["findings"].rows if row["finding"] in of)
+
+
+def _finding(row: Row, answers: Answers) -> Finding:
+    name = row["finding"]
+    members: dict[str, list[tuple[str, float]]] = {}
+    for one in answers["finding_members"].rows:
+        if one["finding"] == name:
+            members.setdefault(one["cause"], []).append((effect_name(one), one["confidence"]))
+    return Finding(
+        family=row["family_label"] or wording.local_name(row["family"]),
+        joints=tuple(one["joint"] for one in answers["finding_joints"].rows if one["finding"] == name),
+        against="twin" if row["scope"] == "missing" else _against(answers["diagnosis"].rows[0]),
+        channel=row["channel"],
+        confidence=row["confidence"],
+        share=row["share"],
+        interval=(row["lower"], row["upper"]),
+        of=row["of"],
+        matters=row["matters"],
+        members=tuple(map(tuple, members.values())),
+    )
+
+
+def _against(diagnosis: Row) -> str:
+    """Return which runs lack what changed: simulated runs never had it, reference runs did not have it yet."""
     if not diagnosis["against_simulator"]:
-        return f"{named} changed since the reference runs"
-    if diagnosis["referenced"]:
-        return f"{named} changed since the reference runs, and the simulator lacks it"
-    return f"the simulator lacks {named}"
+        return "reference"
+    return "both" if diagnosis["referenced"] else "simulated"
+
+
+def where(channel: str, joint: str | None, regime: str | None) -> str:
+    """Say where a gap mostly lies."""
+    of = f" of {joint}" if joint else ""
+    return f" in the {channel}{of}" + (f", mostly in the regime “{regime}”" if regime else "")
+
+
+def closes(share: float, interval: Sequence[float] | None) -> str:
+    """Say how much of a gap closes."""
+    within = "" if interval is None else f" (95 % interval {' to '.join(map(wording.share, interval))})"
+    return f" Adding this to the twin closes {wording.share(share)} of the gap on held-out runs{within}."
 
 
 def effect_name(row: Row, variable: str = "effect") -> str:
@@ -51,51 +87,3 @@ def joints_of(cause: str, answers: Answers) -> list[str]:
 def rivals_of(cause: str, answers: Answers) -> list[str]:
     """Return the effects that explain the data as well as a cause (its IRI) does."""
     return [effect_name(row, "rival") for row in answers["rivals"].rows if row["cause"] == cause]
-
-
-def _cause(row: Row, answers: Answers) -> str:
-    joints = joints_of(row["cause"], answers)
-    place = f" on {wording.listed(joints)}" if joints else ""
-    return f"{effect_name(row)}{place} (confidence {wording.share(row['confidence'])})"
-
-
-def _class_of(row: Row, answers: Answers) -> list[str]:
-    joints = joints_of(row["cause"], answers)
-    place = f" on {wording.listed(joints)}" if joints else ""
-    return [f"{name}{place}" for name in (effect_name(row), *rivals_of(row["cause"], answers))]
-
-
-def _classes(answers: Answers) -> str:
-    """Return the causes, the largest first, each with the effects that explain the data as well."""
-    classes: dict[frozenset[str], list[str]] = {}
-    for row in answers["causes"].rows:
-        names = _class_of(row, answers)
-        classes.setdefault(frozenset(names), names)
-    said = [_alternatives(names) for names in classes.values()]
-    if len(said) == 1:
-        return f"{said[0]} would explain it equally well"
-    return "; ".join(
-        f"either {one}" if len(names) > 1 else one for one, names in zip(said, classes.values(), strict=True)
-    )
-
-
-def _alternatives(names: Sequence[str]) -> str:
-    return " or ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
-
-
-def _where(answers: Answers) -> str:
-    first = answers["locations"].first
-    if first is None:
-        return ""
-    of = f" of {first['joint']}" if first["joint"] else ""
-    regime = f", mostly in the regime “{first['regime']}”" if first["regime"] else ""
-    return f" in the {first['channel']}{of}{regime}"
-
-
-def _closes(answers: Answers) -> str:
-    row = answers["closed"].first
-    if row is None:
-        return ""
-    ends = f" (95 % interval {wording.share(row['lower'])} to {wording.share(row['upper'])})"
-    within = "" if row["lower"] is None else ends
-    return f" Adding this to the twin closes {wording.share(row['closed'])} of the gap on held-out runs{within}."

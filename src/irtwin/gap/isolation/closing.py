@@ -1,0 +1,61 @@
+"""How much of a channel's gap is closed, by all causes or by some: in shares of the gap, and in floors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from irtwin.gap.regression.held_out import HeldOut
+from irtwin.gap.thresholds import Matters
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What is closed on groups of runs left out.
+
+    share: of the channel's gap above the floor, or of its mean square where no floor is known; below 0 where the fit is
+    spoilt. interval: of the share, 95 %, over groups. floors: RMS that is closed in runs where the causes act, at the
+    joint that gains most, in floors; None where none is known. size: mean squares closed, summed over joints, in
+    floors squared, or in what the causes leave where no floor is known: by it all channels' are put in order.
+    """
+
+    share: float
+    interval: tuple[float, float]
+    floors: float | None
+    size: float
+
+    def matters(self, limits: Matters) -> bool:
+        """Return whether a person would miss it: enough of the gap, more than noise, and for sure more than nothing."""
+        more_than_noise = self.floors is None or self.floors >= limits.least_floors
+        return self.share >= limits.least_share and more_than_noise and self.interval[0] > 0
+
+
+def closing(
+    closed: np.ndarray, acting: np.ndarray, held_out: HeldOut, floor: np.ndarray | None, noise: np.ndarray
+) -> Closing:
+    """Return what squares `closed` (G, g) on groups left out are worth; floor, and noise that is left: (g,) RMS.
+
+    acting: (G,) whether the causes act in a group at all. Equations count by their mean square over the floor's, those
+    that have a gap. The interval is Student's, of a ratio of sums over groups (linearised): groups are few, and of
+    groups drawn anew some sets have no gap to be a share of.
+    """
+    before, rows = held_out.before, np.maximum(held_out.rows.sum(axis=0), 1)
+    mean = before.sum(axis=0) / rows
+    level = np.maximum(mean if floor is None else floor**2, np.finfo(float).tiny)
+    least = np.zeros_like(mean) if floor is None else floor**2
+    gap = mean > least
+    above = ((before - least * held_out.rows) / level / rows)[:, gap].sum(axis=1)
+    won = (closed / level / rows)[:, gap].sum(axis=1)
+    whole = float(above.sum())
+    value = min(float(won.sum()) / whole, 1.0) if whole > 0 else 0.0
+    half, groups = 0.0, len(before)
+    if groups > 1 and whole > 0:
+        error = float(np.sqrt(np.sum((won - value * above) ** 2) * groups / (groups - 1))) / whole
+        half = float(student_t.ppf(0.975, groups - 1)) * error
+    squares = closed.sum(axis=0) / rows
+    where = closed[acting].sum(axis=0) / np.maximum(held_out.rows[acting].sum(axis=0), 1)
+    floors = None if floor is None else float(np.sqrt(np.max(np.maximum(where, 0.0) / floor**2)))
+    size = float((squares / (noise if floor is None else floor) ** 2).sum())
+    return Closing(value, (value - half, min(value + half, 1.0)), floors, size)

@@ -1,0 +1,99 @@
+"""Findings in words: few, the largest first, the rest counted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from irtwin.report.gap.findings import Finding, counted, sentence
+
+
+def finding(family: str = "friction", **changes: Any) -> Finding:
+    """A finding of joint_5 that its data do not tell apart."""
+    known: dict[str, Any] = {
+        "joints": ("joint_5",),
+        "against": "twin",
+        "channel": "torque",
+        "confidence": 0.97,
+        "share": 0.44,
+        "interval": (0.38, 0.5),
+        "of": "the gap above the floor",
+        "matters": True,
+        "members": ((("load-dependent friction", 0.55), ("position-dependent friction", 0.3)),),
+    }
+    return Finding(family=family, **(known | changes))
+
+
+def said(verdict: str, *findings: Finding, where: str = "", closes: str = "") -> str:
+    return sentence(verdict, findings, where, closes).replace("\N{NO-BREAK SPACE}", " ")
+
+
+LITTLE = {"matters": False, "share": 0.0004}
+
+
+def test_the_family_is_said_before_its_effects() -> None:
+    assert said("ambiguous", finding(), closes=" It closes.") == (
+        "Friction of joint_5 differs from the twin’s (97 %): load-dependent friction (55 %) or position-dependent "
+        "friction (30 %). It closes."
+    )
+
+
+@pytest.mark.parametrize(
+    ("against", "claim"),
+    [
+        ("twin", "differs from the twin’s"),
+        ("reference", "changed since the reference runs"),
+        ("simulated", "differs from the simulator’s"),
+        ("both", "changed since the reference runs, and differs from the simulator’s"),
+    ],
+)
+def test_a_finding_is_set_against_the_runs_that_lack_it(against: str, claim: str) -> None:
+    one = finding("load", joints=(), against=against, confidence=0.94, members=((("payload", 0.94),),))
+    assert said("attributed", one) == f"Load {claim}: payload (94 %)."
+
+
+def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> None:
+    both = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.6), ("backlash", 0.2))))
+    guess = finding("sensing", joints=("joint_1", "joint_3"), confidence=0.48)
+    assert said("attributed", both, guess) == (
+        "Friction of joint_5 differs from the twin’s (97 %): stribeck friction (90 %) and hysteresis (60 %) or "
+        "backlash (20 %); perhaps sensing of joint_1 and joint_3 (48 %)."
+    )
+
+
+def test_guesses_alone_are_said_to_be_guesses() -> None:
+    guesses = [finding("load", confidence=0.4), finding("sensing", confidence=0.2)]
+    assert said("ambiguous", *guesses) == (
+        "Nothing that was found is sure: perhaps load of joint_5 (40 %); perhaps sensing of joint_5 (20 %)."
+    )
+
+
+def test_at_most_three_are_named_and_the_rest_is_counted() -> None:
+    many = [finding(joints=(f"joint_{k}",), share=0.1) for k in range(1, 6)]
+    told = said("ambiguous", *many, finding(**LITTLE), finding(channel="power", **LITTLE))
+    assert "joint_3" in told and "joint_4" not in told
+    assert told.endswith(
+        "Not named here: 3 findings together close 20 % of the gap in torque and 1 finding closes 0.040 % of the gap "
+        "in power."
+    )
+
+
+def test_what_closes_nothing_is_no_gap_and_named_nowhere() -> None:
+    assert said("no_gap", finding("environment", **LITTLE)) == (
+        "There is no gap that matters: 1 finding closes 0.040 % of the gap in torque."
+    )
+    assert said("no_gap") == "There is no gap: the twin explains the data down to the noise floor."
+
+
+def test_an_unexplained_gap_says_what_part_is_closed() -> None:
+    told = said("unexplained", finding(), finding(**(LITTLE | {"share": -0.01})), where=" in the power")
+    assert told.startswith(
+        "There is a gap in the power, and no effect in the catalogue closes it. Part of it is closed:"
+    )
+    assert told.endswith("Not named here: 1 finding closes nothing of the gap in torque.")
+    assert said("unexplained") == "There is a gap, and no effect in the catalogue closes it."
+
+
+def test_nothing_is_counted_as_nothing() -> None:
+    assert counted([]) == ""
