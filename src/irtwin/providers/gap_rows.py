@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.document import Cause, Change, Document, Location
+from irtwin.gap.document.document import Cause, Change, Document, Location, NotRepeating
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.storage import experiment_schema, gap_schema
 from irtwin.storage.schema import Base
@@ -31,6 +31,8 @@ def rows(said: Document, at: Place) -> Iterator[Base]:
     """Yield all rows of a diagnosis but its own."""
     yield from _sizes(said, at)
     yield from _locations(said, at)
+    for rank, disturbance in enumerate(said.not_repeating or (), start=1):
+        yield from _disturbance(disturbance, rank, at)
     for rank, cause in enumerate(said.causes, start=1):
         yield from _cause(cause, rank, at)
     yield from _changes(said, at)
@@ -56,6 +58,7 @@ def _sizes(said: Document, at: Place) -> Iterator[Base]:
             rmse=size.rmse,
             noise_floor=size.noise_floor,
             excess=size.excess,
+            sensor_noise=size.sensor_noise,
             unit="N m" if channel == "torque" else "W",
         )
 
@@ -88,6 +91,27 @@ def _location_id(one: Location) -> str:
     """Return the name of a place, such as "torque@joint_2:reversal": a diagnosis names each place once."""
     joint = "" if one.joint is None else f"@{one.joint}"
     return f"{one.channel}{joint}" + ("" if one.regime is None else f":{one.regime}")
+
+
+def _disturbance(said: NotRepeating, rank: int, at: Place) -> Iterator[Base]:
+    key = {"diagnosis_id": at.diagnosis_id, "disturbance_id": said.id}
+    yield gap_schema.GapDisturbance(
+        **key,
+        rank=rank,
+        robot_id=at.robot_id,
+        channel=said.channel,
+        joint=said.joint,
+        kind=said.kind,
+        rms=said.rms,
+        unit="N m" if said.channel == "torque" else "W",
+        share=said.share,
+        cause_id=said.explained_by,
+    )
+    for number, one in enumerate(said.quantities, start=1):
+        lower, upper = one.interval95 or (None, None)
+        yield gap_schema.GapDisturbanceQuantity(
+            **key, number=number, name=one.name, value=one.value, unit=one.unit, lower=lower, upper=upper
+        )
 
 
 def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:
