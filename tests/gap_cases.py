@@ -73,6 +73,7 @@ def _gap(verdict: str) -> dict[str, Any]:
             "rmse": 1.4 if joint == "joint_a3" and verdict != "no_gap" else 0.41,
             "noise_floor": 0.4,
             "excess": 0.05,
+            "sensor_noise": 0.3,
         }
         for joint in JOINTS
     }
@@ -89,6 +90,22 @@ def _heat_map(size: float) -> dict[str, Any]:
         for joint in JOINTS
     ]
     return {"joints": JOINTS, "regimes": REGIMES, "excess": excess}
+
+
+def _disturbance(explained_by: str | None) -> dict[str, Any]:
+    return {
+        "id": "line@joint_a3",
+        "channel": "torque",
+        "joint": "joint_a3",
+        "kind": "line",
+        "rms": 0.77,
+        "share": 0.66,
+        "quantities": [
+            {"name": "f", "joint": "joint_a3", "value": 2.9, "unit": "Hz", "interval95": [2.88, 2.92]},
+            {"name": "A", "joint": "joint_a3", "value": 1.09, "unit": "N m", "interval95": None},
+        ],
+        "explained_by": explained_by,
+    }
 
 
 def _cause(effect: str, confidence: float, share: float, rivals: list[str], scope: str = "changed") -> dict[str, Any]:
@@ -219,6 +236,7 @@ _CASES: dict[str, dict[str, Any]] = {
     },
     "attributed": {
         "locations": _LOCATED,
+        "not_repeating": [_disturbance("viscous_friction@joint_a3")],
         "causes": [_cause("viscous_friction", 0.7, 0.7, []), _cause("stribeck_friction", 0.96, 0.3, [])],
         "not_testable": _UNTESTABLE,
         "shrink": _shrink(

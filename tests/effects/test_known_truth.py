@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from tests.flange import flange_position
 from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
-from irtwin.effects import compliance, drive, friction, load, sensing, supply, transmission
+from irtwin.effects import compliance, disturbance, drive, friction, load, sensing, supply, transmission
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
@@ -303,6 +303,16 @@ CASES = [
     ),
     Case(sensing.MeterLag(T=0.2), {("T", None): 0.2}, power=lagged),
     Case(sensing.MeterGain(), {("g", None): 1.2}, power=lambda s: 0.2 * s.power, off=0.02),
+    Case(
+        disturbance.PeriodicDisturbance(f=2.9, joints=J2),
+        {("f", "joint_2"): 2.9, ("A", "joint_2"): 5.0},
+        lambda s: only(5 * np.sin(2 * np.pi * 2.9 * s.motion.time + 0.4)),
+    ),
+    Case(
+        disturbance.SwitchingLoad(period=4.0, duty=0.3, start=1.0),
+        {("P", None): 80.0, ("duty", None): 0.3, ("period", None): 4.0},
+        power=lambda s: 80.0 * ((s.motion.time - 1.0) % 4.0 < 1.2),
+    ),
 ]
 
 

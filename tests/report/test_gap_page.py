@@ -134,6 +134,13 @@ def test_places_carry_their_intervals(pages: dict[str, Path]) -> None:
     assert "<small>10 % … 90 %</small>" in page and "<small>8.0 … 15</small>" in page
 
 
+def test_what_differs_between_repeats_is_described(pages: dict[str, Path]) -> None:
+    text = pages["attributed"].read_text(encoding="utf-8")
+    row = next(part for part in text.split("<tr>") if "<td>line</td>" in part)
+    assert "joint_a3" in row and "f 2.9" in row and "Hz, A 1.09" in row and "viscous friction" in row
+    assert "What differs between repeats" not in pages["no_gap"].read_text(encoding="utf-8")
+
+
 def test_classes_of_several_causes_are_kept_apart(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("ambiguous")
     said["causes"][1] |= {"effect": "payload", "joints": [], "indistinguishable_from": ["base_tilt"]}

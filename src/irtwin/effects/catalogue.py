@@ -6,6 +6,7 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from irtwin.effects.compliance import Backlash, JointElasticity
+from irtwin.effects.disturbance import PeriodicDisturbance, SwitchingLoad
 from irtwin.effects.drive import CopperLoss, InverterLoss, IronLoss, RotorInertia, WindingTemperature
 from irtwin.effects.effect import Effect
 from irtwin.effects.friction import (
@@ -72,6 +73,8 @@ _OWN: tuple[type[Effect], ...] = (
     HoldingBrakes,
     MeterLag,
     MeterGain,
+    PeriodicDisturbance,
+    SwitchingLoad,
 )
 
 # The default twin: the seed paper's model, with rotor inertia and offset.

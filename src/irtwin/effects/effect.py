@@ -99,8 +99,9 @@ class Effect(ABC):
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
     `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, and what is
-    `drawn_at_rest` does not depend on the motion. `manual_test` is what a person can do to show it where no motion
-    does; `taken_off` says how a run without it is made.
+    `drawn_at_rest` does not depend on the motion. A `disturbance` goes its own way, so that no run tells when it acts
+    in another, and repeats of a motion show it; the word says as what, "line" or "switching". `manual_test` is what a
+    person can do to show it where no motion does; `taken_off` says how a run without it is made.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -123,6 +124,7 @@ class Effect(ABC):
     carries_torque: ClassVar[bool] = False
     electrical_loss: ClassVar[bool] = False
     drawn_at_rest: ClassVar[bool] = False
+    disturbance: ClassVar[str | None] = None
     manual_test: ClassVar[str | None] = None
     taken_off: ClassVar[str | None] = None
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}

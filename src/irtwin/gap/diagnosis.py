@@ -33,15 +33,18 @@ from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained
 from irtwin.gap.isolation.finding import Finding, find
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.power_evidence import power_balances
-from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
+from irtwin.gap.isolation.verdict import NO_GAP, beside, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
+from irtwin.gap.not_repeating import NotRepeating, with_removed
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
+from irtwin.gap.repeats.disturbances import Disturbance, disturbances
+from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.threads import one_blas_thread
@@ -70,6 +73,8 @@ class Diagnosis:
     planned: Motion | None = None  # of the experiment's programme; each of its runs makes this motion
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
     energies: EnergyErrors | None = None
+    not_repeating: tuple[Disturbance, ...] = ()  # what differs between repeats, beyond noise
+    removed: tuple[Removed, ...] = ()  # what of it an effect explains
     against: str | None = None  # the role of the runs that the observed ones are held against
     thresholds: Thresholds = DEFAULT
     yardstick: dict[str, Closeable] = field(default_factory=dict)  # each channel's, what could be closed at all
@@ -88,19 +93,24 @@ class Diagnosis:
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         weights = self.thresholds.confidence
-        causes = tuple(writing.cause(robot, *one, gains, self.verdict, weights) for one in named)
+        written = tuple(writing.cause(robot, *one, gains, self.verdict, weights) for one in named)
+        apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
+        found = writing.findings(robot, self.channels, named, written, self.thresholds)
+        causes = apart.causes(written, weights)
+        shrink = writing.shrink(
+            robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
+        )
         return Document(
             verdict=self.verdict,
             robot=robot.name,
-            gap=writing.gap(robot.joint_names, self.channels, self.energies),
+            gap=apart.gap(writing.gap(robot.joint_names, self.channels, self.energies)),
             locations=tuple(map(writing.location, self.locations)),
-            findings=writing.findings(robot, self.channels, named, causes, self.thresholds),
+            findings=apart.findings(found, causes, self.thresholds.matters),
             causes=causes,
             not_testable=tuple(map(writing.untestable, self.untestable)),
-            shrink=writing.shrink(
-                robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
-            ),
+            shrink=apart.shrink(shrink, self.seed),
             next_experiment=self.experiment,
+            not_repeating=apart.listed(),
         )
 
     @property
@@ -132,10 +142,14 @@ def diagnose(
     tell = progress or (lambda line: None)
     tell(f"Filtering {len(data_set.runs)} runs")
     case = case_of(data_set, withhold, thresholds)
-    floor = noise_floor(case.runs, case.motions, thresholds.repeats)
     stack = Stack(case.robot, [*case.effects, *case.run_offsets])
     tell("Fitting the twin")
-    plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
+    plain = _plain(case, stack, tell)
+    differ = disturbances(case)
+    case, taken = removed(case, stack, plain, differ)
+    if taken:
+        plain = _plain(case, stack, tell)
+    floor = noise_floor(case.runs, case.motions, thresholds.repeats)
     if case.shows("torque") and plain is not None:
         _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain)
@@ -155,11 +169,11 @@ def diagnose(
         explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = verdict_of(findings, floor, thresholds)
+    verdict = beside(verdict_of(findings, floor, thresholds), differ, [one.disturbance for one in taken])
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
-    silent = [effect for effect in catalogue().values() if effect.id not in blamed]
+    silent = [one for one in catalogue().values() if one.id not in blamed and not one.disturbance]
     lacking = untestable(
         silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )
@@ -174,7 +188,7 @@ def diagnose(
     return Diagnosis(
         description=case.robot,
         verdict=verdict,
-        channels=tuple(findings),
+        channels=tuple(with_removed(finding, taken) for finding in findings),
         floor=floor,
         locations=tuple(located if verdict != NO_GAP else ()),
         untestable=tuple(lacking),
@@ -185,10 +199,16 @@ def diagnose(
         curves=drawn(left, located, None if proposal is None else proposal.curve),
         twin=closed_twin(case, causes),
         energies=energies,
+        not_repeating=tuple(differ),
+        removed=tuple(taken),
         against=case.against,
         thresholds=thresholds,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
     )
+
+
+def _plain(case: Case, stack: Stack, tell: Progress) -> System | None:
+    return torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
 
 
 def _check_observed(system: System) -> None:
@@ -259,6 +279,9 @@ def _variants(case: Case, signal: str) -> list[Effect]:
     return [
         shape
         for effect in catalogue().values()
-        if effect.signal == signal and (bodies or not effect.bodies) and can_show(effect, case.seen)
+        if effect.signal == signal
+        and not effect.disturbance
+        and (bodies or not effect.bodies)
+        and can_show(effect, case.seen)
         for shape in effect.candidates(case.robot)
     ]

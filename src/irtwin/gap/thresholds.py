@@ -63,6 +63,28 @@ class Repeats:
 
 
 @dataclass(frozen=True)
+class NotRepeating:
+    """What differs between repeats of a motion, and is named: a disturbance."""
+
+    alpha: float = _threshold(1e-3, "largest p of a disturbance, for all channels and frequencies", _P, _JUDGEMENT)
+    least_size: float = _threshold(
+        0.5, "least mean square of a line or a switching", "mean square of what else differs", _JUDGEMENT
+    )
+    least_slow: float = _threshold(
+        1.0, "least mean square of an offset or a drift between runs", "mean square of what else differs", _JUDGEMENT
+    )
+    least_noise: float = _threshold(1.0, "least RMS of a disturbance", "RMS of the sensor's noise", _JUDGEMENT)
+    periods: float = _threshold(3.0, "periods of a line in a run, at least", "periods", "the spectrum's resolution")
+    highest: float = _threshold(0.95, "lines are looked for up to it", "share of the Nyquist frequency", "the sampling")
+    pure: float = _threshold(
+        0.6, "one steady wave explains so much of what stands out, or it is a band", "share", _JUDGEMENT
+    )
+    step: float = _threshold(6.0, "least step of power", "spreads of the steps of noise", _JUDGEMENT)
+    alike: float = _threshold(0.25, "steps of one load differ by no more", "share of the load", _JUDGEMENT)
+    switching: float = _threshold(0.5, "switching explains so much of what differs", "share", _JUDGEMENT)
+
+
+@dataclass(frozen=True)
 class SameRobot:
     """Whether the other runs are of the robot that was observed."""
 
@@ -323,6 +345,7 @@ class Thresholds:
 
     admission: Admission = Admission()
     repeats: Repeats = Repeats()
+    not_repeating: NotRepeating = NotRepeating()
     same_robot: SameRobot = field(default_factory=SameRobot)
     contact: Contact = Contact()
     some_payload: SomePayload = SomePayload()

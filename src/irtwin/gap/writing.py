@@ -113,9 +113,7 @@ def findings(
                 confidence=of_family(likely, limits.confidence),
                 share=branch.closing.share,
                 share_interval95=branch.closing.interval,
-                share_of="the mean square, as no floor is known"
-                if channel.floor is None
-                else "the gap above the floor",
+                share_of=branch.closing.share_of,
                 matters=branch.closing.matters(limits.matters),
                 members=tuple(one for some in members for one in some),
             )

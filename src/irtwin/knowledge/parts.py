@@ -113,7 +113,7 @@ def groups(ontology: Ontology, triples: Iterable[Triple]) -> tuple[set[Triple], 
 def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return the robots of a part; where it has none, its first node."""
     said = list(part)
-    found = {one.subject for one in said if one.predicate == _TYPE and one.object == _ROBOT}
+    found = {node for one in said if (one.predicate, one.object) == (_TYPE, _ROBOT) for node in ontology.nodes(one)}
     return sorted(found or [min((node for one in said for node in ontology.nodes(one)), key=str)], key=str)
 
 

@@ -48,6 +48,9 @@ WHERE {{
     {{ SELECT DISTINCT ?s ?p ?o {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }} }} }}
 }}"""
 
+_SET_ASIDE = f"""
+SELECT ?robot ?why WHERE {{ GRAPH <{GRAPH_REASONED}> {{ ?robot <{term("Contradiction")}> ?why }} }} ORDER BY ?robot"""
+
 _OWL_RL = NamedNode(GRAPH_OWL_RL)
 _ATTRIBUTED_TO = NamedNode(PROV + "wasAttributedTo")
 _PELLET = NamedNode(REASONER + "pellet")
@@ -340,8 +343,7 @@ def _rules() -> bytes:
 def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
     counts = graph.query(_COUNT).rows[0]
     names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
-    said = graph.triples(GRAPH_REASONED)
-    aside = sorted((it.subject.value, it.object.value) for it in said if it.predicate == _CONTRADICTION)
+    aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
     return Inferences(
         counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), _not_run(), joined_by, tuple(aside)
     )

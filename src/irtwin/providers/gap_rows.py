@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.document import Cause, Change, Document, Finding, Location
+from irtwin.gap.document.document import Cause, Change, Document, Finding, Location, NotRepeating
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.storage import experiment_schema, gap_schema
 from irtwin.storage.schema import Base
@@ -33,6 +33,8 @@ def rows(said: Document, at: Place) -> Iterator[Base]:
     yield from _locations(said, at)
     for rank, finding in enumerate(said.findings, start=1):
         yield from _finding(finding, rank, at)
+    for rank, disturbance in enumerate(said.not_repeating or (), start=1):
+        yield from _disturbance(disturbance, rank, at)
     for rank, cause in enumerate(said.causes, start=1):
         yield from _cause(cause, rank, at)
     yield from _changes(said, at)
@@ -58,6 +60,7 @@ def _sizes(said: Document, at: Place) -> Iterator[Base]:
             rmse=size.rmse,
             noise_floor=size.noise_floor,
             excess=size.excess,
+            sensor_noise=size.sensor_noise,
             unit="N m" if channel == "torque" else "W",
         )
 
@@ -113,6 +116,27 @@ def _finding(said: Finding, rank: int, at: Place) -> Iterator[Base]:
     for number, one in enumerate(said.members, start=1):
         yield gap_schema.GapFindingMember(
             **key, number=number, cause_id=one.cause, effect=one.effect, confidence=one.confidence
+        )
+
+
+def _disturbance(said: NotRepeating, rank: int, at: Place) -> Iterator[Base]:
+    key = {"diagnosis_id": at.diagnosis_id, "disturbance_id": said.id}
+    yield gap_schema.GapDisturbance(
+        **key,
+        rank=rank,
+        robot_id=at.robot_id,
+        channel=said.channel,
+        joint=said.joint,
+        kind=said.kind,
+        rms=said.rms,
+        unit="N m" if said.channel == "torque" else "W",
+        share=said.share,
+        cause_id=said.explained_by,
+    )
+    for number, one in enumerate(said.quantities, start=1):
+        lower, upper = one.interval95 or (None, None)
+        yield gap_schema.GapDisturbanceQuantity(
+            **key, number=number, name=one.name, value=one.value, unit=one.unit, lower=lower, upper=upper
         )
 
 

@@ -49,6 +49,7 @@ class GapSize(Base):
     rmse: Mapped[float]
     noise_floor: Mapped[float | None]
     excess: Mapped[float | None]  # mean square over that of the floor, less 1
+    sensor_noise: Mapped[float | None]
     unit: Mapped[str]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
@@ -132,6 +133,41 @@ class GapFindingMember(Base):
     cause_id: Mapped[str]
     effect: Mapped[str]
     confidence: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapDisturbance(Base):
+    """What differs between repeats of a motion, beyond noise."""
+
+    __tablename__ = "gap_disturbance"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    disturbance_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
+    rank: Mapped[int]
+    robot_id: Mapped[str]
+    channel: Mapped[str]
+    joint: Mapped[str | None]
+    kind: Mapped[str]  # "line", "band", "switching", "drift" or "offset"
+    rms: Mapped[float]  # of one run
+    unit: Mapped[str]
+    share: Mapped[float]  # of what differs in its channel and joint, 0 to 1
+    cause_id: Mapped[str | None]  # the cause that explains it
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapDisturbanceQuantity(Base):
+    """A number that describes a disturbance, with its 95 % interval."""
+
+    __tablename__ = "gap_disturbance_quantity"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    disturbance_id: Mapped[str] = mapped_column(primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    value: Mapped[float]
+    unit: Mapped[str]
+    lower: Mapped[float | None]
+    upper: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

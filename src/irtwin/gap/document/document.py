@@ -24,11 +24,15 @@ FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How large the gap of a channel is: `rmse` and `noise_floor` in its unit; `excess`: mean square / floor² - 1."""
+    """How large the gap of a channel is: `rmse` and `noise_floor` in its unit; `excess`: mean square / floor² - 1.
+
+    `sensor_noise`: the part of the floor that the fast end of the spectrum shows, as RMS in the filter's band.
+    """
 
     rmse: float
     noise_floor: float | None
     excess: float | None
+    sensor_noise: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,6 +162,24 @@ class Finding:
 
 
 @dataclass(frozen=True, kw_only=True)
+class NotRepeating:
+    """What differs between repeats of a motion beyond noise: `id`, `channel`, `joint` (None: the whole robot), `kind`.
+
+    `rms` of one run, in the channel's unit; `share` of the mean square of all that differs there; `quantities` as of
+    a cause: frequency and amplitude, or power, duty and period, or offset, or drift. `explained_by`: a cause's id.
+    """
+
+    id: str
+    channel: Channel
+    joint: str | None
+    kind: Annotated[str, OneOf("line", "band", "switching", "drift", "offset")]
+    rms: float
+    share: Share
+    quantities: tuple[Parameter, ...]
+    explained_by: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Untestable:
     """An effect that the data cannot show, and why."""
 
@@ -251,6 +273,7 @@ class Document:
     not_testable: tuple[Untestable, ...]
     shrink: Shrink
     next_experiment: Experiment | None
+    not_repeating: tuple[NotRepeating, ...] | None = None  # none where nothing is repeated, or nothing differs
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

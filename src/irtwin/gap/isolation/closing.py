@@ -26,6 +26,11 @@ class Closing:
     floors: float | None
     size: float
 
+    @property
+    def share_of(self) -> str:
+        """What the share is of, in words."""
+        return "the mean square, as no floor is known" if self.floors is None else "the gap above the floor"
+
     def matters(self, limits: Matters) -> bool:
         """Return whether a person would miss it: enough of the gap, more than noise, and for sure more than nothing."""
         more_than_noise = self.floors is None or self.floors >= limits.least_floors

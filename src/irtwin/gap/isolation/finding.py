@@ -32,7 +32,7 @@ class Finding:
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
     each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
-    of each.
+    of each; `part`: theirs of all that is closed, beside what does not repeat.
     """
 
     name: str
@@ -45,6 +45,7 @@ class Finding:
     estimate: Estimate
     closed_squares: np.ndarray
     power_balances: tuple[PowerBalance, ...] = ()
+    part: float = 1.0
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -55,7 +56,8 @@ class Finding:
     def shares(self) -> tuple[float, ...]:
         """Each cause's part of what they close together, none where they close nothing."""
         level = self.attribution.noise if self.floor is None else self.floor
-        return shares(self.closed_squares, self.held_out.rows, level)
+        own = shares(self.closed_squares, self.held_out.rows, level)
+        return tuple(self.part * share for share in own)
 
     def share(self, cause: Cause) -> float | None:
         """Return a cause's part of what all close together, None where they close nothing."""

@@ -10,6 +10,7 @@ from irtwin.gap.data.noise_floor import REPEATS, Floor
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.normal_equations import noise_before, reference_rms
+from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.thresholds import Thresholds
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
@@ -34,6 +35,16 @@ def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Thresholds) ->
     if not causes:
         return NO_GAP
     return AMBIGUOUS if any(cause.rivals for cause in causes) else ATTRIBUTED
+
+
+def beside(verdict: str, found: Sequence[Disturbance], explained: Sequence[Disturbance]) -> str:
+    """Return the verdict beside what differs between repeats, the largest share first: where there is any, a gap is.
+
+    It is `attributed` where effects explain the largest of it, `unexplained` where that is located only.
+    """
+    if verdict != NO_GAP or not found:
+        return verdict
+    return ATTRIBUTED if any(found[0] is one for one in explained) else UNEXPLAINED
 
 
 def _largest(finding: Finding) -> tuple[float, float]:

@@ -1,0 +1,86 @@
+"""A motion and its repeat, one laid on the other: what they differ by is no model's fault."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import minimize_scalar
+
+from irtwin.gap.thresholds import Repeats
+from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
+
+_FEWEST = 20  # samples that both have
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A motion and its repeat, which is `shift` s later; `inside` (N,): where both are known, on the first's times."""
+
+    first: Motion
+    second: Motion
+    shift: float
+    inside: np.ndarray
+
+    @property
+    def time(self) -> np.ndarray:
+        """(M,) s of the first's clock, where both are known."""
+        return np.asarray(self.first.time[self.inside])
+
+    def difference(self, signal: str) -> np.ndarray | None:
+        """Return first less second of a signal, (M, ...), None where either lacks it."""
+        one, two = getattr(self.first, signal), getattr(self.second, signal)
+        return None if one is None or two is None else self.of(one, two)
+
+    def of(self, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+        """Return the difference of what the first and the second have at their own times, (M, ...)."""
+        return np.asarray(one[self.inside] - make_interp_spline(self.second.time + self.shift, two, k=1)(self.time))
+
+
+def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repeats) -> list[Pair]:
+    """Return each measured run that repeats another of its role, beside that one; a simulator repeats itself.
+
+    `motions`: each run's, by name, filtered alike.
+    """
+    role = {run.name: run.role for run in runs if run.role != "simulated"}
+    found = [
+        _laid(motions[run.repeat_of], motions[run.name], limits)
+        for run in runs
+        if run.repeat_of and run.name in role and role.get(run.repeat_of) == run.role
+    ]
+    return [pair for pair in found if pair is not None]
+
+
+def _laid(first: Motion, second: Motion, limits: Repeats) -> Pair | None:
+    """Return the pair; None where they have too little in common."""
+    shift = _shift(first, second, limits.largest_shift)
+    start = max(first.time[0], second.time[0] + shift) + 1e-9
+    stop = min(first.time[-1], second.time[-1] + shift) - 1e-9
+    inside = (first.time >= start) & (first.time <= stop)
+    if inside.sum() < _FEWEST:
+        return None
+    q = make_interp_spline(second.time + shift, second.q)(first.time[inside])
+    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.largest_difference * max(float(first.q.std()), 1e-3):
+        return None
+    return Pair(first, second, shift, inside)
+
+
+def _shift(first: Motion, second: Motion, largest: float) -> float:
+    """Return by how much later (s) the second motion has to be moved to lie on the first."""
+    spline = make_interp_spline(second.time, second.q)
+    low, high = second.time[0], second.time[-1]
+    every = slice(None, None, max(1, len(first.time) // 500))
+    time, q = first.time[every], first.q[every]
+
+    def distance(shift: float) -> float:
+        inside = (time - shift >= low) & (time - shift <= high)
+        return float(np.mean((spline(time[inside] - shift) - q[inside]) ** 2)) if inside.any() else np.inf
+
+    offset = first.time[0] - second.time[0]
+    grid = offset + np.linspace(-largest, largest, 81)
+    best = grid[int(np.argmin([distance(shift) for shift in grid]))]
+    step = grid[1] - grid[0]
+    return float(minimize_scalar(distance, bounds=(best - step, best + step), method="bounded").x)

@@ -1,0 +1,232 @@
+"""What does not repeat, in the document: listed, as causes where an effect explains it, and in what is closed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from irtwin.effects.effect import Quantity
+from irtwin.gap.data.noise_floor import Floor
+from irtwin.gap.document import document
+from irtwin.gap.document.cause_ids import cause_ids
+from irtwin.gap.isolation.closing import Closing, closing
+from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.regression.held_out import closed_fraction
+from irtwin.gap.regression.hypotheses import MISSING
+from irtwin.gap.repeats.disturbances import Disturbance
+from irtwin.gap.repeats.removal import Removed
+from irtwin.gap.thresholds import Confidence, Matters
+
+
+def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
+    """Return a finding whose residual before anything is added holds what was taken out, on groups left out."""
+    judged, own = finding.held_out, [one for one in taken if one.disturbance.channel == finding.name]
+    if not own:
+        return finding
+    before = judged.before.copy()
+    for one in own:
+        place = finding.places.index(one.disturbance.joint)
+        squares = [one.mean_square(runs) for runs in finding.groups]
+        before[:, place] += judged.rows[:, place] * np.array(squares)
+    closed = float(np.sum((judged.before - judged.after) / _level(finding)))
+    more = float(np.sum((before - judged.before) / _level(finding)))
+    part = max(closed, 0.0) / max(max(closed, 0.0) + more, 1e-300)
+    return replace(finding, held_out=replace(judged, before=before), part=part)
+
+
+def _level(finding: Finding) -> np.ndarray:
+    """Return (g,) by which squares of equations are compared: the floor's."""
+    return np.ones(len(finding.places)) if finding.floor is None else finding.floor**2
+
+
+@dataclass(frozen=True)
+class NotRepeating:
+    """What was `taken` out of all that was `found` to differ between repeats.
+
+    `channels`: the findings with what was taken out in them; `ids`: of the other causes.
+    """
+
+    taken: tuple[Removed, ...]
+    found: tuple[Disturbance, ...]
+    floor: Floor
+    channels: tuple[Finding, ...]
+    ids: Sequence[str]
+    joints: tuple[str, ...]
+
+    @property
+    def _names(self) -> list[str]:
+        acted_on = [
+            (one.effect.id, () if one.disturbance.joint is None else (one.disturbance.joint,)) for one in self.taken
+        ]
+        return cause_ids(acted_on, self.joints)
+
+    def listed(self) -> tuple[document.NotRepeating, ...] | None:
+        """Return all that differs, the largest share first."""
+        explained = {id(one.disturbance): (one, name) for one, name in zip(self.taken, self._names, strict=True)}
+        places = [f"{one.kind}@{one.joint or one.channel}" for one in self.found]
+        listed = []
+        for k, one in enumerate(self.found):
+            by, name = explained.get(id(one), (None, None))
+            before = places[:k].count(places[k])
+            listed.append(
+                document.NotRepeating(
+                    id=places[k] + (f"#{before + 1}" if before else ""),
+                    channel=one.channel,
+                    joint=one.joint,
+                    kind=one.kind,
+                    rms=float(np.sqrt(one.size)),
+                    share=one.share,
+                    quantities=tuple(map(_quantity, one.quantities if by is None else by.quantities)),
+                    explained_by=name,
+                )
+            )
+        return tuple(listed) or None
+
+    def gap(self, gap: document.Gap) -> document.Gap:
+        """Return the gap with the sensors' part of the floors."""
+        torque, power = self.floor.sensor_torque, self.floor.sensor_power
+        sizes = gap.torque and {
+            joint: size if torque is None else replace(size, sensor_noise=float(torque[k]))
+            for k, (joint, size) in enumerate(gap.torque.items())
+        }
+        return replace(gap, torque=sizes, power=gap.power and replace(gap.power, sensor_noise=power))
+
+    def causes(self, others: Sequence[document.Cause], weights: Confidence) -> tuple[document.Cause, ...]:
+        """Return all causes: what takes most of what is closed in its channel goes before the others."""
+        count, own = len(others) + len(self.taken), []
+        for one, name in zip(self.taken, self._names, strict=True):
+            joints = () if one.disturbance.joint is None else (one.disturbance.joint,)
+            sure = confidence(one.t, one.gain, one.gain, 1.0, count, weights, unexplained=False)
+            evidence = document.Evidence(
+                channel=one.disturbance.channel,
+                share_of_what_is_closed=self._share(one),
+                closed_where_it_acts=one.gain,
+                gain_on_groups_left_out=one.gain,
+                t_between_groups=one.t,
+                p_adjusted_for_the_catalogue=one.disturbance.p,
+                gain_of_rivals={},
+                correlation_with_rivals={},
+            )
+            own.append(
+                document.Cause(
+                    id=name,
+                    effect=one.effect.id,
+                    joints=joints,
+                    scope=MISSING,
+                    confidence=sure,
+                    parameters=tuple(map(_quantity, one.quantities)),
+                    indistinguishable_from=(),
+                    evidence=evidence,
+                )
+            )
+        large = [one for one in own if (one.evidence.share_of_what_is_closed or 0.0) >= 0.5]
+        return (*large, *others, *(one for one in own if one not in large))
+
+    def findings(
+        self, others: Sequence[document.Finding], causes: Sequence[document.Cause], limits: Matters
+    ) -> tuple[document.Finding, ...]:
+        """Return all findings: of what was taken out each is one, with its cause alone; the order is that of causes."""
+        sure = {cause.id: cause.confidence for cause in causes}
+        own = []
+        for one, name in zip(self.taken, self._names, strict=True):
+            channel, joint = self._finding(one), one.disturbance.joint
+            closed = self._closing(one)
+            own.append(
+                document.Finding(
+                    id=name,
+                    family=one.effect.family,
+                    joints=() if joint is None else (joint,),
+                    scope=MISSING,
+                    channel=channel.name,
+                    confidence=sure[name],
+                    share=closed.share,
+                    share_interval95=closed.interval,
+                    share_of=closed.share_of,
+                    matters=closed.matters(limits),
+                    members=(
+                        document.Member(
+                            cause=name, effect=one.effect.id, family=one.effect.family, confidence=sure[name]
+                        ),
+                    ),
+                )
+            )
+        large = [one for one in own if one.share >= 0.5]
+        return (*large, *others, *(one for one in own if one not in large))
+
+    def _closing(self, one: Removed) -> Closing:
+        finding = self._finding(one)
+        judged = finding.held_out
+        squares = np.zeros_like(judged.before)
+        place = finding.places.index(one.disturbance.joint)
+        squares[:, place] = judged.rows[:, place] * np.array([one.mean_square(runs) for runs in finding.groups])
+        return closing(squares, squares[:, place] > 0, judged, finding.floor, finding.attribution.noise)
+
+    def shrink(self, shrink: document.Shrink, seed: int) -> document.Shrink:
+        """Return how far the gap shrinks, with what was taken out."""
+        if not self.taken:
+            return shrink
+        closing = [
+            (one.held_out, one.floor)
+            for one in self.channels
+            if one.floor is not None and (one.causes or self._of(one.name))
+        ]
+        closed = closed_fraction(closing, seed) if closing else None
+        fraction = closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1]))
+        return replace(shrink, closed_fraction=fraction, by_cause=(*shrink.by_cause, *self._by_cause()))
+
+    def _of(self, channel: str) -> list[Removed]:
+        return [one for one in self.taken if one.disturbance.channel == channel]
+
+    def _finding(self, one: Removed) -> Finding:
+        return next(each for each in self.channels if each.name == one.disturbance.channel)
+
+    def _squares(self, one: Removed) -> np.ndarray:
+        """Return (g,) its mean square in each equation of its channel, over the groups judged."""
+        finding = self._finding(one)
+        found, rows = np.zeros(len(finding.places)), finding.held_out.rows
+        place = finding.places.index(one.disturbance.joint)
+        squares = [one.mean_square(runs) for runs in finding.groups]
+        found[place] = float(rows[:, place] @ squares) / max(float(rows[:, place].sum()), 1.0)
+        return found
+
+    def _share(self, one: Removed) -> float | None:
+        """Return its part of what the causes of its channel close together."""
+        finding = self._finding(one)
+        level = _level(finding)
+        own = {id(each): float(np.sum(self._squares(each) / level)) for each in self._of(finding.name)}
+        left = 1 - sum(finding.shares) if finding.shares else 1.0
+        return left * own[id(one)] / sum(own.values()) if sum(own.values()) > 0 else None
+
+    def _by_cause(self) -> list[document.CauseChange]:
+        changes = []
+        for one, name in zip(self.taken, self._names, strict=True):
+            finding, squares = self._finding(one), self._squares(one)
+            judged = finding.held_out
+            before, after = judged.rmse(judged.before), judged.rmse(judged.after)
+            changes.append(
+                document.CauseChange(
+                    cause=name,
+                    effect=one.effect.id,
+                    joints=() if one.disturbance.joint is None else (one.disturbance.joint,),
+                    scope=MISSING,
+                    channel=finding.name,
+                    share=self._share(one),
+                    rmse_before=_numbers(before),
+                    rmse_alone=_numbers(np.sqrt(np.maximum(before**2 - squares, 0.0))),
+                    rmse_when_left_out=_numbers(np.sqrt(after**2 + squares)),
+                    rmse_with_all=_numbers(after),
+                )
+            )
+        return changes
+
+
+def _numbers(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _quantity(one: Quantity) -> document.Parameter:
+    ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
+    return document.Parameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)

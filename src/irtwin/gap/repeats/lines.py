@@ -1,0 +1,143 @@
+"""Line spectrum: frequencies that stand out of the spectrum of what two runs of one motion differ by.
+
+At each frequency a wave is fitted beside the columns of a series (the least-squares periodogram of Lomb and Scargle,
+with nuisance columns). What it explains is held against the median of the frequencies around, on the side where these
+are louder, so that coloured noise is no line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar
+from scipy.signal import czt
+from scipy.stats import gamma
+
+from irtwin.gap.repeats.series import Series, waves
+from irtwin.gap.thresholds import NotRepeating
+
+_FINE = 2  # points of the spectrum for each that is independent
+_NEAR = 2  # independent points on either side that belong to a line,
+_AROUND = 12  # and beyond them those that it is held against
+_MEDIAN = float(np.log(np.log(2)))  # of the logarithm of what is exponential, with mean one
+_FREE = 0.3  # of a wave must be left by the columns beside it
+_MOST = 8  # lines of one channel
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line: `frequency` Hz with its standard `error`; `amplitude` of one run, its `deviation`; p, for all tests.
+
+    `purity`: the part of what stands out around the line that one steady wave explains. `size`: its mean square in one
+    run, were its phases random.
+    """
+
+    frequency: float
+    error: float
+    amplitude: float
+    deviation: float
+    purity: float
+    p: float
+
+    @property
+    def size(self) -> float:
+        """The mean square."""
+        return self.amplitude**2 / 2
+
+
+def lines(series: Sequence[Series], tests: int, limits: NotRepeating) -> tuple[list[Line], list[Series]]:
+    """Return the lines that all series show together, the strongest first, and the series with these beside them.
+
+    Each series is the difference of two runs. `tests`: how many channels are searched, for which p is adjusted.
+    """
+    series = list(series)
+    found: list[Line] = []
+    grid = _grid(series, limits)
+    while len(grid) > 4 * _AROUND and len(found) < _MOST:
+        explained = np.array([_explained(one, grid) for one in series])
+        noise = np.array([_noise(each, grid) for each in explained])
+        stands = (explained / noise).sum(axis=0)
+        best = int(np.argmax(stands))
+        p = float(min(1.0, gamma.sf(stands[best], len(series)) * len(grid) / _FINE * tests))
+        if not p <= limits.alpha:
+            break
+        line, series = _line(series, grid, best, noise[:, best], p)
+        found.append(line)
+    return found, series
+
+
+def _grid(series: Sequence[Series], limits: NotRepeating) -> np.ndarray:
+    """Return the frequencies to try, (F,) Hz: even, so that those of a run cut short are told apart too."""
+    seconds = [one.seconds for one in series]
+    step = 1 / (_FINE * max(seconds))
+    highest = limits.highest * min(one.rate for one in series) / 2
+    return np.asarray(step * np.arange(np.ceil(limits.periods / min(seconds) / step), np.floor(highest / step) + 1))
+
+
+def _transform(values: np.ndarray, one: Series, grid: np.ndarray) -> np.ndarray:
+    """Return the Fourier sums of columns (N, m) at even frequencies, (F, m)."""
+    turn = 2j * np.pi / one.rate
+    ratio, start = np.exp(-turn * (grid[1] - grid[0])), np.exp(turn * grid[0])
+    return np.asarray(czt(values, len(grid), ratio, start, axis=0))
+
+
+def _explained(one: Series, grid: np.ndarray) -> np.ndarray:
+    """Return the squares that a wave of each frequency explains beside the columns, (F,), halved: of mean S², white."""
+    basis, count = one.basis(), len(one.values)
+    left = one.left()
+    sums = _transform(np.column_stack([left, basis]), one, grid)
+    twice = _transform(np.ones((count, 1)), one, 2 * grid)[:, 0]
+    own, beside = sums[:, 0], sums[:, 1:]
+    cosine, sine = beside.real, -beside.imag
+    both = np.empty((len(grid), 2, 2))
+    both[:, 0, 0] = (count + twice.real) / 2 - (cosine**2).sum(axis=1)
+    both[:, 1, 1] = (count - twice.real) / 2 - (sine**2).sum(axis=1)
+    both[:, 0, 1] = both[:, 1, 0] = -twice.imag / 2 - (cosine * sine).sum(axis=1)
+    imitated = np.linalg.eigvalsh(both)[:, 0] < _FREE * count / 2
+    both[imitated] = np.eye(2)
+    right = np.stack([own.real, -own.imag], axis=1)
+    found = np.einsum("fi,fi->f", right, np.linalg.solve(both, right[..., None])[..., 0]) / 2
+    return np.asarray(np.where(imitated, 0.0, found))
+
+
+def _noise(explained: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Return what noise explains at each frequency, (F,): the median of the louder side, as what wanders falls off.
+
+    Below there is little to hold the lowest frequencies against, so they are from those above, by the square of their
+    ratio: that of a random walk.
+    """
+    logs = np.log(np.maximum(explained, 1e-12 * max(float(explained.max(initial=0.0)), 1e-300)))
+    width, apart = _FINE * _AROUND, _FINE * (_NEAR + _AROUND // 2)
+    padded = np.pad(median_filter(logs, size=width, mode="reflect"), apart, mode="reflect")
+    below, above = padded[: len(logs)], padded[2 * apart :]
+    falling = 2 * np.log1p(apart * (grid[1] - grid[0]) / grid)
+    return np.asarray(np.exp(np.maximum(below, above + falling) - _MEDIAN))
+
+
+def _line(
+    series: Sequence[Series], grid: np.ndarray, best: int, noise: np.ndarray, p: float
+) -> tuple[Line, list[Series]]:
+    """Place a line between the points of the grid; return it, and the series with it beside them."""
+    step = grid[1] - grid[0]
+
+    def missed(frequency: float) -> float:
+        near = np.array([frequency, frequency + step])
+        return -float(np.sum([_explained(one, near)[0] / level for one, level in zip(series, noise, strict=True)]))
+
+    placed = minimize_scalar(missed, bounds=(grid[best] - step, grid[best] + step), method="bounded")
+    frequency = float(placed.x)
+    more = [one.with_columns(*waves(one.time, frequency)) for one in series]
+    near = grid[max(0, best - _FINE * _NEAR) : best + _FINE * _NEAR + 1]
+    rest = np.sum([_explained(one, near) for one in more], axis=0).max(initial=0.0)
+    samples = np.array([len(one.values) for one in series])
+    whole = np.array([_explained(one, np.array([frequency, frequency + step]))[0] for one in series])
+    squares = [float(np.sum(one.coefficients()[-2:] ** 2)) for one in more]
+    amplitude = float(np.sqrt(np.mean(squares) / 2))  # of one run: a difference has two, of any phases
+    deviation = float(np.sqrt(np.sum(2 * noise / samples)) / len(series) / np.sqrt(2))
+    seconds = float(np.mean([one.seconds for one in series]))
+    signal = float(np.sum(whole / noise))
+    error = float(np.sqrt(1.5 / max(signal, 1.0)) / (np.pi * seconds))
+    return Line(frequency, error, amplitude, deviation, float(whole.sum() / (whole.sum() + rest)), p), more

@@ -1,0 +1,62 @@
+"""A series that should be noise: what two runs of one motion differ by, beside what follows the motion in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+_WILD = 6.0  # spreads: what lies beyond is a joint that turned back at another instant, and is cut there
+_SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
+
+
+@dataclass(frozen=True)
+class Series:
+    """Even samples: `time` (N,) s, `values` (N,), and `beside` (N, m), columns that may explain any part of them."""
+
+    time: np.ndarray
+    values: np.ndarray
+    beside: np.ndarray
+
+    @property
+    def seconds(self) -> float:
+        """How long it lasts."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, Hz."""
+        return (len(self.time) - 1) / self.seconds
+
+    def with_columns(self, *columns: np.ndarray) -> Series:
+        """Return the series with more columns beside it, (N,) each."""
+        return replace(self, beside=np.column_stack([self.beside, *columns]))
+
+    def basis(self) -> np.ndarray:
+        """Return orthonormal columns (N, r) that span those beside it."""
+        scaled = self.beside / np.maximum(np.linalg.norm(self.beside, axis=0), 1e-300)
+        left, size, _ = np.linalg.svd(scaled, full_matrices=False)
+        return np.asarray(left[:, size > 1e-8 * size.max(initial=0.0)])
+
+    def coefficients(self) -> np.ndarray:
+        """Return the coefficients (m,) of the columns beside it in a fit to the values."""
+        scale = np.maximum(np.linalg.norm(self.beside, axis=0), 1e-300)
+        found: np.ndarray = np.linalg.lstsq(self.beside / scale, self.values, rcond=1e-8)[0] / scale
+        return found
+
+    def left(self) -> np.ndarray:
+        """Return what the columns beside it leave of the values, (N,)."""
+        basis = self.basis()
+        return np.asarray(self.values - basis @ (basis.T @ self.values))
+
+    def tamed(self) -> Series:
+        """Return the series with wild samples cut: what is far beyond the spread of what is left."""
+        left = self.left()
+        most = _WILD * _SPREAD * float(np.median(np.abs(left)))
+        return replace(self, values=self.values - left + np.clip(left, -most, most)) if most > 0 else self
+
+
+def waves(time: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return cosine and sine of a frequency, Hz, at some times, (N,) each."""
+    angle = 2 * np.pi * frequency * time
+    return np.cos(angle), np.sin(angle)

@@ -1,0 +1,139 @@
+"""What two runs of one motion differ by: found, described, and not found where there is noise alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.gap.test_diagnosis import data_set
+from tests.synthetic import arm, as_run, measure, swing
+
+from irtwin.gap.data.case import case_of
+from irtwin.gap.data.noise_floor import noise_floor
+from irtwin.gap.isolation.verdict import beside
+from irtwin.gap.regression.correlation import correlation_samples
+from irtwin.gap.repeats.disturbances import disturbances
+from irtwin.gap.repeats.lines import lines
+from irtwin.gap.repeats.series import Series
+from irtwin.gap.thresholds import DEFAULT
+
+ROBOT = arm(3)
+LIMITS = DEFAULT.not_repeating
+
+
+def repeated(change=None, count=2, noise=0.3, rate=100.0):
+    """Two to four runs of one motion; `change(run's number, time)` gives what is added to torque (N, n) and power."""
+    made = []
+    for number in range(count):
+        motion = replace(swing(ROBOT, 0, seconds=10.0, rate=rate), run=f"run_{number}")
+        shown = replace(measure(ROBOT, motion, noise=noise, seed=number), current=None)
+        if change is not None:
+            torque, power = change(number, motion.time)
+            shown = replace(shown, torque=shown.torque + torque, power=shown.power + power)
+        made.append(replace(as_run(shown), role="observed", repeat_of="run_0" if number else None))
+    return case_of(data_set(made), (), DEFAULT)
+
+
+def in_joint_2(values):
+    return np.column_stack([np.zeros_like(values), values, np.zeros_like(values)]), np.zeros_like(values)
+
+
+def in_power(values):
+    return np.zeros((len(values), 3)), values
+
+
+def only(found):
+    assert len(found) == 1, [(one.kind, one.joint) for one in found]
+    return found[0], {each.name: each for each in found[0].quantities}
+
+
+def wandering(count, memory, rng):
+    """Noise of unit variance that remembers `memory` samples."""
+    found = np.zeros(count)
+    for k, push in enumerate(rng.standard_normal(count)):
+        found[k] = found[k - 1] * (1 - 1 / memory) + push
+    return found / found.std()
+
+
+@pytest.mark.parametrize("frequency", [0.5, 2.9, 12.0, 30.0])
+def test_a_torque_that_swings_is_a_line_at_its_joint(frequency):
+    case = repeated(lambda k, t: in_joint_2(3.0 * np.sin(2 * np.pi * frequency * t + 2.0 * k)))
+    one, said = only(disturbances(case))
+    assert (one.channel, one.joint, one.kind) == ("torque", "joint_2", "line")
+    assert said["f"].value == pytest.approx(frequency, abs=0.02)
+    assert said["f"].lower < frequency < said["f"].upper
+    assert one.share > 0.5 and one.p < 1e-3
+
+
+@pytest.mark.parametrize("duty", [0.2, 0.5, 0.8])
+def test_a_load_that_switches_is_told_by_its_power_duty_and_period(duty):
+    case = repeated(lambda k, t: in_power(60.0 * ((t / 3.0 + 0.4 * k) % 1 < duty)))
+    one, said = only(disturbances(case))
+    assert (one.channel, one.joint, one.kind) == ("power", None, "switching")
+    assert said["P"].value == pytest.approx(60.0, rel=0.1)
+    assert said["duty"].value == pytest.approx(duty, abs=0.06)
+    assert said["period"].value == pytest.approx(3.0, rel=0.1)
+
+
+def test_an_offset_between_runs_is_located():
+    one, said = only(disturbances(repeated(lambda k, t: in_joint_2(4.0 * k + 0 * t))))
+    assert (one.joint, one.kind) == ("joint_2", "offset")
+    assert said["offset"].lower < -4.0 < said["offset"].upper
+
+
+def test_a_drift_is_located_and_is_no_offset_too():
+    one, said = only(disturbances(repeated(lambda k, t: in_joint_2(0.5 * k * t))))
+    assert (one.joint, one.kind) == ("joint_2", "drift")
+    assert said["drift"].lower < -0.5 < said["drift"].upper
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_noise_differs_but_is_no_disturbance(count):
+    assert disturbances(repeated(count=count)) == []
+
+
+def test_friction_that_differs_between_runs_follows_the_motion():
+    speed = swing(ROBOT, 0, seconds=10.0).dq[:, 1]
+    assert disturbances(repeated(lambda k, t: in_joint_2(k * (2.0 * np.sign(speed) + speed)))) == []
+
+
+def test_what_is_small_beside_the_noise_is_no_disturbance():
+    assert disturbances(repeated(lambda k, t: in_joint_2(0.02 * np.sin(18.2 * t + 2 * k)))) == []
+
+
+def test_without_repeats_nothing_is_said():
+    case = repeated(lambda k, t: in_joint_2(3.0 * np.sin(18.2 * t + 2.0 * k)))
+    assert disturbances(replace(case, runs=tuple(replace(run, repeat_of=None) for run in case.runs))) == []
+
+
+@pytest.mark.parametrize("memory", [1, 5, 20, 100])
+def test_noise_that_remembers_has_no_lines(memory):
+    rng, false = np.random.default_rng(memory), 0
+    time = np.arange(1000) / 125
+    for _ in range(30):
+        series = Series(time, wandering(1000, memory, rng), np.column_stack([np.ones(1000), time]))
+        false += bool(lines([series], 6, LIMITS)[0])
+    assert false <= 1
+
+
+@pytest.mark.parametrize("memory", [1, 10, 50])
+def test_the_correlation_of_what_remembers_is_found(memory):
+    rng = np.random.default_rng(0)
+    found = np.median([correlation_samples(wandering(4000, memory, rng)) for _ in range(10)])
+    assert found == pytest.approx(max(2 * memory - 1, 1), rel=0.3)
+
+
+def test_a_line_is_no_sensors_noise():
+    case = repeated(lambda k, t: in_joint_2(18.0 * np.sin(2 * np.pi * 30.0 * t + 2.0 * k)))
+    quiet = repeated()
+    loud, still = (noise_floor(one.runs, one.motions, DEFAULT.repeats) for one in (case, quiet))
+    assert loud.sensor_torque[1] < 2 * still.sensor_torque[1] < 0.3
+
+
+def test_the_verdict_is_never_no_gap_beside_a_disturbance():
+    found = disturbances(repeated(lambda k, t: in_joint_2(4.0 * k + 0 * t)))
+    assert beside("no_gap", [], []) == "no_gap"
+    assert beside("no_gap", found, []) == "unexplained"
+    assert beside("no_gap", found, found) == "attributed"
+    assert beside("ambiguous", found, []) == "ambiguous"
