@@ -109,6 +109,11 @@ def case_study(workspace: Path) -> None:
     type=click.Path(path_type=Path, dir_okay=False),
     help="JSON file to write the twin to, with the causes added.",
 )
+@click.option(
+    "--twin",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Twin that --save-twin wrote, to hold the data against: its effects are the baseline, its numbers the prior.",
+)
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
@@ -120,6 +125,7 @@ def diagnose(
     out: Path,
     report: Path | None,
     save_twin: Path | None,
+    twin: Path | None,
     withhold: tuple[str, ...],
     seed: int,
     repair: bool,
@@ -136,6 +142,7 @@ def diagnose(
 
     found = workflow.diagnose(
         dataset,
+        twin=twin,
         withhold=withhold,
         seed=seed,
         repair=repair,

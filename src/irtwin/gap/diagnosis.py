@@ -15,6 +15,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
+from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
@@ -111,6 +112,7 @@ class Diagnosis:
 def diagnose(
     data_set: DataSet,
     *,
+    twin: Twin | None = None,
     withhold: Sequence[str] = (),
     unknown: Sequence[str] = (),
     thresholds: Thresholds = DEFAULT,
@@ -119,15 +121,19 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
-    `withhold` takes effects out of the twin and leaves them in the catalogue; `unknown` are those that the search is
-    not to know; `thresholds` decide what is said; `progress` is told each step. Raises InputError on an effect that the
-    catalogue lacks or the twin has not, and where the data set cannot be diagnosed.
+    `twin` is what the gap is held against: its effects in their shapes, and its numbers as the prior; None: the effects
+    that the data set names. `withhold` takes effects out of it and leaves them in the catalogue; `unknown` are those
+    that the search is not to know; `thresholds` decide what is said; `progress` is told each step. Raises InputError on
+    an effect that the catalogue lacks or the twin has not, on a twin of another robot, and where the data set cannot be
+    diagnosed.
     """
     tell = progress or (lambda line: None)
     tell(f"Filtering {len(data_set.runs)} runs")
-    case = case_of(data_set, withhold, thresholds)
+    case = case_of(data_set, withhold, thresholds, twin)
+    for line in said_of_twin(data_set, twin) if twin else ():
+        tell(line)
     floor = noise_floor(case.runs, case.motions, thresholds.repeats)
-    stack = Stack(case.robot, [*case.effects, *case.run_offsets])
+    stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
     if case.shows("torque") and plain is not None:
@@ -154,7 +160,7 @@ def diagnose(
     blamed = {cause.effect for cause in causes}
     silent = [effect for effect in catalogue().values() if effect.id not in blamed]
     lacking = untestable(
-        silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
+        silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )
     left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
     located = places(left, seed)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
@@ -111,10 +112,10 @@ def find(
     without: Set[str] = frozenset(),
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
-    power, inside = name == "power", case.effects
+    power, inside = name == "power", case.modelled
     places = (None,) if power else case.robot.joint_names
     if system.both:  # zero in the other runs where these did not measure it: there, missing is changed
-        inside = (*inside, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
+        inside |= {(one.id, None) for one in catalogue().values() if not can_show(one, case.others)}
     candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
@@ -144,4 +145,5 @@ def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
             ]
             factors.append(np.column_stack([*parts, factor[:, -1]]))
         blocks.append(replace(block, factors=tuple(factors)))
-    return estimate(blocks, pattern, terms)
+    rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
+    return estimate(blocks, pattern, terms, rows)

@@ -41,7 +41,7 @@ def shares(system: System, found: Attribution, seed: int) -> tuple[float, ...]:
         every = np.append(inside, len(total) - 1)
         left = 0.0
         for group, train in rest.items():
-            factor = factored(train[np.ix_(inside, inside)])
+            factor = factored(train[np.ix_(inside, inside)], system.prior(chosen))
             vector = np.append(-solved(factor, train[inside, -1]), 1.0)
             left += float(vector @ moments[group][np.ix_(every, every)] @ vector)
         return -left

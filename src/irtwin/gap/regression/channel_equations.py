@@ -57,7 +57,8 @@ def torque_system(
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
-    return _enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+    known = stack.prior_rows(stack.torque_terms)
+    return _enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
 
 def power_system(
@@ -90,7 +91,8 @@ def power_system(
         return Rows([joined], known[:, None], motion.power[:, None])
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
-    return _enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+    known = stack.prior_rows(free)
+    return _enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
 
 def _enough(system: System) -> System:
