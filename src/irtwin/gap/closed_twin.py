@@ -23,7 +23,7 @@ def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
             continue
         for variant in cause.variants:
             joints = dict.fromkeys(map(place_of, variant.terms[:1] if cause.joints else variant.terms))
-            lacking = [joint for joint in joints if (cause.effect, joint) not in case.modelled]
+            lacking = [joint for joint in joints if not {(cause.effect, joint), (cause.effect, None)} & case.modelled]
             named = [joint for joint in lacking if joint is not None]
             whole = not cause.joints and len(lacking) == len(joints)
             effect = variant.effect if whole else variant.effect.on(*named)

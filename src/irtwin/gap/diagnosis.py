@@ -30,9 +30,11 @@ from irtwin.gap.experiment.planned_equations import planned_equations
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
-from irtwin.gap.isolation.finding import Finding, find
+from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.power_consistency import filtered, refuted
 from irtwin.gap.isolation.power_evidence import power_balances
+from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
+from irtwin.gap.isolation.torque_scale import TorqueScale, torque_scale
 from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
@@ -71,6 +73,8 @@ class Diagnosis:
     against: str | None = None  # the role of the runs that the observed ones are held against
     thresholds: Thresholds = DEFAULT
     yardstick: dict[str, Closeable] = field(default_factory=dict)  # each channel's, what could be closed at all
+    refusals: Refusals = NOTHING_REFUSED
+    scale: TorqueScale | None = None  # of torque, where it was measured
 
     @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
@@ -90,12 +94,16 @@ class Diagnosis:
             robot=robot.name,
             gap=writing.gap(robot.joint_names, self.channels, self.energies),
             locations=tuple(map(writing.location, self.locations)),
-            causes=tuple(writing.cause(robot, *one, gains, self.verdict, self.thresholds.confidence) for one in named),
+            causes=tuple(
+                writing.cause(robot, *one, gains, self.verdict, self.thresholds.confidence, self.scale) for one in named
+            ),
             not_testable=tuple(map(writing.untestable, self.untestable)),
             shrink=writing.shrink(
                 robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
             ),
             next_experiment=self.experiment,
+            refused=tuple(map(writing.refused, self.refusals.refused)) or None,
+            torque_scale=None if self.scale is None else writing.torque_scale(self.scale),
         )
 
     @property
@@ -140,21 +148,27 @@ def diagnose(
         _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain)
     explained: list[Explained] = []
+    refusals = NOTHING_REFUSED
+    scale: TorqueScale | None = None
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found = _torque(case, stack, plain, floor, below, frozenset(unknown), seed, tell)
+        found, refusals = _torque(case, stack, plain, floor, below, frozenset(unknown), seed, tell)
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
-            torque = _balanced(case, power_stack, torque, below, frozenset(unknown), seed)
+            torque, again = _balanced(case, power_stack, torque, below, frozenset(unknown), seed)
+            refusals = again if again.refused else refusals
         explained.append(torque)
+        scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
+        of_power, wrong = _power(case, power_stack, floor, torque, frozenset(unknown), seed, tell)
+        explained.append(of_power)
+        refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = verdict_of(findings, floor, thresholds.verdict)
+    verdict = verdict_of(findings, floor, thresholds.verdict, unmatched=refusals.unmatched)
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
@@ -186,6 +200,8 @@ def diagnose(
         against=case.against,
         thresholds=thresholds,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
+        refusals=refusals,
+        scale=scale,
     )
 
 
@@ -218,37 +234,40 @@ def _torque(
     unknown: Set[str],
     seed: int,
     tell: Progress,
-) -> Finding:
+) -> tuple[Finding, Refusals]:
     found = screen(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
     system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
     system = replace(system, transient=found.contact)
-    return find("torque", case, system, floor.torque, seed, without=unknown)
+    return find_possible("torque", case, system, floor.torque, seed, case.stated, unknown)
 
 
 def _balanced(
     case: Case, stack: Stack, explained: ExplainedTorque, below: Below, unknown: Set[str], seed: int
-) -> ExplainedTorque:
+) -> tuple[ExplainedTorque, Refusals]:
     """Let power speak: drop the rivals that it refutes, and try without causes that it does."""
     known, finding = catalogue(), explained.finding
+    refusals = NOTHING_REFUSED
     weighed = power_balances(case, stack, explained)
     if wrong := refuted(finding.causes, weighed, known):
-        finding = find("torque", case, finding.system, finding.floor, seed, without=wrong | unknown)
+        system, floor = finding.system, finding.floor
+        finding, refusals = find_possible("torque", case, system, floor, seed, case.stated, wrong | unknown)
         weighed = power_balances(case, stack, ExplainedTorque(explained.stack, finding, below))
     causes = tuple(filtered(one, said, known) for one, said in zip(finding.causes, weighed, strict=True))
     finding = replace(finding, attribution=replace(finding.attribution, causes=causes), power_balances=weighed)
-    return ExplainedTorque(explained.stack, finding, below)
+    return ExplainedTorque(explained.stack, finding, below), refusals
 
 
 def _power(
     case: Case, stack: Stack, floor: Floor, torque: Torque, unknown: Set[str], seed: int, tell: Progress
-) -> Explained:
+) -> tuple[Explained, Refusals]:
     power_of = twin_power(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
-    return explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
+    finding, refusals = find_possible("power", case, system, level, seed, case.stated, unknown)
+    return explained_power(stack, finding, torque, power_of), refusals
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

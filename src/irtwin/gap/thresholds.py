@@ -189,6 +189,17 @@ class PowerConsistency:
 
 
 @dataclass(frozen=True)
+class ScaleOfTorque:
+    """How far logged torque may be off on all joints alike; half a 95 % interval each."""
+
+    assumed: float = _threshold(
+        0.1, "torque of drives, where the data set states nothing", "share", "decisions/gap-scale-of-torque.md"
+    )
+    sensor: float = _threshold(0.02, "torque of sensors", "share", "decisions/gap-scale-of-torque.md")
+    meter: float = _threshold(0.02, "power of a meter", "share", "decisions/gap-scale-of-torque.md")
+
+
+@dataclass(frozen=True)
 class Detectability:
     """What the data can show."""
 
@@ -294,6 +305,7 @@ class Thresholds:
     selection: Selection = Selection()
     ambiguity: Ambiguity = Ambiguity()
     power_consistency: PowerConsistency = PowerConsistency()
+    scale_of_torque: ScaleOfTorque = ScaleOfTorque()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()
     confidence: Confidence = Confidence()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from irtwin.effects.effect import Effect
+from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
@@ -27,9 +27,9 @@ from irtwin.twin.twin import Twin
 class Case:
     """The robot, its twin's effects (ids, or effects of a shape), and each run's motion by name, all filtered alike.
 
-    `prior`: what is known of the twin's coefficients; None: what the catalogue expects. `robot` has the torque
-    constants that a balance of power told where nobody knew them, and `motions` the torque that follows; `given` are
-    the robot and the motions without.
+    `prior`: what is known of the twin's coefficients; None: what the catalogue expects; `stated`: what bounds the
+    causes. `robot` has the torque constants that a balance of power told where nobody knew them, and `motions` the
+    torque that follows; `given` are the robot and the motions without.
     """
 
     robot: Robot
@@ -39,6 +39,7 @@ class Case:
     given: tuple[Robot, dict[str, Motion]]
     thresholds: Thresholds
     prior: Prior | None = None
+    stated: Stated = NOTHING_STATED
 
     @cached_property
     def stack(self) -> Stack:
@@ -47,8 +48,13 @@ class Case:
 
     @cached_property
     def modelled(self) -> frozenset[tuple[str, str | None]]:
-        """Each effect that the twin has, with each joint at which it has it; None: of the whole robot."""
-        return frozenset((one.id, place_of(term)) for one in self.stack.effects for term in one.terms(self.robot))
+        """Each effect that the twin has, with each joint at which it has it; None: of the whole robot, or known."""
+        found = set()
+        for one in self.stack.effects:
+            terms = one.terms(self.robot)
+            known = all(term.fixed for term in terms)  # as a candidate, it has one coefficient for all
+            found |= {(one.id, None if known else place_of(term)) for term in terms}
+        return frozenset(found)
 
     @property
     def observed(self) -> frozenset[str]:
@@ -110,7 +116,25 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
-    return Case(robot, begun.effects, data_set.runs, motions, (begun.robot, given), thresholds, begun.prior)
+    return Case(
+        robot,
+        begun.effects,
+        data_set.runs,
+        motions,
+        (begun.robot, given),
+        thresholds,
+        begun.prior,
+        _stated(data_set),
+    )
+
+
+def _stated(data_set: DataSet) -> Stated:
+    rated = data_set.notes.get("rated_payload")
+    return Stated(
+        payload=max((run.payload_mass for run in data_set.runs if run.role == "observed"), default=0.0),
+        rated_payload=float(rated) if isinstance(rated, int | float) and rated > 0 else None,
+        torque_scale=data_set.torque_scale_uncertainty,
+    )
 
 
 def _torque_from_current(robot: Robot, motions: dict[str, Motion]) -> tuple[Robot, dict[str, Motion]]:

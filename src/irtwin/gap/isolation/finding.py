@@ -22,6 +22,8 @@ from irtwin.gap.regression.normal_equations import System, noise_before, observe
 from irtwin.identification.estimators import Estimate, estimate
 
 _NO_NOISE = 1e-9
+Without = str | tuple[str, str | None]
+"""What a search is not to name: an effect, or an effect at a joint (None: of the whole robot)."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def find(
     system: System,
     floor: np.ndarray | None,
     seed: int,
-    without: Set[str] = frozenset(),
+    without: Set[Without] = frozenset(),
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
     power, inside = name == "power", case.modelled
@@ -119,7 +121,7 @@ def find(
     candidates: list[Hypothesis] = hypotheses(system.columns, system.base, MISSING, whole=power, inside=inside)
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
-    candidates = [one for one in candidates if one.effect not in without]
+    candidates = [one for one in candidates if not {one.effect, (one.effect, one.joint)} & without]
     found = attribute(system, candidates, seed, case.thresholds, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)

@@ -14,8 +14,13 @@ from irtwin.gap.thresholds import Verdict
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
 
 
-def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Verdict) -> str:
-    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not."""
+def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Verdict, *, unmatched: bool = False) -> str:
+    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not.
+
+    `unmatched`: a cause that cannot be true explains the data far better than those that were named instead.
+    """
+    if unmatched:
+        return UNEXPLAINED
     causes = [cause for finding in findings for cause in finding.causes]
     if floor.source == REPEATS:
         before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
