@@ -255,9 +255,9 @@ def _both_ways(robots: Sequence[Robot]) -> list[str]:
         "## Both ways",
         "",
         "With the default twin, and with the adopted one: the data set is diagnosed, the twin with its causes taken, "
-        "the effect taken out of that, and the same data diagnosed again. First: the effect withheld is the first cause. "
-        "Family: the first cause is of its family. Joints: all are named on which it matters to that twin; with a plus "
-        "those named besides.",
+        "the effect taken out of that, and the same data diagnosed again. First: the effect withheld is the first "
+        "cause. Family: the first cause is of its family. Joints: all are named on which it matters to that twin; with "
+        "a plus those named besides.",
         "",
         "| right with | first | family first | joints |",
         "| --- | --- | --- | --- |",
