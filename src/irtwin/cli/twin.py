@@ -138,7 +138,7 @@ def diagnose(
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     """
     from irtwin import workflow
-    from irtwin.report.gap.headline import line
+    from irtwin.report.gap.headline import line, refused
 
     found = workflow.diagnose(
         dataset,
@@ -155,6 +155,8 @@ def diagnose(
         announce=say,
     )
     click.echo(line(found.document, found.against))
+    for said in refused(found.document):
+        click.echo(said)
 
 
 @click.command()

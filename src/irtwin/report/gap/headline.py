@@ -18,6 +18,14 @@ def line(diagnosis: Document, against: str | None) -> str:
     return f"{diagnosis.verdict}: {'; '.join(said) or 'no cause named'}"
 
 
+def refused(diagnosis: Document) -> list[str]:
+    """Return a line for each effect that was refused as a cause."""
+    return [
+        f"refused: {one.effect.replace('_', ' ')}{f' on {listed(one.joints)}' if one.joints else ''}: {one.why}"
+        for one in diagnosis.refused or ()
+    ]
+
+
 def _named(cause: Cause) -> str:
     names = " or ".join(name.replace("_", " ") for name in (cause.effect, *cause.indistinguishable_from))
     return f"{names} on {listed(cause.joints)}" if cause.joints else names
