@@ -36,7 +36,6 @@ WITHHELD = {
     "staubli_tx40": ("viscous_friction", "coulomb_friction", "rotor_inertia"),
     "ur10": ("coulomb_friction", "viscous_friction"),
     "franka_panda": ("coulomb_friction", "viscous_friction"),
-    "panda_gaz": ("coulomb_friction", "viscous_friction"),
     "ur3_power": ("standby_power", "mechanical_power"),
 }
 COUPLED = "staubli_tx40"  # its wrist, which the default twin lacks

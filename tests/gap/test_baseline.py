@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.friction import StribeckFriction
@@ -22,15 +22,19 @@ ROBOT = arm(2)
 OTHERS = {"another count": arm(3), "another joint": arm(2, slides=(1,))}
 
 
-def logged(first, cable=0.0):
-    """Four runs, two motions twice, of an arm that sticks at joint_2 and whose windings heat; a cable may pull."""
+def logged(first, cable=0.0, grease=1.0):
+    """Four runs, two motions twice, of an arm that sticks at joint_2 and whose windings heat.
+
+    A cable may pull at joint_1, N m/rad, and friction be so many times what it was.
+    """
     made = []
     for seed in range(first, first + 4):
         motion = replace(swing(ROBOT, (first + seed) // 2, seconds=8.0), run=f"run_{seed}")
         shown = measure(ROBOT, motion, noise=0.3, seed=seed)
-        added = np.zeros_like(motion.dq)
-        added[:, 0] = cable * motion.q[:, 0]
-        added[:, 1] = 4 * np.sign(motion.dq[:, 1]) * np.exp(-np.abs(motion.dq[:, 1]) / 0.1)
+        true = truth(ROBOT)
+        added = (grease - 1) * (true["Fc"] * np.sign(motion.dq) + true["Fv"] * motion.dq)
+        added[:, 0] += cable * motion.q[:, 0]
+        added[:, 1] += 4 * np.sign(motion.dq[:, 1]) * np.exp(-np.abs(motion.dq[:, 1]) / 0.1)
         power = shown.power + (added * motion.dq).sum(axis=1)
         power += 2 * np.random.default_rng(seed).standard_normal(len(power))
         run = as_run(replace(shown, torque=shown.torque + added, power=power, current=None))
@@ -61,6 +65,14 @@ def test_what_the_first_diagnosis_named_is_no_gap_for_its_twin(first, twin):
     again = diagnose(logged(20), twin=twin)
     assert again.verdict == "no_gap"
     assert {"stribeck_friction", "copper_loss"} <= set(again.twin.effect_ids)
+
+
+@pytest.mark.slow
+def test_friction_that_moved_is_no_gap_and_fitted_again(twin):
+    again = diagnose(logged(30, grease=1.3), twin=twin)
+    assert again.verdict == "no_gap"
+    found = {one.joint: one.value for one in again.twin.parameters if one.name == "Fc"}
+    assert list(found.values()) == pytest.approx(list(1.3 * truth(ROBOT)["Fc"]), rel=0.05)
 
 
 @pytest.mark.slow
@@ -131,6 +143,14 @@ def test_the_prior_decides_what_short_data_leave_open():
 
     assert error(informed) < 0.3 * error(alone)
     assert error(informed) < 2 * error(before)
+
+
+def test_bodies_stay_and_all_else_may_move(bare):
+    exact, loose = bare.prior, baseline(logged(0), (), bare).prior
+    more = np.sqrt(np.diag(loose.covariance - exact.covariance))
+    for key, value, moved in zip(exact.keys, exact.values, more, strict=True):
+        assert (moved < 1e-6) == (catalogue()[key[0]].family == "bodies")
+        assert moved == pytest.approx(0, abs=1e-6) or moved >= 0.2 * abs(value)
 
 
 def test_without_a_covariance_intervals_are_the_prior(bare):

@@ -25,6 +25,10 @@ class Prior:
     values: np.ndarray
     covariance: np.ndarray
 
+    def loosened(self, more: np.ndarray) -> Prior:
+        """Return the prior with `more` standard deviation (p,) of each coefficient by itself."""
+        return replace(self, covariance=self.covariance + np.diag(more**2))
+
     def informed(self, effect: Effect, term: Term) -> Term:
         """Return the term of an effect with what is known of it as its expectation."""
         place = self._place(effect, term)

@@ -44,6 +44,19 @@ class Admission:
 
 
 @dataclass(frozen=True)
+class GivenTwin:
+    """How far the numbers of a twin that is given may have moved since it was fitted; one standard deviation each.
+
+    Bodies stay: of them only what the fit left open is open.
+    """
+
+    moved: float = _threshold(0.2, "friction, offset or loss", "share of the number", "decisions/gap-a-twin-goes-in.md")
+    moved_at_least: float = _threshold(
+        0.1, "friction, offset or loss", "share of the catalogue's spread", "decisions/gap-a-twin-goes-in.md"
+    )
+
+
+@dataclass(frozen=True)
 class Repeats:
     """Which runs repeat a motion, so that their difference is noise."""
 
@@ -297,6 +310,7 @@ class Thresholds:
     """All of them."""
 
     admission: Admission = Admission()
+    given_twin: GivenTwin = GivenTwin()
     repeats: Repeats = Repeats()
     same_robot: SameRobot = field(default_factory=SameRobot)
     contact: Contact = Contact()

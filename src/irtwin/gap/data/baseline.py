@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.gap.thresholds import DEFAULT, GivenTwin
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
+
+_BODIES = "bodies"  # the family of effects
 
 
 @dataclass(frozen=True)
@@ -24,21 +29,36 @@ class Baseline:
     prior: Prior | None = None
 
 
-def baseline(data_set: DataSet, withhold: Sequence[str], twin: Twin | None = None) -> Baseline:
+def baseline(
+    data_set: DataSet, withhold: Sequence[str], twin: Twin | None = None, limits: GivenTwin = DEFAULT.given_twin
+) -> Baseline:
     """Return what the data set's twin models, or a `twin` that is given, less the effects withheld.
 
-    Of a twin: its effects in their shapes, and its numbers as the prior. Effects that act in some runs only are those
-    of its own data, and stay out; those that its data could not show come in as the catalogue has them.
+    Of a twin: its effects in their shapes, and its numbers as the prior, as far as they can have moved since. Effects
+    that act in some runs only are those of its own data, and stay out; those that its data could not show come in as
+    the catalogue has them.
     Raises InputError on an effect that cannot be withheld, and on a twin of another robot.
     """
     if twin is None:
         begun = Baseline(data_set.robot, data_set.effects or BASELINE)
     else:
         robot = _same_robot(data_set, twin)
-        begun = Baseline(robot, (*twin.standing, *(twin.unidentified)), twin.prior)
+        begun = Baseline(robot, (*twin.standing, *twin.unidentified), _prior(twin, limits))
     ids = Stack(begun.robot, begun.effects).ids
     _check_withheld(withhold, ids)
     return replace(begun, effects=tuple(one for one in begun.effects if _id(one) not in withhold))
+
+
+def _prior(twin: Twin, limits: GivenTwin) -> Prior:
+    """Return a twin's numbers as prior: bodies stay as they were, friction, offsets and losses move."""
+    prior, known = twin.prior, catalogue()
+    spread = {
+        (effect.id, term.joint, term.link, term.name): term.spread
+        for effect, term in (*twin.stack.torque_terms, *twin.stack.power_terms)
+    }
+    moves = np.array([known[effect].family != _BODIES for effect, *_ in prior.keys], dtype=float)
+    least = limits.moved_at_least * np.array([spread[key] for key in prior.keys])
+    return prior.loosened(moves * np.hypot(limits.moved * prior.values, least))
 
 
 def said_of_twin(data_set: DataSet, twin: Twin) -> list[str]:

@@ -111,7 +111,7 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
 
     Raises InputError where `baseline` and `admit` do.
     """
-    begun = baseline(data_set, withhold, twin)
+    begun = baseline(data_set, withhold, twin, thresholds.given_twin)
     cutoff = choose_cutoff(data_set.runs)
     given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
