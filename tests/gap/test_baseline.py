@@ -145,12 +145,11 @@ def test_the_prior_decides_what_short_data_leave_open():
     assert error(informed) < 2 * error(before)
 
 
-def test_bodies_stay_and_all_else_may_move(bare):
+def test_each_number_may_have_moved(bare):
     exact, loose = bare.prior, baseline(logged(0), (), bare).prior
     more = np.sqrt(np.diag(loose.covariance - exact.covariance))
-    for key, value, moved in zip(exact.keys, exact.values, more, strict=True):
-        assert (moved < 1e-6) == (catalogue()[key[0]].family == "bodies")
-        assert moved == pytest.approx(0, abs=1e-6) or moved >= 0.2 * abs(value)
+    assert np.all(more >= 0.2 * np.abs(exact.values))
+    assert np.all(more > 0)
 
 
 def test_without_a_covariance_intervals_are_the_prior(bare):

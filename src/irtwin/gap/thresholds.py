@@ -45,14 +45,11 @@ class Admission:
 
 @dataclass(frozen=True)
 class GivenTwin:
-    """How far the numbers of a twin that is given may have moved since it was fitted; one standard deviation each.
+    """How far the numbers of a twin that is given may be off by now; one standard deviation each."""
 
-    Bodies stay: of them only what the fit left open is open.
-    """
-
-    moved: float = _threshold(0.2, "friction, offset or loss", "share of the number", "decisions/gap-a-twin-goes-in.md")
+    moved: float = _threshold(0.2, "any number", "share of the number", "decisions/gap-a-twin-goes-in.md")
     moved_at_least: float = _threshold(
-        0.1, "friction, offset or loss", "share of the catalogue's spread", "decisions/gap-a-twin-goes-in.md"
+        0.1, "any number", "share of the catalogue's spread", "decisions/gap-a-twin-goes-in.md"
     )
 
 

@@ -17,8 +17,6 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
 
-_BODIES = "bodies"  # the family of effects
-
 
 @dataclass(frozen=True)
 class Baseline:
@@ -50,15 +48,14 @@ def baseline(
 
 
 def _prior(twin: Twin, limits: GivenTwin) -> Prior:
-    """Return a twin's numbers as prior: bodies stay as they were, friction, offsets and losses move."""
-    prior, known = twin.prior, catalogue()
+    """Return a twin's numbers as prior, each of which may have moved."""
+    prior = twin.prior
     spread = {
         (effect.id, term.joint, term.link, term.name): term.spread
         for effect, term in (*twin.stack.torque_terms, *twin.stack.power_terms)
     }
-    moves = np.array([known[effect].family != _BODIES for effect, *_ in prior.keys], dtype=float)
     least = limits.moved_at_least * np.array([spread[key] for key in prior.keys])
-    return prior.loosened(moves * np.hypot(limits.moved * prior.values, least))
+    return prior.loosened(np.hypot(limits.moved * prior.values, least))
 
 
 def said_of_twin(data_set: DataSet, twin: Twin) -> list[str]:
