@@ -1,8 +1,9 @@
 """Withhold what is known to act on measured robots: `python bench/withheld.py DATA_FOLDER [--out PAGE.md]`.
 
 A twin is robbed of an effect (`diagnose --withhold`), and the diagnosis has to name it. Measured robots have other gaps
-too, so each answer stands beside that of the whole twin on the same data. Shams, in which nothing is missing, say how
-often an effect is named for nothing.
+too. So it is done both ways: with the default twin, each answer beside that of the whole twin on the same data; and
+with the twin adopted first (`diagnose --save-twin`, then `--twin`), so that those gaps are closed. Shams, in which
+nothing is missing, say how often an effect is named for nothing.
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ import numpy as np
 
 from blind.score import wilson
 from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Effect
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, read_data_set
+from irtwin.twin.files import from_json, to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 from irtwin.twin.validate import validate
@@ -60,6 +63,11 @@ class Answer:
         """Return the cause that names the effect."""
         return next((cause for cause in self.document["causes"] if cause["effect"] == effect), None)
 
+    @property
+    def family_first(self) -> str | None:
+        """The family of the first cause."""
+        return catalogue()[self.named[0]].family if self.named else None
+
     def stands_for(self, effect: str) -> str | None:
         """Return the cause that names the effect as its rival, where none is the effect itself."""
         causes = [cause["effect"] for cause in self.document["causes"] if effect in cause["indistinguishable_from"]]
@@ -77,14 +85,24 @@ class Answer:
 
 
 @dataclass(frozen=True)
+class Adopted:
+    """The answers with the adopted twin: of it as it is, and by the effect withheld; where each matters in it."""
+
+    plain: Answer
+    withheld: dict[str, Answer]
+    matters: dict[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
 class Robot:
-    """The answers about one robot: of the whole twin, and by the effect withheld; where each effect matters."""
+    """The answers about one robot: of the whole default twin, and by the effect withheld; where each effect matters."""
 
     name: str
     joints: tuple[str, ...]
     plain: Answer
     withheld: dict[str, Answer]
     matters: dict[str, tuple[str, ...]]
+    adopted: Adopted
     shams: dict[str, list[list[str]]] = field(default_factory=dict)  # structure: effects named in each sham
 
 
@@ -96,9 +114,16 @@ def examine(folder: Path, pool: Executor) -> tuple[Robot, Twin]:
     diagnosis = diagnose(data_set)
     plain = Answer(diagnosis.to_json(), time.perf_counter() - started)
     assert diagnosis.twin is not None
+    full = diagnosis.twin
+    again = pool.submit(answer, data_set, (), to_json(full))
+    robbed = {effect: pool.submit(answer, data_set, (effect,), to_json(full)) for effect in pending}
+    matters = [
+        {effect: where_it_matters(data_set, effect, effects) for effect in pending}
+        for effects in (BASELINE, full.stack.effects)
+    ]
     withheld = {effect: future.result() for effect, future in pending.items()}
-    matters = {effect: where_it_matters(data_set, effect) for effect in withheld}
-    return Robot(folder.name, data_set.robot.joint_names, plain, withheld, matters), diagnosis.twin
+    adopted = Adopted(again.result(), {effect: future.result() for effect, future in robbed.items()}, matters[1])
+    return Robot(folder.name, data_set.robot.joint_names, plain, withheld, matters[0], adopted), full
 
 
 def blame(folder: Path, full: Twin, seeds: int, pool: Executor) -> dict[str, list[list[str]]]:
@@ -111,10 +136,11 @@ def blame(folder: Path, full: Twin, seeds: int, pool: Executor) -> dict[str, lis
     return {name: [future.result().named for future in futures] for name, futures in pending.items()}
 
 
-def answer(data_set: DataSet, withhold: Sequence[str]) -> Answer:
-    """Diagnose, and take the time."""
+def answer(data_set: DataSet, withhold: Sequence[str], twin: str | None = None) -> Answer:
+    """Diagnose, against the twin of JSON text if one is given, and take the time."""
     started = time.perf_counter()
-    document = diagnose(data_set, withhold=withhold).to_json()
+    given = None if twin is None else from_json(twin, Path("twin.json"))
+    document = diagnose(data_set, twin=given, withhold=withhold).to_json()
     return Answer(document, time.perf_counter() - started)
 
 
@@ -139,18 +165,19 @@ def nulls(data_set: DataSet, full: Twin) -> dict[str, tuple[Twin, bool]]:
     return found
 
 
-def where_it_matters(data_set: DataSet, effect: str) -> tuple[str, ...]:
-    """Return the joints whose torque the default twin fits worse without the effect, by MATTERS."""
+def where_it_matters(data_set: DataSet, effect: str, twin: Sequence[str | Effect] = BASELINE) -> tuple[str, ...]:
+    """Return the joints whose torque a twin of some effects fits worse without this one, by MATTERS."""
     if catalogue()[effect].signal != "torque":
         return ()
     cutoff = choose_cutoff(data_set.runs)
     motions = [condition(run, data_set.robot, cutoff) for run in data_set.runs]
 
-    def left(effects: Sequence[str]) -> np.ndarray:
+    def left(effects: Sequence[str | Effect]) -> np.ndarray:
         fits = validate(identify(data_set.robot, motions, effects), motions)
         return np.sqrt(np.mean([fit.torque_rmse**2 for fit in fits if fit.torque_rmse is not None], axis=0))
 
-    ratio = left([each for each in BASELINE if each != effect]) / left(BASELINE)
+    others = [each for each in twin if (each if isinstance(each, str) else each.id) != effect]
+    ratio = left(others) / left(twin)
     return tuple(name for name, value in zip(data_set.robot.joint_names, ratio, strict=True) if value >= MATTERS)
 
 
@@ -164,7 +191,9 @@ def page(robots: Sequence[Robot], missing: Sequence[str], command: str) -> str:
         "",
         *_summary(robots),
         "",
-        "## Each effect withheld",
+        *_both_ways(robots),
+        "",
+        "## Each effect withheld from the default twin",
         "",
         f"A joint counts where leaving the effect out of the default twin raises the RMS residual of its fit by "
         f"{100 * (MATTERS - 1):.0f} % or more. New are causes that the whole twin's diagnosis does not give.",
@@ -208,6 +237,64 @@ def _summary(robots: Sequence[Robot]) -> list[str]:
         place = coupled.plain.place("joint_coupling")
         lines[0] += f" TX40's wrist coupling, which nobody withheld, is {_place(place)}."
     return lines
+
+
+def _both_ways(robots: Sequence[Robot]) -> list[str]:
+    """Return the answers with the default twin beside those with the adopted one, and how many are right."""
+    ways = [
+        [(robot.withheld[effect], effect, robot.matters[effect]) for robot in robots for effect in robot.withheld],
+        [
+            (one, effect, robot.adopted.matters[effect])
+            for robot in robots
+            for effect, one in robot.adopted.withheld.items()
+        ],
+    ]
+    names = [robot.name for robot in robots for _ in robot.withheld]
+    lines = [
+        "## Both ways",
+        "",
+        "With the default twin, and with the adopted one: the data set is diagnosed, the twin with its causes taken, "
+        "the effect taken out of that, and the same data diagnosed again. First: the effect withheld is the first "
+        "cause. Family: the first cause is of its family. Joints: all are named on which it matters to that twin; with "
+        "a plus those named besides.",
+        "",
+        "| right with | first | family first | joints |",
+        "| --- | --- | --- | --- |",
+    ]
+    for title, way in zip(("the default twin", "the adopted twin"), ways, strict=True):
+        judged = [_judged(*one) for one in way]
+        counts = [f"{sum(one[k] for one in judged)} of {len(way)}" for k in range(3)]
+        lines.append(f"| {title} | " + " | ".join(counts) + " |")
+    lines += [
+        "",
+        "| robot | withheld | default twin | first cause | joints | adopted twin | first cause | joints |",
+        "| --- " * 8 + "|",
+    ]
+    for name, *pair in zip(names, *ways, strict=True):
+        cells = [cell for one in pair for cell in _seen(*one)]
+        lines.append(f"| {name} | {pair[0][1]} | " + " | ".join(cells) + " |")
+    lines += ["", "What is named with the adopted twin as it is: " + "; ".join(_left(robot) for robot in robots) + "."]
+    return lines
+
+
+def _judged(answer: Answer, effect: str, where: Sequence[str]) -> tuple[bool, bool, bool]:
+    """Return whether the effect is first, its family is, and the joints are right."""
+    cause = answer.cause(effect)
+    family = answer.family_first == catalogue()[effect].family
+    return answer.place(effect) == 1, family, cause is not None and set(where) <= set(cause["joints"])
+
+
+def _seen(answer: Answer, effect: str, where: Sequence[str]) -> list[str]:
+    cause = answer.cause(effect)
+    joints = cause["joints"] if cause else []
+    besides = len(set(joints) - set(where))
+    hit = f"{len(set(where) & set(joints))} of {len(where)}" + (f" (+{besides})" if besides else "")
+    first = f"{answer.named[0]} ({answer.family_first})" if answer.named else answer.document["verdict"]
+    return [_place(answer.place(effect)), first, hit if where or besides else "-"]
+
+
+def _left(robot: Robot) -> str:
+    return f"{robot.name} {_listed(robot.adopted.plain, set(), '') or robot.adopted.plain.document['verdict']}"
 
 
 def _leads_with(answer: Answer, effect: str) -> bool:

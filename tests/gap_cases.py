@@ -239,6 +239,21 @@ _CASES: dict[str, dict[str, Any]] = {
         "not_repeating": [_disturbance("viscous_friction@joint_a3")],
         "causes": [_cause("viscous_friction", 0.7, 0.7, []), _cause("stribeck_friction", 0.96, 0.3, [])],
         "not_testable": _UNTESTABLE,
+        "refused": [
+            {
+                "effect": "torque_constant_error",
+                "joints": ["joint_a2"],
+                "why": "g = 2.1 (2.05 to 2.16); 0.7 to 1.4 is possible",
+            },
+            {"effect": "payload", "joints": [], "why": "m = -9 kg (-9.2 to -8.8); at least -3 is possible"},
+        ],
+        "torque_scale": {
+            "uncertainty95": 0.1,
+            "source": "assumed",
+            "low": 0.9,
+            "high": 0.94,
+            "why": "The scale of torque is uncertain by 10 %: torque of drives comes from nominal constants",
+        },
         "shrink": _shrink(
             0.93,
             0.5,

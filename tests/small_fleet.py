@@ -353,6 +353,10 @@ def _diagnoses() -> Iterator[Base]:
         before=1.0, after=0.6, unit="N m",
     )  # fmt: skip
     yield gap.GapNotTestable(**of, number=1, effect="payload", why="no run carries a load")
+    yield gap.GapRefused(
+        **of, number=1, robot_id="Arm_A", effect="torque_constant_error", joint="j2", why="g = 2.1 (2 to 2.2)"
+    )
+    yield gap.GapRefused(**of, number=2, robot_id="Arm_A", effect="payload", why="m = -9 kg (-9.5 to -8.5)")
     yield from _diagnosis("Arm_B", "ambiguous", 5.0)
     of = {"diagnosis_id": "Arm_B.d1", "activity_id": "diagnosis.Arm_B"}
     yield from _cause("Arm_B", 1, "payload", None, "missing", 0.5, ("m", 1.5, "kg", 1.3, 1.7))

@@ -10,7 +10,6 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
-from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
@@ -53,7 +52,7 @@ class Library:
 
 def torque_library(case: Case) -> tuple[Library, LeftOut]:
     """Return the library of torque, and what its columns are built on: what the twin says without the run."""
-    stack = Stack(case.robot, case.effects)
+    stack = case.stack
     left_out = LeftOut(stack, torque_system(stack, case.with_torque, case.grouping, (), None))
     system = torque_system(stack, case.with_torque, case.grouping, _shapes(case, "torque"), left_out.below)
     return Library("torque", system, _hypotheses(system, case)), left_out
@@ -61,7 +60,7 @@ def torque_library(case: Case) -> tuple[Library, LeftOut]:
 
 def power_library(case: Case, torque: Torque) -> Library:
     """Return the library of power on top of a joint torque."""
-    stack = Stack(case.robot, case.effects)
+    stack = case.stack
     power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     shapes = _shapes(case, "power")
     system = power_system(stack, case.with_power, case.grouping, shapes, torque, power_of)
@@ -73,7 +72,7 @@ class Explained:
 
     def __init__(self, case: Case, library: Library, left_out: LeftOut, chosen: Sequence[Variant]):
         """Take what was chosen of a library of torque, and what its columns were built on."""
-        self._stack, self._system = Stack(case.robot, case.effects), library.system
+        self._stack, self._system = case.stack, library.system
         self._below, self._chosen, self._observed = left_out.below, chosen, case.observed
         vector = self._system.solution([k for variant in chosen for k in variant.columns], library.total)
         self._twin, self._values = twin_values(self._system, vector), vector * self._system.scale
@@ -116,7 +115,7 @@ def _shapes(case: Case, signal: str) -> list[Effect]:
 
 
 def _hypotheses(system: System, case: Case) -> tuple[Hypothesis, ...]:
-    found = hypotheses(system.columns, system.base, MISSING, inside=case.effects)
+    found = hypotheses(system.columns, system.base, MISSING, inside=case.modelled)
     if system.both:
         found += hypotheses(system.columns, system.changed, CHANGED)
     return tuple(found)

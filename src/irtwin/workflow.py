@@ -41,7 +41,8 @@ from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
 from irtwin.storage.staging import staged
-from irtwin.twin.files import to_json
+from irtwin.twin.files import load, to_json
+from irtwin.twin.twin import Twin
 
 Announce = Callable[[str], None]
 
@@ -82,6 +83,7 @@ def run(
 def diagnose(
     dataset: Path | str,
     *,
+    twin: Twin | Path | str | None = None,
     withhold: Sequence[str] = (),
     seed: int = 0,
     repair: bool = False,
@@ -96,18 +98,20 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
-    `withhold` takes effects out of the twin and leaves them in the catalogue. With a `workspace` the diagnosis is
-    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
-    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
-    motion of the next experiment, where one is designed.
+    `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
+    in their shapes, and its numbers as the prior. `withhold` takes effects out of the twin and leaves them in the
+    catalogue. With a `workspace` the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the
+    robot's. Files to write, each whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the
+    twin with the causes added, `motion_file` the motion of the next experiment, where one is designed.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     for file in filter(None, (json_file, report, twin_file, motion_file)):
         check_place(file)
+    given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
-    found = gap.diagnose(data_set, withhold=withhold, seed=seed, progress=announce)
+    found = gap.diagnose(data_set, twin=given, withhold=withhold, seed=seed, progress=announce)
     if json_file is not None:
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
@@ -120,12 +124,12 @@ def diagnose(
     if workspace is not None:
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
-        twin = None if found.twin is None else to_json(found.twin)
+        closed = None if found.twin is None else to_json(found.twin)
         with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
-                record(apart, robot_id, found.document, found.curves, twin, motion_text(found))
+                record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)

@@ -130,6 +130,14 @@ def test_an_unknown_effect_cannot_be_withheld(small_data_set, tmp_path):
     assert not (tmp_path / "out.json").exists()
 
 
+def test_a_twin_to_diagnose_against_must_be_one(small_data_set, tmp_path):
+    options = ["--json", tmp_path / "out.json", "--twin", small_data_set / "robot.urdf"]
+    done = irtwin("diagnose", small_data_set, *options)
+    assert done.returncode == 2
+    assert "robot.urdf: not JSON" in done.stderr
+    assert not (tmp_path / "out.json").exists()
+
+
 @pytest.mark.parametrize(
     ("break_it", "message"),
     [

@@ -151,7 +151,8 @@ def test_effects_that_share_nothing_do_not_correlate():
 @given(st.floats(-0.99, 0.99))
 def test_the_canonical_correlation_of_two_columns_is_their_correlation(correlation):
     products = 1e6 * np.array([[1.0, 0, 0, 0], [0, 1, correlation, 0], [0, correlation, 1, 0], [0, 0, 0, 1]])
-    same, other = canonical_correlation(products, 1, (), [(1,), (2,)])
+    system, _ = system_of(np.eye(2), [0.0, 0.0])
+    same, other = canonical_correlation(system, products, (), [(1,), (2,)])
     assert same == pytest.approx(1, abs=1e-5)
     assert other == pytest.approx(abs(correlation), abs=1e-3)
 

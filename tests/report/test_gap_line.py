@@ -6,7 +6,7 @@ import pytest
 from tests import gap_cases
 
 from irtwin.gap.document.document import Document
-from irtwin.report.gap.headline import line
+from irtwin.report.gap.headline import line, refused
 
 
 @pytest.mark.parametrize(
@@ -45,3 +45,11 @@ def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
     said = line(Document.from_json(gap_cases.with_findings(diagnosis)), "simulated")
     assert "Environment differs from the twin’s: base tilt (70 %); " in said
     assert "friction of joint_a3 differs from the simulator’s: stribeck friction (96 %)." in said
+
+
+def test_what_was_refused_has_a_line_each():
+    assert refused(gap_cases.document("attributed")) == [
+        "refused: torque constant error on joint_a2: g = 2.1 (2.05 to 2.16); 0.7 to 1.4 is possible",
+        "refused: payload: m = -9 kg (-9.2 to -8.8); at least -3 is possible",
+    ]
+    assert refused(gap_cases.document("no_gap")) == []

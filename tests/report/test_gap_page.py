@@ -186,6 +186,17 @@ def test_a_robot_without_diagnosis_is_an_error(tmp_path: Path) -> None:
             render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, tmp_path / "p.html")
 
 
+def test_what_cannot_be_true_and_the_scale_of_torque_are_said(pages: dict[str, Path]) -> None:
+    page = html.unescape(pages["attributed"].read_text(encoding="utf-8"))
+    for row in (
+        "torque constant error</th><td>joint_a2</td><td>g = 2.1 (2.05 to 2.16); 0.7 to 1.4 is possible",
+        "payload</th><td>–</td><td>m = -9 kg",
+    ):
+        assert row in page
+    assert page.count("The scale of torque is uncertain by 10 %: torque of drives") == 2  # of each cause's parameters
+    assert "The scale of torque" not in pages["ambiguous"].read_text(encoding="utf-8")
+
+
 def test_text_from_the_data_is_no_markup(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("attributed")
     said["not_testable"] = [{"effect": "payload", "why": "<script>alert(1)</script>"}]

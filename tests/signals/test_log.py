@@ -227,6 +227,16 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
         ('"runs/two.csv"', '"runs/three.csv"', "no such file"),
         ("2026-03-02T08:00:00", '"monday"', "started should be a TOML date"),
         ("weight = 12.5", 'power_at = "moon"', "use mains or dc_bus"),
+        (
+            "weight = 12.5",
+            "torque_scale_uncertainty = 10",
+            "torque_scale_uncertainty should be a share below 1, not 10",
+        ),
+        (
+            "weight = 12.5",
+            "torque_scale_uncertainty = -0.1",
+            "torque_scale_uncertainty should be a number of at least 0",
+        ),
         ("[[run]]", "[[walk]]", r"\[\[run\]\] is missing"),
         (
             "gear_ratio",

@@ -114,6 +114,11 @@ def case_study(workspace: Path) -> None:
     type=click.Path(path_type=Path, dir_okay=False),
     help="CSV file to write the motion of the next experiment to.",
 )
+@click.option(
+    "--twin",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Twin that --save-twin wrote, to hold the data against: its effects are the baseline, its numbers the prior.",
+)
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
@@ -126,6 +131,7 @@ def diagnose(
     report: Path | None,
     save_twin: Path | None,
     save_motion: Path | None,
+    twin: Path | None,
     withhold: tuple[str, ...],
     seed: int,
     repair: bool,
@@ -138,10 +144,11 @@ def diagnose(
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     """
     from irtwin import workflow
-    from irtwin.report.gap.headline import line
+    from irtwin.report.gap.headline import line, refused
 
     found = workflow.diagnose(
         dataset,
+        twin=twin,
         withhold=withhold,
         seed=seed,
         repair=repair,
@@ -155,6 +162,8 @@ def diagnose(
         announce=say,
     )
     click.echo(line(found.document, found.against))
+    for said in refused(found.document):
+        click.echo(said)
 
 
 @click.command()

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
 
-from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity, ratio
+from irtwin.effects.effect import (
+    Effect,
+    JointEffect,
+    Known,
+    Possible,
+    Predicted,
+    Quantity,
+    Stated,
+    Term,
+    force_unit,
+    quantity,
+    ratio,
+)
 from irtwin.effects.rigid_body import inverse_dynamics, model_of
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import differentiate
@@ -20,6 +33,7 @@ _INERTIA_EVERY = 0.016  # s
 _LIGHTEST = 1e-6  # kg m^2: a link without inertia is no link
 _CONTACT, _CONTACT_DAMPING = 30.0, 0.5  # Hz: of gears that touch again, well above what moves a robot
 _DAMPING = 0.1  # of an elastic joint's swing
+_SLOWEST = 1.0  # Hz, of that swing: no controller would hold an arm that swings slower
 
 
 def load_torque(robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
@@ -207,6 +221,12 @@ class JointElasticity(_Compliance):
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
                 found.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))
         return tuple(found)
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return how soft the acting joint that moves least can be."""
+        inertia = _middle_inertia(robot)[[robot.index(joint.name) for joint in self.acting(robot)]]
+        softest = (2 * np.pi * _SLOWEST) ** 2 * float(inertia.min())
+        return {"K": Possible(softest, np.inf, f"softer, the link would swing at less than {_SLOWEST:g} Hz")}
 
 
 def _middle_inertia(robot: Robot) -> np.ndarray:

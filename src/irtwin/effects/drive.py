@@ -5,6 +5,7 @@ What a data sheet says of them is taken to be as unsure as it is large: it leave
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,8 +14,10 @@ import numpy as np
 from irtwin.effects.effect import (
     JointEffect,
     Known,
+    Possible,
     Predicted,
     Quantity,
+    Stated,
     Term,
     force_unit,
     inertia_unit,
@@ -24,6 +27,7 @@ from irtwin.effects.effect import (
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
+_WARMEST = 180.0  # K above the surroundings: insulation of class H ends there
 COPPER = 0.0039  # 1/K: how resistance grows
 
 
@@ -107,6 +111,10 @@ class WindingTemperature(JointEffect):
         """Return 0.0039 i^2, by the measured rise in units of `rise`."""
         warmth = 1.0 if motion.temperature is None else (motion.temperature - self.T0) / self.rise
         return (COPPER * warmth * currents(robot, predicted) ** 2,)
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return how warm a winding gets."""
+        return {"T": Possible(0.0, _WARMEST, "a winding that is warmer has burnt")}
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

@@ -73,6 +73,31 @@ class Predicted:
 
 
 @dataclass(frozen=True)
+class Stated:
+    """What a data set states of a robot that bounds what can be true of it; None where it says nothing.
+
+    payload: kg, the most that an observed run carries; rated_payload: kg; torque_scale: share by which logged torque
+    may be off.
+    """
+
+    payload: float = 0.0
+    rated_payload: float | None = None
+    torque_scale: float | None = None
+
+
+NOTHING_STATED = Stated()
+
+
+@dataclass(frozen=True)
+class Possible:
+    """The values that a parameter can have, ends included, and why no others."""
+
+    low: float
+    high: float
+    why: str
+
+
+@dataclass(frozen=True)
 class Quantity:
     """A parameter as engineers state it, with its 95 % interval; None where there is none."""
 
@@ -101,7 +126,8 @@ class Effect(ABC):
     `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, and what is
     `drawn_at_rest` does not depend on the motion. A `disturbance` goes its own way, so that no run tells when it acts
     in another, and repeats of a motion show it; the word says as what, "line" or "switching". `manual_test` is what a
-    person can do to show it where no motion does; `taken_off` says how a run without it is made.
+    person can do to show it where no motion does; `taken_off` says how a run without it is made. What its parameters
+    can be is `possible`.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -170,6 +196,10 @@ class Effect(ABC):
             quantity(term.name, term.joint, value, term.unit, deviation)
             for term, value, deviation in zip(self.terms(robot), values, deviations, strict=True)
         )
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return what parameters can be, by name: those of `parameters` that no robot, or not this one, has beyond."""
+        return {}
 
     @property
     def shape(self) -> dict[str, Any]:

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity, ratio
+from irtwin.effects.effect import (
+    Effect,
+    JointEffect,
+    Known,
+    Possible,
+    Predicted,
+    Quantity,
+    Stated,
+    Term,
+    force_unit,
+    quantity,
+    ratio,
+)
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
+
+_MOST_LOST = 0.6  # of a load, in gears: those that lose half when driven back hold by themselves
 
 
 def direction(dq: np.ndarray) -> np.ndarray:
@@ -172,6 +187,11 @@ class LoadDependentFriction(JointEffect):
         column = np.abs(predicted.torque) * direction(motion.dq)
         drives = predicted.torque * motion.dq > 0
         return np.where(drives, column, 0.0), np.where(drives, 0.0, column)
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return what gears lose, or lose less than before."""
+        lost = Possible(-_MOST_LOST, _MOST_LOST, "gears of robots do not lose more of a load")
+        return {"mu": lost, "mu_back": lost}
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -12,8 +13,10 @@ from irtwin.effects.effect import (
     Effect,
     JointEffect,
     Known,
+    Possible,
     Predicted,
     Quantity,
+    Stated,
     Term,
     force_unit,
     quantity,
@@ -24,6 +27,10 @@ from irtwin.effects.rigid_body import flange_frame, inverse_dynamics, last_body_
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
+_HEAVIEST = 20.0  # kg: a load that any arm may carry, as data sheets have it,
+_OF_ARM = 0.5  # of the arm's mass, if that is more; where a payload is rated
+_OVERLOAD = 2.0  # times it
+_STEEPEST = 0.35  # rad: a base that leans more is no tilt, but mounted so
 _UPRIGHT = 0.7  # of an axis' length that is vertical
 _TURN = np.linspace(0, 2 * np.pi, 181)
 
@@ -52,6 +59,10 @@ class CableDrag(JointEffect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return q."""
         return (motion.q,)
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return that a hose pulls back."""
+        return {"k": Possible(0.0, np.inf, "a hose pulls a joint back to where it is at rest")}
 
 
 @dataclass(frozen=True)
@@ -110,6 +121,21 @@ class Payload(Effect):
         """Return (N, n, 10)."""
         return np.asarray(last_body_columns(robot, motion) @ to_body(flange_frame(robot).placement))
 
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return that the last body and its load have a mass, and that the arm can carry it."""
+        body = robot.model.inertias[flange_frame(robot).parentJoint].mass
+        together = body + stated.payload
+        least, why = (-together, f"the last body and its load weigh {together:.3g} kg together")
+        if body <= 0:  # nothing is known of it
+            least, why = -np.inf, ""
+        if stated.rated_payload:
+            most = _OVERLOAD * stated.rated_payload
+            carried = f"{stated.rated_payload:g} kg are rated"
+        else:
+            most = max(_HEAVIEST, _OF_ARM * sum(inertia.mass for inertia in robot.model.inertias))
+            carried = f"no arm of its kind carries more than {most:.3g} kg"
+        return {"m": Possible(least, most, "; ".join(filter(None, (why, carried))))}
+
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
     ) -> tuple[Quantity, ...]:
@@ -157,6 +183,10 @@ class BaseTilt(Effect):
         angle, deviation = size(values, covariance)
         whole = quantity("angle", None, angle, "rad", deviation)
         return (whole, *super().parameters(robot, values, covariance, known))
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return how far a base that was meant to stand upright may lean."""
+        return {"angle": Possible(0.0, _STEEPEST, "a base that leans more was mounted so, and its URDF is wrong")}
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from scipy.signal import lfilter
 
-from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity
+from irtwin.effects.effect import (
+    Effect,
+    JointEffect,
+    Known,
+    Possible,
+    Predicted,
+    Quantity,
+    Stated,
+    Term,
+    force_unit,
+    quantity,
+)
 from irtwin.effects.rigid_body import torque_slope
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
+
+_GAINS = (0.7, 1.4)  # the range of the ontology, `effects.ttl`
+_FARTHEST = 0.35  # rad or m, of a zero
 
 
 @dataclass(frozen=True)
@@ -78,6 +93,13 @@ class TorqueConstantError(JointEffect):
             for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
         )
 
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return the range of a constant that is off; of one that is stated to be right within a share, that."""
+        if stated.torque_scale is not None:
+            off, why = stated.torque_scale, "torque_scale_uncertainty of the data set allows no more"
+            return {"g": Possible(1 - off, 1 + off, why)}
+        return {"g": Possible(*_GAINS, "beyond, a gear ratio or a unit is wrong rather than a constant")}
+
 
 @dataclass(frozen=True)
 class EncoderOffset(Effect):
@@ -97,6 +119,10 @@ class EncoderOffset(Effect):
         """Return (N, n, k) slopes of every joint's torque over the position of each acting one."""
         acting = [robot.index(joint.name) for joint in self.acting(robot)]
         return torque_slope(robot, None if predicted is None else predicted.bodies, motion)[:, :, acting]
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return how far a joint's zero may be off."""
+        return {"e": Possible(-_FARTHEST, _FARTHEST, "a zero that is farther off is another convention, no offset")}
 
 
 @dataclass(frozen=True)
@@ -186,6 +212,10 @@ class MeterGain(Effect):
         """Return (N, 1) the predicted power."""
         assert predicted is not None and predicted.power is not None
         return predicted.power[:, None]
+
+    def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
+        """Return the range of a meter that is out of scale."""
+        return {"g": Possible(*_GAINS, "beyond, the unit of power is wrong rather than its scale")}
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

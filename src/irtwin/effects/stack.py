@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, JointEffect, Predicted, Term
+from irtwin.effects.prior import Prior
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -31,13 +32,17 @@ class _Torques:
 class Stack:
     """The effects of a robot of n joints: K coefficients of the torque signal, L of the power signal."""
 
-    def __init__(self, robot: Robot, effects: Sequence[str | Effect]):
-        """Take effects or their ids. Raise InputError on an unknown id or joint, an effect twice, or an absurd body."""
+    def __init__(self, robot: Robot, effects: Sequence[str | Effect], prior: Prior | None = None):
+        """Take effects or their ids, and what is known of their coefficients; None: what the catalogue expects.
+
+        Raise InputError on an unknown id or joint, an effect twice, or an absurd body.
+        """
         known = catalogue()
         for effect in effects:
             if isinstance(effect, str) and effect not in known:
                 raise InputError(f'there is no effect "{effect}"; choose from {", ".join(known)}')
         self.robot = robot
+        self.prior = prior
         self.effects = tuple(known[effect] if isinstance(effect, str) else effect for effect in effects)
         self.ids = tuple(dict.fromkeys(effect.id for effect in self.effects))
         self._torque = [effect for effect in self.effects if effect.signal == "torque"]
@@ -69,12 +74,26 @@ class Stack:
     @cached_property
     def torque_terms(self) -> tuple[tuple[Effect, Term], ...]:
         """The K coefficients of effects that torque shows, each with its effect."""
-        return tuple((effect, term) for effect in self._torque for term in effect.terms(self.robot))
+        return self._terms(self._torque)
 
     @cached_property
     def power_terms(self) -> tuple[tuple[Effect, Term], ...]:
         """The L coefficients of effects that power shows, each with its effect."""
-        return tuple((effect, term) for effect in self._power for term in effect.terms(self.robot))
+        return self._terms(self._power)
+
+    def prior_rows(self, pairs: Sequence[tuple[Effect, Term]]) -> np.ndarray | None:
+        """Return what is known of some terms, as `Prior.rows`; None: nothing beside their expectation and spread."""
+        return None if self.prior is None else self.prior.rows(pairs)
+
+    def with_effects(self, effects: Sequence[str | Effect]) -> Stack:
+        """Return the stack of other effects of the robot, of which the same is known."""
+        return Stack(self.robot, effects, self.prior)
+
+    def _terms(self, effects: Sequence[Effect]) -> tuple[tuple[Effect, Term], ...]:
+        pairs = ((effect, term) for effect in effects for term in effect.terms(self.robot))
+        if self.prior is None:
+            return tuple(pairs)
+        return tuple((effect, self.prior.informed(effect, term)) for effect, term in pairs)
 
     @cached_property
     def _torque_places(self) -> tuple[tuple[Effect, slice], ...]:

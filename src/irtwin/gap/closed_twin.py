@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from irtwin.effects.effect import Effect
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.regression.hypotheses import CHANGED
+from irtwin.gap.regression.hypotheses import CHANGED, place_of
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 
@@ -19,14 +19,17 @@ def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
     """
     added: list[Effect] = []
     for cause in causes:
-        if cause.effect in case.effects or (cause.scope == CHANGED and cause.variants[0].effect.within_bodies):
+        if cause.scope == CHANGED and cause.variants[0].effect.within_bodies:
             continue
         for variant in cause.variants:
-            joint = variant.terms[0].joint if cause.joints else None
-            effect = variant.effect if joint is None else variant.effect.on(joint)
-            if not any(one.id == effect.id and one.joints == effect.joints for one in added):
+            joints = dict.fromkeys(map(place_of, variant.terms[:1] if cause.joints else variant.terms))
+            lacking = [joint for joint in joints if not {(cause.effect, joint), (cause.effect, None)} & case.modelled]
+            named = [joint for joint in lacking if joint is not None]
+            whole = not cause.joints and len(lacking) == len(joints)
+            effect = variant.effect if whole else variant.effect.on(*named)
+            if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in added):
                 added.append(effect)
     changed = any(cause.scope == CHANGED for cause in causes)
     robot, motions = case.given
     used = [motion for run, motion in motions.items() if run in case.observed or not changed]
-    return identify(robot, used, [*case.effects, *added])
+    return identify(robot, used, [*case.effects, *added], case.prior)

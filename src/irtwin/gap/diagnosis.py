@@ -15,6 +15,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
+from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
@@ -30,9 +31,11 @@ from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
-from irtwin.gap.isolation.finding import Finding, find
+from irtwin.gap.isolation.finding import Finding, Without, find
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.power_evidence import power_balances
+from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
+from irtwin.gap.isolation.torque_scale import TorqueScale, torque_scale
 from irtwin.gap.isolation.verdict import NO_GAP, beside, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
@@ -78,6 +81,8 @@ class Diagnosis:
     against: str | None = None  # the role of the runs that the observed ones are held against
     thresholds: Thresholds = DEFAULT
     yardstick: dict[str, Closeable] = field(default_factory=dict)  # each channel's, what could be closed at all
+    refusals: Refusals = NOTHING_REFUSED
+    scale: TorqueScale | None = None  # of torque, where it was measured
 
     @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
@@ -93,7 +98,7 @@ class Diagnosis:
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         weights = self.thresholds.confidence
-        written = tuple(writing.cause(robot, *one, gains, self.verdict, weights) for one in named)
+        written = tuple(writing.cause(robot, *one, gains, self.verdict, weights, self.scale) for one in named)
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
         found = writing.findings(robot, self.channels, named, written, self.thresholds)
         causes = apart.causes(written, weights)
@@ -111,6 +116,8 @@ class Diagnosis:
             shrink=apart.shrink(shrink, self.seed),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
+            refused=tuple(map(writing.refused, self.refusals.refused)) or None,
+            torque_scale=None if self.scale is None else writing.torque_scale(self.scale),
         )
 
     @property
@@ -127,6 +134,7 @@ class Diagnosis:
 def diagnose(
     data_set: DataSet,
     *,
+    twin: Twin | None = None,
     withhold: Sequence[str] = (),
     unknown: Sequence[str] = (),
     thresholds: Thresholds = DEFAULT,
@@ -135,14 +143,18 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
-    `withhold` takes effects out of the twin and leaves them in the catalogue; `unknown` are those that the search is
-    not to know; `thresholds` decide what is said; `progress` is told each step. Raises InputError on an effect that the
-    catalogue lacks or the twin has not, and where the data set cannot be diagnosed.
+    `twin` is what the gap is held against: its effects in their shapes, and its numbers as the prior; None: the effects
+    that the data set names. `withhold` takes effects out of it and leaves them in the catalogue; `unknown` are those
+    that the search is not to know; `thresholds` decide what is said; `progress` is told each step. Raises InputError on
+    an effect that the catalogue lacks or the twin has not, on a twin of another robot, and where the data set cannot be
+    diagnosed.
     """
     tell = progress or (lambda line: None)
     tell(f"Filtering {len(data_set.runs)} runs")
-    case = case_of(data_set, withhold, thresholds)
-    stack = Stack(case.robot, [*case.effects, *case.run_offsets])
+    case = case_of(data_set, withhold, thresholds, twin)
+    for line in said_of_twin(data_set, twin) if twin else ():
+        tell(line)
+    stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = _plain(case, stack, tell)
     differ = disturbances(case)
@@ -154,28 +166,34 @@ def diagnose(
         _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain)
     explained: list[Explained] = []
+    refusals = NOTHING_REFUSED
+    scale: TorqueScale | None = None
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found, floor = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
+        found, floor, refusals = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
             found = replace(found, power_balances=power_balances(case, power_stack, torque))
             torque = ExplainedTorque(stack, found, below)
         explained.append(torque)
+        scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
+        of_power, wrong = _power(case, power_stack, floor, torque, frozenset(unknown), seed, tell)
+        explained.append(of_power)
+        refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = beside(verdict_of(findings, floor, thresholds), differ, [one.disturbance for one in taken])
+    verdict = verdict_of(findings, floor, thresholds, unmatched=refusals.unmatched)
+    verdict = beside(verdict, differ, [one.disturbance for one in taken])
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
     silent = [one for one in catalogue().values() if one.id not in blamed and not one.disturbance]
     lacking = untestable(
-        silent, case.effects, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
+        silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )
     left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
     located = places(left, seed)
@@ -204,6 +222,8 @@ def diagnose(
         against=case.against,
         thresholds=thresholds,
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
+        refusals=refusals,
+        scale=scale,
     )
 
 
@@ -241,33 +261,42 @@ def _torque(
     unknown: Set[str],
     seed: int,
     tell: Progress,
-) -> tuple[Finding, Floor]:
+) -> tuple[Finding, Floor, Refusals]:
     """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
     found = screen(case, stack, plain, seed)
     tried = found.shapes(_variants(case, "torque"))
-    if not case.shows("power"):
-        system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
-        system = replace(system, transient=found.contact)
-        first = find("torque", case, system, floor.torque, seed, without=unknown)
+    if case.shows("power"):
+        both = (tried, _variants(case, "power"))
+
+        def beside_power(without: Set[Without]) -> tuple[Finding, Floor]:
+            return find_beside_power(
+                case, stack, both, below, predicted, floor, seed, transient=found.contact, without=without, tell=tell
+            )
+
+        return find_possible(case, beside_power, unknown)
+    system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
+    system = replace(system, transient=found.contact)
+
+    def alone(without: Set[Without]) -> tuple[Finding, Floor]:
+        first = find("torque", case, system, floor.torque, seed, without)
         left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
-        if left is floor:
-            return first, floor
-        return find("torque", case, system, left.torque, seed, without=unknown), left
-    both = (tried, _variants(case, "power"))
-    return find_beside_power(
-        case, stack, both, below, predicted, floor, seed, transient=found.contact, without=unknown, tell=tell
-    )
+        return (first, floor) if left is floor else (find("torque", case, system, left.torque, seed, without), left)
+
+    return find_possible(case, alone, unknown)
 
 
 def _power(
     case: Case, stack: Stack, floor: Floor, torque: Torque, unknown: Set[str], seed: int, tell: Progress
-) -> Explained:
+) -> tuple[Explained, Refusals]:
     power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
-    return explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
+    finding, _, refusals = find_possible(
+        case, lambda without: (find("power", case, system, level, seed, without), floor), unknown
+    )
+    return explained_power(stack, finding, torque, power_of), refusals
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

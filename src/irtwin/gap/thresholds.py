@@ -44,6 +44,16 @@ class Admission:
 
 
 @dataclass(frozen=True)
+class GivenTwin:
+    """How far the numbers of a twin that is given may be off by now; one standard deviation each."""
+
+    moved: float = _threshold(0.2, "any number", "share of the number", "decisions/gap-a-twin-goes-in.md")
+    moved_at_least: float = _threshold(
+        0.1, "any number", "share of the catalogue's spread", "decisions/gap-a-twin-goes-in.md"
+    )
+
+
+@dataclass(frozen=True)
 class Repeats:
     """Which runs repeat a motion, so that their difference is noise."""
 
@@ -229,6 +239,17 @@ class PowerConsistency:
 
 
 @dataclass(frozen=True)
+class ScaleOfTorque:
+    """How far logged torque may be off on all joints alike; half a 95 % interval each."""
+
+    assumed: float = _threshold(
+        0.1, "torque of drives, where the data set states nothing", "share", "decisions/gap-scale-of-torque.md"
+    )
+    sensor: float = _threshold(0.02, "torque of sensors", "share", "decisions/gap-scale-of-torque.md")
+    meter: float = _threshold(0.02, "power of a meter", "share", "decisions/gap-scale-of-torque.md")
+
+
+@dataclass(frozen=True)
 class Detectability:
     """What the data can show."""
 
@@ -344,6 +365,7 @@ class Thresholds:
     """All of them."""
 
     admission: Admission = Admission()
+    given_twin: GivenTwin = GivenTwin()
     repeats: Repeats = Repeats()
     not_repeating: NotRepeating = NotRepeating()
     same_robot: SameRobot = field(default_factory=SameRobot)
@@ -354,6 +376,7 @@ class Thresholds:
     ambiguity: Ambiguity = Ambiguity()
     changes: Changes = Changes()
     power_consistency: PowerConsistency = PowerConsistency()
+    scale_of_torque: ScaleOfTorque = ScaleOfTorque()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()
     matters: Matters = Matters()

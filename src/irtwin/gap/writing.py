@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Quantity, Term
+from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.document import document
 from irtwin.gap.document.cause_ids import cause_ids
@@ -19,13 +19,15 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.quantities import quantities
+from irtwin.gap.isolation.refusal import Refused
+from irtwin.gap.isolation.torque_scale import TorqueScale
 from irtwin.gap.isolation.verdict import UNEXPLAINED
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Confidence, Thresholds
-from irtwin.identification.estimators import Estimate
 from irtwin.robot.description import Robot
 
 
@@ -69,7 +71,14 @@ def location(one: Location) -> document.Location:
 
 
 def cause(
-    robot: Robot, finding: Finding, one: Cause, name: str, gains: Sequence[float], verdict: str, weights: Confidence
+    robot: Robot,
+    finding: Finding,
+    one: Cause,
+    name: str,
+    gains: Sequence[float],
+    verdict: str,
+    weights: Confidence,
+    scale: TorqueScale | None,
 ) -> document.Cause:
     """Return a cause, `name` its id, with its parameters and evidence; `gains` are those of all causes."""
     closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
@@ -79,7 +88,7 @@ def cause(
         joints=acted_on(robot, one),
         scope=one.scope,
         confidence=confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained),
-        parameters=parameters(robot, finding, one),
+        parameters=parameters(robot, finding, one, scale),
         indistinguishable_from=one.rivals,
         evidence=_evidence(finding, one, closed),
     )
@@ -174,30 +183,24 @@ def acted_on(robot: Robot, one: Cause) -> tuple[str, ...]:
     return tuple(dict.fromkeys(joint for joints in touched for joint in joints))
 
 
-def parameters(robot: Robot, finding: Finding, one: Cause) -> tuple[document.Parameter, ...]:
-    """Return a cause's parameters as the catalogue states them, with 95 % intervals."""
-    found, used = finding.estimate, finding.used
-    known = {
-        (effect.id, term.joint, term.name): float(found.values[k])
-        for k, (effect, term) in enumerate(finding.system.terms)
-        if term.link is None
-    }
-    stated: list[document.Parameter] = []
-    for variant in one.variants:
-        places = [used.index(k) for k in variant.columns]
-        joint = variant.terms[0].joint if variant.terms[0].link is None and len(variant.terms) else None
-        effect = variant.effect
-        if joint is not None and len(one.joints) > 0:
-            effect = effect.on(joint)
-        if len(effect.terms(robot)) == len(places):
-            covariance = found.covariance[np.ix_(places, places)]
-            quantities = effect.parameters(robot, found.values[places], covariance, known)
-            stated += [_quantity(each) for each in quantities if np.isfinite(each.value)]
-        else:
-            stated += [_coefficient(variant.terms[k], found, place) for k, place in enumerate(places)]
+def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | None) -> tuple[document.Parameter, ...]:
+    """Return a cause's parameters as the catalogue states them, with 95 % intervals that hold the torque's scale."""
+    stated = [_quantity(each if scale is None else scale.widened(each)) for each in quantities(robot, finding, one)]
     if one.of_bodies:  # most of a body's numbers do not show: those that do
         stated = [each for each in stated if each.interval95 and each.interval95[0] * each.interval95[1] > 0]
     return tuple(stated)
+
+
+def refused(one: Refused) -> document.Refused:
+    """Return a cause that cannot be true."""
+    return document.Refused(effect=one.effect, joints=() if one.joint is None else (one.joint,), why=one.why)
+
+
+def torque_scale(one: TorqueScale) -> document.TorqueScale:
+    """Return how sure the scale of torque is, and why."""
+    return document.TorqueScale(
+        uncertainty95=one.uncertainty, source=one.source, low=one.low, high=one.high, why=one.why
+    )
 
 
 def untestable(one: Untestable) -> document.Untestable:
@@ -274,9 +277,3 @@ def _numbers(values: np.ndarray) -> tuple[float, ...]:
 def _quantity(one: Quantity) -> document.Parameter:
     ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
     return document.Parameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)
-
-
-def _coefficient(term: Term, found: Estimate, place: int) -> document.Parameter:
-    value, half = float(found.values[place]), 1.96 * float(np.sqrt(max(found.covariance[place, place], 0.0)))
-    ends = (value - half, value + half)
-    return document.Parameter(name=term.name, joint=term.joint, value=value, unit=term.unit, interval95=ends)

@@ -30,33 +30,37 @@ class Estimate:
     blocks: int
 
 
-def estimate(blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term]) -> Estimate:
+def estimate(
+    blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term], prior_rows: np.ndarray | None = None
+) -> Estimate:
     """Estimate the coefficients of `terms` (K) from g equations a sample.
 
     Each equation is weighted by its residual's inverse RMS, found by iteration. The prior of each term (mean
-    `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that
-    they show, and what they do not show stays as expected (Tikhonov's ridge with physical units). As samples
-    depend on each other, they count against it by their design effect only. Bounds hold (`lowest`). The covariance
-    is explained in `uncertainty`.
+    `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that they
+    show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Where more is known of the
+    terms together, `prior_rows` (K, K) say it instead: rows on their deviations, in units of their spread, of noise
+    one. As samples depend on each other, they count against it by their design effect only. Bounds hold (`lowest`). The
+    covariance is explained in `uncertainty`.
     """
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
     count = np.maximum(sum(block.rows for block in blocks), 1)
     expected = np.array([term.expected for term in terms])
     spread = np.array([term.spread for term in terms])
     lowest = np.array([term.lowest for term in terms])
+    prior = np.eye(len(terms)) if prior_rows is None else prior_rows
     size = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
     shown = np.array([np.abs(factor[:, :-1] * spread).max(initial=0.0) for factor in factors])
     dead = np.maximum(_LEAST_SHOWN * shown, np.finfo(float).tiny)
     least = np.maximum(_LEAST_NOISE * size, dead)
     noise = np.maximum(size, dead)
     for _ in range(_REWEIGHTINGS):
-        values = _solve(factors, noise, expected, spread, lowest)
+        values = _solve(factors, noise, expected, spread, lowest, prior)
         residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
         noise = np.maximum(residual / np.sqrt(count), least)
-    _, effect = covariance(blocks, pattern, factors, values, noise, spread)
+    _, effect = covariance(blocks, pattern, factors, values, noise, spread, prior)
     level = noise * np.sqrt(effect)
-    values = _solve(factors, level, expected, spread, lowest)
-    sureness, _ = covariance(blocks, pattern, factors, values, level, spread)
+    values = _solve(factors, level, expected, spread, lowest, prior)
+    sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
     return Estimate(values, sureness, noise, len(blocks))
 
 
@@ -69,12 +73,17 @@ def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:
 
 
 def _solve(
-    factors: Sequence[np.ndarray], noise: np.ndarray, expected: np.ndarray, spread: np.ndarray, lowest: np.ndarray
+    factors: Sequence[np.ndarray],
+    noise: np.ndarray,
+    expected: np.ndarray,
+    spread: np.ndarray,
+    lowest: np.ndarray,
+    prior: np.ndarray,
 ) -> np.ndarray:
     """Solve in the coefficients' deviation from expectation, in units of their spread: well scaled."""
     rows = np.concatenate([factor / level for factor, level in zip(factors, noise, strict=True)])
     target = rows[:, -1] - rows[:, :-1] @ expected
-    scaled = np.concatenate([rows[:, :-1] * spread, np.eye(len(expected))])
+    scaled = np.concatenate([rows[:, :-1] * spread, prior])
     target = np.concatenate([target, np.zeros(len(expected))])
     factor = triangle(np.column_stack([scaled, target]))
     left, right = factor[:-1, :-1], factor[:-1, -1]

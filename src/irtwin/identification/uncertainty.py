@@ -22,11 +22,12 @@ def covariance(
     values: np.ndarray,
     noise: np.ndarray,
     spread: np.ndarray,
+    prior: np.ndarray,
 ) -> tuple[np.ndarray, float]:
     """Return the (K, K) covariance of weighted least squares, and the design effect.
 
     The design effect (Kish 1965) is how many rows carry what one independent row would, at least 1; `spread` are the
-    standard deviations of the prior.
+    units of the `prior` (K, K), rows of noise one.
 
     factors: each equation's over all blocks, (r, K + 1); noise: (g,) by which they are weighted.
 
@@ -41,10 +42,11 @@ def covariance(
             scores[number, used] += factor[:, :-1].T @ (factor @ extended)
     rows = np.concatenate([factor[:, :-1] / level for factor, level in zip(factors, noise, strict=True)])
     # in units of the spread; through a triangle, as normal equations would lose what the prior alone decides
-    root = solve_triangular(triangle(np.concatenate([rows * spread, np.eye(len(values))])), np.eye(len(values)))
+    root = solve_triangular(triangle(np.concatenate([rows * spread, prior])), np.eye(len(values)))
     groups = max(len(blocks), 2)
     between = (scores * spread) @ root
-    middle = between.T @ between * groups / (groups - 1) + root.T @ root
+    own = prior @ root
+    middle = between.T @ between * groups / (groups - 1) + own.T @ own
     sandwich, independent = root @ middle @ root.T, root @ root.T
     ratio = np.diag(sandwich) / np.diag(independent)
     learnt = np.diag(independent) < _LEARNT**2

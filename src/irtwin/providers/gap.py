@@ -126,6 +126,7 @@ def _linear_joints(workspace: Workspace, robot_id: str, said: Document) -> froze
     named = {*(said.gap.torque or ())}
     named |= {location.joint for location in said.locations if location.joint}
     named |= {joint for cause in said.causes for joint in cause.joints}
+    named |= {joint for cause in said.refused or () for joint in cause.joints}
     if named - known.keys():
         raise InputError(
             f"{robot_id} has no joint {', '.join(sorted(named - known.keys()))}; diagnose a data set of this robot"
@@ -151,6 +152,8 @@ def _row(
         created=datetime.now(UTC),
         energy_error_percent=said.gap.energy_error_percent,
         noise_floor_from=said.shrink.noise_floor_from,
+        torque_scale_uncertainty=said.torque_scale and said.torque_scale.uncertainty95,
+        torque_scale_why=said.torque_scale and said.torque_scale.why,
         file=files[".json"],
         sha256=sums[".json"],
         evidence_file=files[".evidence.json"],

@@ -43,6 +43,16 @@ def rows(said: Document, at: Place) -> Iterator[Base]:
         yield gap_schema.GapHeldOut(diagnosis_id=at.diagnosis_id, run_id=at.run_id(name))
     for number, one in enumerate(said.not_testable, start=1):
         yield gap_schema.GapNotTestable(diagnosis_id=at.diagnosis_id, number=number, effect=one.effect, why=one.why)
+    for number, refused in enumerate(said.refused or (), start=1):
+        joint = next(iter(refused.joints), None)
+        yield gap_schema.GapRefused(
+            diagnosis_id=at.diagnosis_id,
+            number=number,
+            robot_id=at.robot_id,
+            effect=refused.effect,
+            joint=joint,
+            why=refused.why,
+        )
     if said.next_experiment is not None:
         yield from _experiment(said.next_experiment, at)
 

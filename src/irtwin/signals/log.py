@@ -28,7 +28,7 @@ _POWER_AT = ("mains", "dc_bus")
 DATA_SET_KEYS = ("robot", "run", "twin", "topics")
 ROBOT_KEYS = (
     "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
-    "arm_movement_type", "simulated", "joint",
+    "arm_movement_type", "simulated", "torque_scale_uncertainty", "joint",
 )  # fmt: skip
 RUN_KEYS = ("file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started")
 TWIN_KEYS = ("effects",)
@@ -73,6 +73,7 @@ class DataSet:
     findings: tuple[Finding, ...] = ()
     urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
     plans: tuple[Run, ...] = ()
+    torque_scale_uncertainty: float | None = None  # share by which logged torque may be off, 95 %
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
@@ -118,6 +119,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         findings=tuple(findings),
         urdf=table.path("urdf", folder) if "urdf" in table.values else None,
         plans=tuple(run for run in listed if run.role == PLANNED),
+        torque_scale_uncertainty=_torque_scale(table),
     )
 
 
@@ -302,6 +304,15 @@ def _checksum(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     files = sorted(one for one in path.iterdir() if one.is_file())
     return hashlib.sha256("\n".join(f"{one.name} {_checksum(one)}" for one in files).encode()).hexdigest()
+
+
+def _torque_scale(table: Table) -> float | None:
+    share = table.number("torque_scale_uncertainty", least=0.0)
+    if share is not None and share >= 1:
+        raise InputError(
+            f"{table.file}: [robot] torque_scale_uncertainty should be a share below 1, not {share:g}; 0.1 is 10 %"
+        )
+    return share
 
 
 def _topics(file: Path, document: Mapping[str, Any], robot: Robot) -> dict[str, str]:

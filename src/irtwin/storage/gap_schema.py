@@ -25,6 +25,8 @@ class GapDiagnosis(Base):
     created: Mapped[datetime]
     energy_error_percent: Mapped[float | None]  # before anything is added
     noise_floor_from: Mapped[str | None]  # "repeats" or "out_of_band"
+    torque_scale_uncertainty: Mapped[float | None]  # a share, half a 95 % interval
+    torque_scale_why: Mapped[str | None]  # in words
     file: Mapped[str]
     sha256: Mapped[str]
     evidence_file: Mapped[str]
@@ -327,5 +329,19 @@ class GapNotTestable(Base):
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     effect: Mapped[str]
+    why: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapRefused(Base):
+    """An effect that would explain the data, but by a number that cannot be true; joint NULL: of the whole robot."""
+
+    __tablename__ = "gap_refused"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[str]
+    effect: Mapped[str]
+    joint: Mapped[str | None]
     why: Mapped[str]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

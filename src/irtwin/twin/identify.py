@@ -10,6 +10,7 @@ from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect, JointEffect, Term
+from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
@@ -32,7 +33,12 @@ _TORQUE_STEP = 1e-2  # N m, exact for what is quadratic in torque
 
 
 @one_blas_thread()
-def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect] = BASELINE) -> Twin:
+def identify(
+    robot: Robot,
+    motions: Sequence[Motion],
+    effects: Sequence[str | Effect] = BASELINE,
+    prior: Prior | None = None,
+) -> Twin:
     """Return the twin of a robot that fits the motions.
 
     - Where torque was measured, it gives the coefficients of torque; then power, where it was measured, gives those
@@ -44,7 +50,8 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
     Effects are ids, for which the data choose among the candidates of shape (joint by joint), or effects of a shape.
     Those that nothing measured can show are
     listed as `unidentified`, and left out. Where columns depend on what other effects predict, fit and prediction are
-    repeated until they agree. Raises InputError where there is nothing to fit.
+    repeated until they agree. `prior` is what is known before the motions; None: what the catalogue expects. Raises
+    InputError where there is nothing to fit.
     """
     if not motions:
         raise InputError("there is no run to fit a twin to; give at least one")
@@ -55,7 +62,7 @@ def identify(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Ef
     with_power = [motion for motion in motions if motion.power is not None]
     if not with_torque and not with_power:
         raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
-    stack = _visible(robot, effects, torque=bool(with_torque), power=bool(with_power))
+    stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
     fit = None
     if with_torque:
@@ -92,13 +99,12 @@ class _TorqueFit:
     condition: float
 
 
-def _visible(robot: Robot, effects: Sequence[str | Effect], *, torque: bool, power: bool) -> Stack:
+def _visible(whole: Stack, *, torque: bool, power: bool) -> Stack:
     """Return the effects that can be told from what was measured, or that hold nothing to be told."""
-    whole = Stack(robot, effects)
     seen = {effect.id for effect, term in whole.power_terms if power or term.fixed}
     carried = any(effect.carries_torque for effect in whole.effects)
     seen |= {effect.id for effect, _ in whole.torque_terms if torque or (carried and effect.channel == "torque")}
-    return Stack(robot, [effect for effect in whole.effects if effect.id in seen])
+    return whole.with_effects([effect for effect in whole.effects if effect.id in seen])
 
 
 def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot, list[Motion], TorqueConstants | None]:
@@ -127,9 +133,9 @@ def _shaped(stack: Stack, open_shapes: set[str], signal: str, fit: Callable[[Sta
             continue
         place = effects.index(effect)
         before, after = effects[:place], effects[place + 1 :]
-        noise = np.array([fit(Stack(stack.robot, [*before, shape, *after])).noise for shape in shapes])
+        noise = np.array([fit(stack.with_effects([*before, shape, *after])).noise for shape in shapes])
         effects = [*before, *_best(shapes, noise, stack.robot), *after]
-    return Stack(stack.robot, effects)
+    return stack.with_effects(effects)
 
 
 def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Effect]:
@@ -152,11 +158,11 @@ def _fit_torque(stack: Stack, motions: Sequence[Motion]) -> _TorqueFit:
 
 
 def _solve_torque(stack: Stack, motions: Sequence[Motion]) -> tuple[list[Block], Estimate]:
-    terms = [term for _, term in stack.torque_terms]
+    terms, known = [term for _, term in stack.torque_terms], stack.prior_rows(stack.torque_terms)
 
     def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
         blocks = accumulate(motions, _torque_equations(stack, values), stack.pattern)
-        return blocks, estimate(blocks, stack.pattern, terms)
+        return blocks, estimate(blocks, stack.pattern, terms, known)
 
     blocks, found = fit(_alone(stack, motions) if stack.coupled else None)
     for _ in range(_REPEATS if stack.coupled else 0):
@@ -202,7 +208,7 @@ def _fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarra
             known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
             return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
 
-        return _estimate(motions, equations, free)
+        return _estimate(motions, equations, free, stack.prior_rows(free))
 
     values = _expected(stack.power_terms)
     found = fit(values)
@@ -245,7 +251,7 @@ def _solve_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.nd
     before = np.full(len(spread), np.inf)
     for _ in range(_STEPS):
         equations = _linearised(stack, torque_values.copy(), power_values.copy())
-        found = _estimate(motions, equations, [*real, *free])
+        found = _estimate(motions, equations, [*real, *free], stack.prior_rows([*real, *free]))
         torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
         if np.all(np.abs(found.values - before) < _CONVERGED * spread):
             break
@@ -283,10 +289,10 @@ def power_slope(stack: Stack, motion: Motion, torque: np.ndarray, power_values: 
     return slope
 
 
-def _estimate(motions: Sequence[Motion], equations: Equations, terms: Terms) -> Estimate:
+def _estimate(motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None) -> Estimate:
     """Estimate the terms of one equation a sample."""
     pattern = np.ones((1, len(terms)), dtype=bool)
-    return estimate(accumulate(motions, equations, pattern), pattern, [term for _, term in terms])
+    return estimate(accumulate(motions, equations, pattern), pattern, [term for _, term in terms], prior_rows)
 
 
 def _expected(terms: Terms) -> np.ndarray:

@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.effect import Effect, Term
+from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
+from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -85,6 +87,31 @@ class Twin:
     def stack(self) -> Stack:
         """The effects' regressors."""
         return Stack(self.robot, self.effects)
+
+    @property
+    def standing(self) -> tuple[Effect, ...]:
+        """The effects that act in whatever run, in their shapes."""
+        return tuple(effect for effect in self.stack.effects if effect.runs is None)
+
+    @property
+    def prior(self) -> Prior:
+        """What the twin knows of the coefficients of its standing effects, as a prior of another fit.
+
+        Where it has no covariance, intervals say how sure each is by itself, and spreads where there are none.
+        """
+        spread = {
+            (effect.id, term.joint, term.link, term.name): term.spread
+            for effect, term in (*self.stack.torque_terms, *self.stack.power_terms)
+        }
+        passing = {effect.id for effect in self.stack.effects if effect.runs is not None}
+        keys = [(each.effect, each.joint, each.link, each.name) for each in self.parameters]
+        kept = [k for k, key in enumerate(keys) if key in spread and key[0] not in passing]
+        values = np.array([self.parameters[k].value for k in kept])
+        if self.covariance is not None:
+            covariance = self.covariance[np.ix_(kept, kept)]
+        else:
+            covariance = np.diag([_deviation(self.parameters[k], spread[keys[k]]) ** 2 for k in kept])
+        return Prior(tuple(keys[k] for k in kept), tuple(self.parameters[k].unit for k in kept), values, covariance)
 
     @property
     def stated(self) -> tuple[Parameter, ...]:
@@ -170,3 +197,10 @@ class Twin:
 
     def _vector(self, terms: tuple[tuple[Effect, Term], ...]) -> np.ndarray:
         return np.array([self.value(effect.id, term) for effect, term in terms], dtype=float)
+
+
+def _deviation(parameter: Parameter, spread: float) -> float:
+    """Return a parameter's standard deviation by its interval; without one, the spread."""
+    if parameter.lower is None or parameter.upper is None:
+        return spread
+    return max(parameter.upper - parameter.value, parameter.value - parameter.lower) / NORMAL

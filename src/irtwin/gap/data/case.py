@@ -4,36 +4,57 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
-from irtwin.effects.catalogue import BASELINE, catalogue
-from irtwin.effects.effect import Effect
+from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
+from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
-from irtwin.errors import InputError
 from irtwin.gap.data.admission import admit
+from irtwin.gap.data.baseline import baseline
 from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
+from irtwin.twin.twin import Twin
 
 
 @dataclass(frozen=True)
 class Case:
-    """The robot, the ids of its twin's effects, and each run's motion by name, all filtered alike.
+    """The robot, its twin's effects (ids, or effects of a shape), and each run's motion by name, all filtered alike.
 
-    `robot` has the torque constants that a balance of power told where nobody knew them, and `motions` the torque that
-    follows; `given` are the robot and the motions without.
+    `prior`: what is known of the twin's coefficients; None: what the catalogue expects; `stated`: what bounds the
+    causes. `robot` has the torque constants that a balance of power told where nobody knew them, and `motions` the
+    torque that follows; `given` are the robot and the motions without.
     """
 
     robot: Robot
-    effects: tuple[str, ...]
+    effects: tuple[str | Effect, ...]
     runs: tuple[Run, ...]
     motions: dict[str, Motion]
     given: tuple[Robot, dict[str, Motion]]
     thresholds: Thresholds
+    prior: Prior | None = None
+    stated: Stated = NOTHING_STATED
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The twin's effects."""
+        return Stack(self.robot, self.effects, self.prior)
+
+    @cached_property
+    def modelled(self) -> frozenset[tuple[str, str | None]]:
+        """Each effect that the twin has, with each joint at which it has it; None: of the whole robot, or known."""
+        found = set()
+        for one in self.stack.effects:
+            terms = one.terms(self.robot)
+            known = all(term.fixed for term in terms)  # as a candidate, it has one coefficient for all
+            found |= {(one.id, None if known else place_of(term)) for term in terms}
+        return frozenset(found)
 
     @property
     def observed(self) -> frozenset[str]:
@@ -90,32 +111,35 @@ class Case:
         return any(getattr(motion, signal) is not None for motion in self.seen)
 
 
-def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds) -> Case:
-    """Prepare a data set; `withhold` takes effects out of the twin.
+def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, twin: Twin | None = None) -> Case:
+    """Prepare a data set; `withhold` takes effects out of the twin, which is `twin` or what the data set says.
 
-    Raises InputError on an effect that the catalogue lacks or the twin has not, and where `admit` does.
+    Raises InputError where `baseline` and `admit` do.
     """
-    effects = twin_effects(data_set, withhold)
+    begun = baseline(data_set, withhold, twin, thresholds.given_twin)
     cutoff = choose_cutoff(data_set.runs)
-    given = {run.name: condition(run, data_set.robot, cutoff) for run in data_set.runs}
-    robot, motions = _torque_from_current(data_set.robot, given)
+    given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
+    robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
-    return Case(robot, effects, data_set.runs, motions, (data_set.robot, given), thresholds)
+    return Case(
+        robot,
+        begun.effects,
+        data_set.runs,
+        motions,
+        (begun.robot, given),
+        thresholds,
+        begun.prior,
+        _stated(data_set),
+    )
 
 
-def twin_effects(data_set: DataSet, withhold: Sequence[str]) -> tuple[str, ...]:
-    """Return the ids of the twin's effects, less those withheld; InputError on one that cannot be."""
-    effects = data_set.effects or BASELINE
-    Stack(data_set.robot, effects)
-    known = catalogue()
-    for effect in withhold:
-        if effect not in known:
-            raise InputError(f"--withhold {effect}: there is no such effect; choose from {', '.join(known)}")
-        if effect not in effects:
-            raise InputError(f"--withhold {effect}: the twin does not have this effect; it has {', '.join(effects)}")
-        if known[effect].bodies:
-            raise InputError(f"--withhold {effect}: the rigid bodies cannot be withheld; withhold another effect")
-    return tuple(effect for effect in effects if effect not in withhold)
+def _stated(data_set: DataSet) -> Stated:
+    rated = data_set.notes.get("rated_payload")
+    return Stated(
+        payload=max((run.payload_mass for run in data_set.runs if run.role == "observed"), default=0.0),
+        rated_payload=float(rated) if isinstance(rated, int | float) and rated > 0 else None,
+        torque_scale=data_set.torque_scale_uncertainty,
+    )
 
 
 def _torque_from_current(robot: Robot, motions: dict[str, Motion]) -> tuple[Robot, dict[str, Motion]]:

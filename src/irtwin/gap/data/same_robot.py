@@ -52,7 +52,7 @@ def _foreign_share(
     Friction, offsets and rotors are refitted, and a load of a likely size may have come or gone; what the observed
     runs' own bodies leave too is not counted. `own`, `other`: coefficients (D,) of either kind of run.
     """
-    borrowed = other + _refitted(total, other, _allowed(robot, system, limits.heaviest_load))
+    borrowed = other + _refitted(system, total, other, _allowed(robot, system, limits.heaviest_load))
     nothing = np.zeros(len(other))
     nothing[: system.base] = -system.expected / system.scale[: system.base]
 
@@ -88,10 +88,10 @@ def _allowed(robot: Robot, system: System, heaviest: float) -> np.ndarray:
     return allowed
 
 
-def _refitted(total: np.ndarray, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def _refitted(system: System, total: np.ndarray, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """Return what is added to coefficients `start` (D,) so that they fit best, each no farther than allowed (K,)."""
     free = np.flatnonzero(allowed > 0)
-    factor = np.triu(factored(total[np.ix_(free, free)]))
+    factor = np.triu(factored(total[np.ix_(free, free)], system.prior()[np.ix_(free, free)]))
     right = total[free, -1] - total[free, : len(start)] @ start
     found = lsq_linear(factor, solve_triangular(factor.T, right, lower=True), (-allowed[free], allowed[free]))
     added = np.zeros(len(start))

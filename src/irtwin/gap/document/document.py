@@ -19,6 +19,7 @@ Interval = tuple[float, float]  # 95 %
 Channel = Annotated[str, OneOf("torque", "power")]
 Verdict = Annotated[str, OneOf("no_gap", "attributed", "ambiguous", "unexplained")]
 Scope = Annotated[str, OneOf("missing", "changed")]
+ScaleSource = Annotated[str, OneOf("stated", "simulated", "sensor", "assumed")]
 FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
 
 
@@ -188,6 +189,29 @@ class Untestable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Refused:
+    """An effect that would explain the data, but by a number that cannot be true; `why` names it."""
+
+    effect: str
+    joints: tuple[str, ...]
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueScale:
+    """How sure the scale of logged torque is: half its 95 % interval as a share, and where that comes from.
+
+    low, high: what true torque is over logged torque, with what power says; parameters that go with torque carry it.
+    """
+
+    uncertainty95: float
+    source: ScaleSource
+    low: float
+    high: float
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Change:
     """A measure of the gap on runs outside the fit, before and after the causes are added, in the measure's unit."""
 
@@ -274,6 +298,8 @@ class Document:
     shrink: Shrink
     next_experiment: Experiment | None
     not_repeating: tuple[NotRepeating, ...] | None = None  # none where nothing is repeated, or nothing differs
+    refused: tuple[Refused, ...] | None = None
+    torque_scale: TorqueScale | None = None
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

@@ -18,7 +18,7 @@ from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import PowerOf, TwinPower
 from irtwin.gap.regression.hypotheses import Column
-from irtwin.gap.regression.normal_equations import least_noise
+from irtwin.gap.regression.normal_equations import System, least_noise
 from irtwin.gap.regression.residuals import as_filtered
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.accumulate import Rows, accumulate_any
@@ -36,12 +36,12 @@ class Products:
     existing: np.ndarray
     total: np.ndarray
     at: dict[int | Column, int]
-    base: int
+    system: System
 
     def left(self, causes: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
         """Return what the twin and some causes' columns, refitted, leave: now and then."""
-        fitted = [*range(self.base), *(self.at[k] for k in causes)]
-        return projected(self.existing, fitted), projected(self.total, fitted)
+        fitted, prior = [*range(self.system.base), *(self.at[k] for k in causes)], self.system.prior(causes)
+        return projected(self.existing, fitted, prior), projected(self.total, fitted, prior)
 
 
 class PlannedEquations:
@@ -95,7 +95,7 @@ class PlannedEquations:
         existing = np.zeros((base + len(tried) + 1,) * 2)
         existing[np.ix_(into, into)] = self._total[np.ix_(places, places)]
         at = {column: base + place for place, column in enumerate(tried)}
-        return Products(existing, existing + self._planned(programme, tried), at, system.base)
+        return Products(existing, existing + self._planned(programme, tried), at, system)
 
     def residuals(self, part: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return what the twin leaves of a measured part of a run, what it leaves with its causes, (N, g) each.

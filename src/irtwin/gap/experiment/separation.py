@@ -17,10 +17,10 @@ from irtwin.gap.regression.normal_equations import System
 _LEAST = 1.0  # squares of a column in units of its prior: with less the prior decides
 
 
-def projected(total: np.ndarray, inside: Sequence[int]) -> np.ndarray:
-    """Return the products of what the columns `inside`, refitted, leave of all columns."""
+def projected(total: np.ndarray, inside: Sequence[int], prior: np.ndarray | None = None) -> np.ndarray:
+    """Return the products of what the columns `inside` (c), refitted, leave of all columns; `prior`: its products."""
     kept = np.array(inside, dtype=int)
-    return np.asarray(total - total[:, kept] @ solved(factored(total[np.ix_(kept, kept)]), total[kept]))
+    return np.asarray(total - total[:, kept] @ solved(factored(total[np.ix_(kept, kept)], prior), total[kept]))
 
 
 def fitted(left: np.ndarray, own: Sequence[int]) -> np.ndarray:

@@ -76,9 +76,7 @@ def _cause(
     trial = attempt(system, moments, others, [[_joined(parts)] for parts in sides])
     gain, said = gains(system, trial)[:, own], (trial.said[0] / rows(system))[own]
     mean = np.average(gain, axis=1, weights=rows(system)[own])
-    alike = canonical_correlation(
-        reduce(np.add, moments), system.base, others, [_joined(parts).columns for parts in sides]
-    )
+    alike = canonical_correlation(system, reduce(np.add, moments), others, [_joined(parts).columns for parts in sides])
     known: dict[str, float] = {}
     correlations: dict[str, float] = {}
     equal: list[str] = []

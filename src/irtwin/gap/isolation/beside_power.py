@@ -13,7 +13,7 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import ExplainedTorque
-from irtwin.gap.isolation.finding import Finding, attributed, estimate_of
+from irtwin.gap.isolation.finding import Finding, Without, attributed, estimate_of
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.forward_selection import Attribution
 from irtwin.gap.isolation.shares import closed_squares
@@ -38,7 +38,7 @@ def find_beside_power(
     seed: int,
     *,
     transient: Transient | None = None,
-    without: Set[str] = frozenset(),
+    without: Set[Without] = frozenset(),
     tell: Tell | None = None,
 ) -> tuple[Finding, Floor]:
     """Find the causes of torque, `without` some effects; return them with the floor that they leave.
@@ -67,7 +67,7 @@ def find_beside_power(
     return _find(case, equations, left, seed, without), left
 
 
-def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[str]) -> Finding:
+def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]) -> Finding:
     whole, torque = equations.whole, equations.torque
     n = len(torque.pattern)
     levels = [np.zeros(n) if floor.torque is None else floor.torque, [floor.power or 0.0]]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
@@ -23,6 +24,8 @@ from irtwin.gap.regression.normal_equations import System, noise_before, observe
 from irtwin.identification.estimators import Estimate, estimate
 
 _NO_NOISE = 1e-9
+Without = str | tuple[str, str | None]
+"""What a search is not to name: an effect, or an effect at a joint (None: of the whole robot)."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,7 @@ def find(
     system: System,
     floor: np.ndarray | None,
     seed: int,
-    without: Set[str] = frozenset(),
+    without: Set[Without] = frozenset(),
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
     places = (None,) if name == "power" else case.robot.joint_names
@@ -138,7 +141,7 @@ def find(
 
 
 def attributed(
-    case: Case, system: System, floor: np.ndarray | None, seed: int, without: Set[str] = frozenset()
+    case: Case, system: System, floor: np.ndarray | None, seed: int, without: Set[Without] = frozenset()
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS.
 
@@ -147,26 +150,27 @@ def attributed(
     inside = _inside(case, system)
     candidates = _hypotheses(system, inside, without)
     found = attribute(system, candidates, seed, case.thresholds, floor)
-    while old := shown_before(system, found.causes, found.noise, frozenset(inside), case.thresholds.changes):
+    known = {effect for effect, _ in inside}
+    while old := shown_before(system, found.causes, found.noise, known, case.thresholds.changes):
         candidates = [one for one in candidates if not (one.effect in old and one.scope == CHANGED)]
         found = attribute(system, candidates, seed, case.thresholds, floor)
     return found
 
 
-def _inside(case: Case, system: System) -> tuple[str, ...]:
-    """Return the effects that cannot be missing from the twin."""
+def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
+    """Return what cannot be missing from the twin: an effect and its joint; joint None: anywhere."""
     if not system.both:
-        return tuple(case.effects)
+        return case.modelled
     # zero in the other runs where these did not measure it: there, missing is changed
-    return (*case.effects, *(one.id for one in catalogue().values() if not can_show(one, case.others)))
+    return case.modelled | {(one.id, None) for one in catalogue().values() if not can_show(one, case.others)}
 
 
-def _hypotheses(system: System, inside: Sequence[str], without: Set[str]) -> list[Hypothesis]:
+def _hypotheses(system: System, inside: Set[tuple[str, str | None]], without: Set[Without]) -> list[Hypothesis]:
     """Return what may be missing or have changed, `without` some effects; effects on power may act in every joint."""
     found = hypotheses(system.columns, system.base, MISSING, inside=inside)
     if system.both:
         found += hypotheses(system.columns, system.changed, CHANGED)
-    return [one for one in found if one.effect not in without]
+    return [one for one in found if not {one.effect, (one.effect, one.joint)} & without]
 
 
 def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
@@ -187,4 +191,5 @@ def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
             ]
             factors.append(np.column_stack([*parts, factor[:, -1]]))
         blocks.append(replace(block, factors=tuple(factors)))
-    return estimate(blocks, pattern, terms)
+    rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
+    return estimate(blocks, pattern, terms, rows)

@@ -16,11 +16,14 @@ from irtwin.gap.thresholds import Thresholds
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
 
 
-def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Thresholds) -> str:
+def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Thresholds, *, unmatched: bool = False) -> str:
     """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not.
 
-    Causes that close nothing that matters make no gap.
+    Causes that close nothing that matters make no gap. `unmatched`: a cause that cannot be true explains the data far
+    better than those that were named instead.
     """
+    if unmatched:
+        return UNEXPLAINED
     causes = [
         cause
         for finding in findings

@@ -52,7 +52,8 @@ def torque_system(
         return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
-    return enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+    known = stack.prior_rows(stack.torque_terms)
+    return enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
 
 def power_system(
@@ -85,7 +86,8 @@ def power_system(
         return Rows([joined], known[:, None], motion.power[:, None])
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
-    return enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks)))
+    known = stack.prior_rows(free)
+    return enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
 
 def with_load(robot: Robot, below: Below | None) -> Below:

@@ -1,4 +1,4 @@
-"""Normal equations under the prior: products of columns, in units of it, and the identity."""
+"""Normal equations under the prior: products of columns, and those of the prior's rows."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 
-def factored(products: np.ndarray) -> np.ndarray:
-    """Return the Cholesky factor, (k, k) upper triangle, of products of columns and the identity.
+def factored(products: np.ndarray, prior: np.ndarray | None = None) -> np.ndarray:
+    """Return the Cholesky factor, (k, k) upper triangle, of products of columns and of a prior's rows, (k, k) each.
 
-    Products are rounded. Where that hides the prior, it is taken to be as firm as the rounding is large.
+    `prior` None: the identity, of columns in units of it. Products are rounded. Where that hides the prior, it is
+    taken to be as firm as the rounding is large.
     """
-    prior = np.eye(len(products))
+    prior = np.eye(len(products)) if prior is None else prior
     try:
         return np.asarray(cho_factor(products + prior)[0])
     except LinAlgError:
         rounding = 10 * len(products) * np.finfo(float).eps * float(np.abs(products).max())
-        return np.asarray(cho_factor(products + (1 + rounding) * prior)[0])
+        return np.asarray(cho_factor(products + prior + rounding * np.eye(len(products)))[0])
 
 
 def solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -56,12 +56,12 @@ def attempt(
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
     batches = _batches(system, variants)
     total = reduce(np.add, moments)
-    whole, _ = _project(total, total, system.base, chosen)
+    whole, _ = _project(system, total, total, chosen)
     objective, _, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss, said = np.empty((2, len(candidates), len(moments)))
     for group, part in enumerate(moments):
-        train, test = _project(total - part, part, system.base, chosen)
+        train, test = _project(system, total - part, part, chosen)
         start[group] = test.squares
         inner, left_out, added, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
@@ -86,7 +86,7 @@ def scores(
     A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
     """
     total = reduce(np.add, moments)
-    inside, weights = _weights(total, system.base, chosen)
+    inside, weights = _weights(system, total, chosen)
     rest = np.zeros(len(total))
     rest[-1] = 1.0
     rest[inside] = -weights[:, -1]
@@ -104,13 +104,13 @@ def scores(
 
 
 def canonical_correlation(
-    total: np.ndarray, base: int, chosen: Sequence[int], sets: Sequence[Sequence[int]]
+    system: System, total: np.ndarray, chosen: Sequence[int], sets: Sequence[Sequence[int]]
 ) -> np.ndarray:
     """Return the largest canonical correlation of each set of columns with the first set, (S,), after the refit.
 
     total: (D + 1, D + 1) products of columns. What the prior holds near zero anyway correlates with nothing.
     """
-    whole, _ = _project(total, total, base, chosen)
+    whole, _ = _project(system, total, total, chosen)
     first = len(sets[0])
     found = []
     for columns in sets:
@@ -146,10 +146,10 @@ def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:
     return batches
 
 
-def _weights(total: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def _weights(system: System, total: np.ndarray, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the fitted columns' indices, and their weights in the fit of every column and of the measurement."""
-    inside = np.append(np.arange(base), np.array(chosen, dtype=int))
-    return inside, solved(factored(total[np.ix_(inside, inside)]), total[inside])
+    inside = np.append(np.arange(system.base), np.array(chosen, dtype=int))
+    return inside, solved(factored(total[np.ix_(inside, inside)], system.prior(chosen)), total[inside])
 
 
 @dataclass(frozen=True)
@@ -180,9 +180,9 @@ class _Products:
         return self.of(np.arange(len(self.whole) - 1)[:, None])[:, 0, 0]
 
 
-def _project(train: np.ndarray, test: np.ndarray, base: int, chosen: Sequence[int]) -> tuple[_Products, _Products]:
+def _project(system: System, train: np.ndarray, test: np.ndarray, chosen: Sequence[int]) -> tuple[_Products, _Products]:
     """Return the products of what a fit on `train` leaves of each column: on train, and on test."""
-    inside, weights = _weights(train, base, chosen)
+    inside, weights = _weights(system, train, chosen)
     own = np.ascontiguousarray(weights.T)
     seen = np.ascontiguousarray(test[inside].T)
     fitted = seen - own @ test[np.ix_(inside, inside)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,6 +59,11 @@ class Column:
     term: Term
 
 
+def place_of(term: Term) -> str | None:
+    """Return the joint that a coefficient belongs to; None: the whole robot, or a link of it."""
+    return term.joint if term.link is None else None
+
+
 def candidate_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, ...]:
     """Return the columns of effects with their terms; those of an effect without any free term become one."""
     columns: list[Column] = []
@@ -71,18 +76,20 @@ def candidate_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, 
     return tuple(columns)
 
 
-def hypotheses(columns: Sequence[Column], first: int, scope: str, *, inside: Sequence[str] = ()) -> list[Hypothesis]:
+def hypotheses(
+    columns: Sequence[Column], first: int, scope: str, *, inside: Set[tuple[str, str | None]] = frozenset()
+) -> list[Hypothesis]:
     """Group candidate columns (the first of index `first`) into hypotheses of one scope, joint by joint.
 
-    Effects on power that act joint by joint may also act in every joint at once; effects `inside` the twin cannot be
-    missing.
+    Effects on power that act joint by joint may also act in every joint at once; what is `inside` the twin, an effect
+    and its joint, cannot be missing; joint None: nowhere.
     """
     places: dict[tuple[str, str | None], dict[int, list[int]]] = {}
     for k, column in enumerate(columns):
         effect = column.effect
-        if scope == MISSING and effect.id in inside:
+        joint = place_of(column.term)
+        if scope == MISSING and {(effect.id, joint), (effect.id, None)} & inside:
             continue
-        joint = column.term.joint if column.term.link is None else None
         keys = [joint, None] if joint and effect.signal == "power" else [joint]
         for key in keys:
             places.setdefault((effect.id, key), {}).setdefault(id(effect), []).append(k)

@@ -102,9 +102,18 @@ def joint_equations(
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     alone = [replace(one, rows=one.rows[:-1], factors=one.factors[:-1]) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *electrical)
-    whole = System(terms, columns, pattern, tuple(blocks), *grouping.of(blocks), beside_power=True)
+    whole = System(
+        terms,
+        columns,
+        pattern,
+        tuple(blocks),
+        *grouping.of(blocks),
+        beside_power=True,
+        prior_rows=stack.prior_rows(terms),
+    )
     of_joints = np.concatenate([stack.pattern, tried], axis=1)
-    torque = System(stack.torque_terms, mechanical, of_joints, tuple(alone), *grouping.of(alone))
+    known = stack.prior_rows(stack.torque_terms)
+    torque = System(stack.torque_terms, mechanical, of_joints, tuple(alone), *grouping.of(alone), prior_rows=known)
     return JointEquations(enough(whole), enough(torque))
 
 

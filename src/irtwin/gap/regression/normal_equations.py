@@ -29,9 +29,10 @@ class System:
     """g equations a sample, B blocks; K terms of the twin, M candidate columns.
 
     `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
-    whether the block belongs to an observed run. With any that does not, each candidate column stands there twice: as
-    it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of a brief candidate.
-    `beside_power`: the last equation is power's, beside those of torque.
+    whether the block belongs to an observed run. `prior_rows` (K, K): what is known of the twin's terms, as
+    `effects.prior` gives it; None: each by itself, as its spread says. With any that does not, each candidate column
+    stands there twice: as it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of
+    a brief candidate. `beside_power`: the last equation is power's, beside those of torque.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -42,6 +43,7 @@ class System:
     observed: np.ndarray
     transient: Transient | None = None
     beside_power: bool = False
+    prior_rows: np.ndarray | None = None
 
     @property
     def base(self) -> int:
@@ -109,6 +111,18 @@ class System:
     def expected(self) -> np.ndarray:
         """(K,) what is expected of the twin's terms."""
         return np.array([term.expected for _, term in self.terms])
+
+    def prior(self, chosen: Sequence[int] | np.ndarray = ()) -> np.ndarray:
+        """Return the products of the prior's rows of the twin's terms and c chosen columns, (K + c, K + c)."""
+        found = np.eye(self.base + len(chosen))
+        if self.prior_rows is not None:
+            found[: self.base, : self.base] = self._prior_products
+        return found
+
+    @cached_property
+    def _prior_products(self) -> np.ndarray:
+        assert self.prior_rows is not None
+        return np.asarray(self.prior_rows.T @ self.prior_rows)
 
     @property
     def _size(self) -> int:
@@ -189,7 +203,7 @@ class System:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
         inside = np.append(np.arange(self.base), np.array(chosen, dtype=int))
         vector = np.zeros(self._size)
-        vector[inside] = solved(factored(total[np.ix_(inside, inside)]), total[inside, -1])
+        vector[inside] = solved(factored(total[np.ix_(inside, inside)], self.prior(chosen)), total[inside, -1])
         return vector
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:

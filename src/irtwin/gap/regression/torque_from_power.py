@@ -29,7 +29,7 @@ class ThroughPower(Stack):
         """Fit the effects of `stack` to the power of the motions."""
         self._own = stack
         self._values = fit_through_power(stack, motions)
-        super().__init__(stack.robot, stack.effects)
+        super().__init__(stack.robot, stack.effects, stack.prior)
 
     def _check(self) -> None:
         """The stack that it is made of was checked; terms of torque stand among those of power on purpose."""

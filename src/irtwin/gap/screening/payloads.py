@@ -69,6 +69,7 @@ class _Parts:
     group: np.ndarray
     observed: np.ndarray
     base: int
+    prior: np.ndarray
 
     @classmethod
     def of(cls, robot: Robot, system: System, noise: np.ndarray, fewest: int) -> _Parts | None:
@@ -93,7 +94,7 @@ class _Parts:
                 inside = used < base
                 mapped = factor[:, np.append(inside, True)] @ full[np.append(used[inside], base)] / level
                 products[run, joint] += mapped.T @ mapped
-        return cls(runs, products, rows, np.array([one.pop() for one in groups]), observed, base)
+        return cls(runs, products, rows, np.array([one.pop() for one in groups]), observed, base, system.prior())
 
     def carrying(self, inside: np.ndarray) -> np.ndarray:
         """Return (R,) which runs carry the payload, as runs `inside` tell; the heavier where either part could.
@@ -151,7 +152,7 @@ class _Fold:
         base = parts.base
         products = parts.products.sum(axis=1)
         total = products[inside].sum(axis=0)
-        factor = factored(total[:base, :base])
+        factor = factored(total[:base, :base], parts.prior)
         used = np.isin(np.arange(len(products)), inside)[:, None, None]
         self._twin = solved(factor, total[:base, -1])
         self._beside = products[:, :base, base:-1] * used

@@ -98,7 +98,7 @@ def foremost_curves(curves: Sequence[Followed], answers: Answers) -> list[Follow
 
 def effect_names(answers: Answers) -> dict[str, str]:
     """Return what the ontology calls the effects that the diagnosis names, by their ids."""
-    questions = ("causes", "not_testable")
+    questions = ("causes", "not_testable", "refused")
     named = [(row["effect"], row["label"]) for question in questions for row in answers[question].rows]
     named += [(row["rival"], row["rival_label"]) for row in answers["rivals"].rows]
     return {wording.local_name(effect): label for effect, label in named if label}

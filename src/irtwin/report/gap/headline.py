@@ -5,6 +5,7 @@ from __future__ import annotations
 from irtwin.gap.document.document import Document, Finding
 from irtwin.report.gap import findings
 from irtwin.report.gap.verdict import closes, where
+from irtwin.report.wording import listed
 
 
 def line(diagnosis: Document, against: str | None) -> str:
@@ -39,3 +40,11 @@ def _told(one: Finding, against: str | None) -> findings.Finding:
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
+
+
+def refused(diagnosis: Document) -> list[str]:
+    """Return a line for each effect that was refused as a cause."""
+    return [
+        f"refused: {one.effect.replace('_', ' ')}{f' on {listed(one.joints)}' if one.joints else ''}: {one.why}"
+        for one in diagnosis.refused or ()
+    ]

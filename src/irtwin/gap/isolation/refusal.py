@@ -1,0 +1,110 @@
+"""Refusals: causes whose numbers cannot be true, and the search without them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.effects.effect import Possible, Quantity, Stated
+from irtwin.gap.data.case import Case
+from irtwin.gap.data.noise_floor import Floor
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.finding import Finding, Without
+from irtwin.gap.isolation.quantities import of_variant
+from irtwin.gap.regression.hypotheses import CHANGED, Variant, place_of
+from irtwin.robot.description import Robot
+
+_SEARCHES = 4  # a search without what was refused may name something else that cannot be
+_NORMAL = 1.96  # standard deviations in half a 95 % interval
+
+
+@dataclass(frozen=True)
+class Refused:
+    """An effect that would explain the data by a number that cannot be true; joint None: of the whole robot."""
+
+    effect: str
+    joint: str | None
+    why: str
+
+
+@dataclass(frozen=True)
+class Refusals:
+    """What was refused, and whether that which is named instead leaves far more: then nothing explains the data."""
+
+    refused: tuple[Refused, ...] = ()
+    unmatched: bool = False
+
+    def __add__(self, other: Refusals) -> Refusals:
+        return Refusals(self.refused + other.refused, self.unmatched or other.unmatched)
+
+
+NOTHING_REFUSED = Refusals()
+
+
+def find_possible(
+    case: Case, search: Callable[[Set[Without]], tuple[Finding, Floor]], without: Set[Without] = frozenset()
+) -> tuple[Finding, Floor, Refusals]:
+    """Return what a search `without` some effects finds, where each cause can be true, and what was refused."""
+    refused: dict[tuple[str, str | None], Refused] = {}
+    least = np.inf
+    for _ in range(_SEARCHES):
+        finding, floor = search(without | refused.keys())
+        least = np.minimum(least, finding.attribution.noise)
+        wrong = {
+            (one.effect, one.joint): one
+            for cause in finding.causes
+            for one in _of(case.robot, finding, cause, case.stated)
+        }
+        if not wrong:
+            break
+        refused |= wrong
+    else:
+        finding, floor = search(without | {effect for effect, _ in refused})
+    more = (finding.attribution.noise / np.maximum(least, finding.system.quietest)) ** 2 - 1
+    return finding, floor, Refusals(tuple(refused.values()), bool(more.max() > case.thresholds.verdict.excess))
+
+
+def _of(robot: Robot, finding: Finding, cause: Cause, stated: Stated) -> list[Refused]:
+    refused = []
+    for number, variant in enumerate(cause.variants):
+        joint = place_of(variant.terms[0]) if cause.joints else None
+        limits = (variant.effect if joint is None else variant.effect.on(joint)).possible(robot, stated)
+        said = of_variant(robot, finding, cause, number) if limits else []
+        whys = [_beyond(one, limits[one.name]) for one in said if one.name in limits]
+        if cause.scope == CHANGED:
+            whys += [_below_nothing(finding, variant, place) for place in range(len(variant.columns))]
+        refused += [Refused(cause.effect, joint, why) for why in [each for each in whys if each][:1]]
+    return refused
+
+
+def _beyond(one: Quantity, limits: Possible) -> str | None:
+    """Say by how much a quantity misses what is possible; None where its interval reaches that."""
+    if one.lower is None or one.upper is None or (one.upper >= limits.low and one.lower <= limits.high):
+        return None
+    ends = [f"{end:.3g}" for end in (limits.low, limits.high) if np.isfinite(end)]
+    side = "at least" if np.isfinite(limits.low) else "at most"
+    allowed = " to ".join(ends) if len(ends) == 2 else f"{side} {ends[0]}"
+    return f"{_value(one)}; {allowed} is possible: {limits.why}"
+
+
+def _below_nothing(finding: Finding, variant: Variant, place: int) -> str | None:
+    """Say where a change takes more off a coefficient than there was in the reference runs."""
+    term, used, system = variant.terms[place], finding.used, finding.system
+    key = (variant.effect.id, term.joint, term.link, term.name)
+    before = [k for k, (e, t) in enumerate(system.terms) if (e.id, t.joint, t.link, t.name) == key and e.runs is None]
+    if not before or not np.isfinite(term.lowest):
+        return None
+    pair, found = [before[0], used.index(variant.columns[place])], finding.estimate
+    total = float(found.values[pair].sum())
+    half = _NORMAL * float(np.sqrt(max(found.covariance[np.ix_(pair, pair)].sum(), 0.0)))
+    if total + half >= term.lowest:
+        return None
+    left = Quantity(term.name, term.joint, total, term.unit, total - half, total + half)
+    return f"{_value(left)} would be left of it; at least {term.lowest:g} is possible"
+
+
+def _value(one: Quantity) -> str:
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    return f"{one.name} = {one.value:.3g}{unit} ({one.lower:.3g} to {one.upper:.3g})"

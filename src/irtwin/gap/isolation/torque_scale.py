@@ -1,0 +1,153 @@
+"""How sure the scale of logged torque is, and with it every parameter that is weighed by torque.
+
+Torque from current times a nominal constant may be off by a tenth on all joints alike: a fit does not see that, as all
+it finds is off with it. The scale is the torque that is logged over that which is there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from irtwin.effects.effect import Quantity, Term
+from irtwin.errors import InputError
+from irtwin.gap.regression.channel_equations import Torque
+from irtwin.gap.thresholds import ScaleOfTorque
+from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.identification.estimators import estimate
+from irtwin.identification.uncertainty import half_widths
+from irtwin.signals.log import DataSet
+from irtwin.signals.motion import Motion
+
+STATED, SIMULATED, SENSOR, ASSUMED = "stated", "simulated", "sensor", "assumed"
+_SENSOR = re.compile(r"\bsensors?\b", re.IGNORECASE)
+_FORCES = re.compile(r"\b(?:kg|N)\b")
+_POWER_OF = re.compile(r"\)\^(\d+)$")
+_LOSSES = (  # of joint torques and speeds, (N, n) each
+    lambda torque, speed: torque**2,
+    lambda torque, speed: np.abs(torque),
+    lambda torque, speed: np.abs(speed),
+    lambda torque, speed: speed**2,
+)
+_SPREAD = 1e3  # of a loss' coefficient: no more is known of it
+
+
+@dataclass(frozen=True)
+class TorqueScale:
+    """Half the 95 % interval of the scale, a share, and where that comes from.
+
+    low, high: the ends of what true torque is over logged torque; `why` says all of it in words.
+    """
+
+    uncertainty: float
+    source: str
+    low: float
+    high: float
+    why: str
+
+    def widened(self, one: Quantity) -> Quantity:
+        """Return a quantity with the scale in its interval; one that does not go with torque as it is."""
+        degree = torque_degree(one.unit)
+        if degree == 0 or one.lower is None or one.upper is None:
+            return one
+        ends = sorted(one.value * factor**degree for factor in (self.low, self.high))
+        below, above = max(one.value - ends[0], 0.0), max(ends[1] - one.value, 0.0)
+        return replace(
+            one,
+            lower=one.value - float(np.hypot(one.value - one.lower, below)),
+            upper=one.value + float(np.hypot(one.upper - one.value, above)),
+        )
+
+
+def torque_degree(unit: str) -> int:
+    """Return the power of torque that a quantity of this unit goes with: kg and N m 1, W/(N m)^2 -2, rad 0."""
+    above, _, below = unit.partition("/")
+    return _degree(above) - _degree(below)
+
+
+def _degree(part: str) -> int:
+    if not _FORCES.search(part):
+        return 0
+    power = _POWER_OF.search(part)
+    return int(power[1]) if power else 1
+
+
+def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque, limits: ScaleOfTorque) -> TorqueScale:
+    """Return how sure the scale is by what the data set states, and by power where that tells more.
+
+    motions: observed, filtered alike; torque: the real joint torque that explains what was logged. Power counts where
+    it was measured on the DC bus: that of the mains holds the efficiency of a supply.
+    """
+    known = _stated(data_set, limits)
+    with_power = [motion for motion in motions if motion.power is not None]
+    if known.uncertainty == 0 or not with_power or data_set.power_at != "dc_bus":
+        return known
+    told = _told_by_power(with_power, torque)
+    return known if told is None else _narrowed(known, *told, limits)
+
+
+def _stated(data_set: DataSet, limits: ScaleOfTorque) -> TorqueScale:
+    note = data_set.notes.get("torque")
+    if data_set.torque_scale_uncertainty is not None:
+        share, source, why = data_set.torque_scale_uncertainty, STATED, "the data set states it"
+    elif data_set.simulated:
+        share, source, why = 0.0, SIMULATED, "simulated torque is exact"
+    elif isinstance(note, str) and _SENSOR.search(note):
+        share, source, why = limits.sensor, SENSOR, "a sensor measured torque"
+    else:
+        share, source, why = limits.assumed, ASSUMED, "torque of drives comes from nominal constants"
+    words = f"The scale of torque is uncertain by {100 * share:.3g} %: {why}"
+    return TorqueScale(share, source, 1 / (1 + share), 1 / (1 - share), words)
+
+
+def _narrowed(known: TorqueScale, slope: float, half: float, limits: ScaleOfTorque) -> TorqueScale:
+    """Join what is known of true torque over logged, 1 give or take the uncertainty, with the slope of power."""
+    half = float(np.hypot(half, limits.meter * abs(slope)))
+    if half >= known.uncertainty:
+        return known
+    said = f"power over torque times speed is {slope:.3f} (give or take {half:.3f})"
+    if abs(slope - 1) > np.hypot(half, known.uncertainty):
+        return replace(known, why=f"{known.why}; {said}, farther off than that, and does not count")
+    weights = np.array([known.uncertainty, half]) ** -2.0
+    middle, rest = float(weights @ [1.0, slope] / weights.sum()), float(weights.sum() ** -0.5)
+    return replace(known, low=middle - rest, high=middle + rest, why=f"{known.why}; {said}, which narrows it")
+
+
+def _told_by_power(motions: Sequence[Motion], torque: Torque) -> tuple[float, float] | None:
+    """Return the slope of power over torque times speed, and half its 95 % interval; None where power does not tell.
+
+    Losses of windings, inverters and iron are fitted beside it, joint by joint; where it depends on which, by so much
+    it is unsure. Only while the robot takes power: what it gives back may be burnt.
+    """
+    slopes = [_slope(motions, torque, losses) for losses in (_LOSSES, _LOSSES[:1])]
+    if any(slope is None for slope in slopes):
+        return None
+    (slope, half), (other, _) = [one for one in slopes if one is not None]
+    return slope, float(np.hypot(half, slope - other))
+
+
+def _slope(
+    motions: Sequence[Motion], torque: Torque, losses: Sequence[Callable[[np.ndarray, np.ndarray], np.ndarray]]
+) -> tuple[float, float] | None:
+    joints = motions[0].dq.shape[1]
+    terms = [Term("slope", "1", expected=1.0), Term("P0", "W", spread=_SPREAD)]
+    terms += [Term("loss", "", spread=_SPREAD)] * (len(losses) * joints)
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.power is not None
+        real = torque(motion)
+        work = (real * motion.dq).sum(axis=1)
+        columns = np.column_stack([work, np.ones_like(work), *(loss(real, motion.dq) for loss in losses)])
+        return Rows(columns[:, None], np.zeros((len(work), 1)), motion.power[:, None], (work < 0)[:, None])
+
+    pattern = np.ones((1, len(terms)), dtype=bool)
+    try:
+        blocks = accumulate(motions, equations, pattern)
+    except InputError:  # nothing is left of runs that only brake
+        return None
+    found = estimate(blocks, pattern, terms)
+    half = float(half_widths(found.covariance, np.array([term.spread for term in terms]), found.blocks)[0])
+    return (float(found.values[0]), half) if np.isfinite(half) else None

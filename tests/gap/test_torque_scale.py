@@ -1,0 +1,130 @@
+"""How sure the scale of torque is, and what carries it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import Quantity
+from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.isolation.quantities import quantities
+from irtwin.gap.isolation.torque_scale import TorqueScale, torque_degree, torque_scale
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.robot.kinematics import flange
+from irtwin.signals.conditioning import condition
+from irtwin.signals.log import DataSet
+
+ROBOT = arm(3)
+LOAD, GAIN = 3.0, 1.09  # kg at the flange; of every drive's torque constant
+LIMITS = DEFAULT.scale_of_torque
+
+
+def loaded_torque(motion, mass):
+    """What a mass at the flange adds, by inverse dynamics of a heavier last body."""
+    model = ROBOT.model.copy()
+    frame = model.frames[model.getFrameId(flange(ROBOT), pin.FrameType.BODY)]
+    load = frame.placement.act(pin.Inertia(mass, np.array([0.02, 0.0, 0.1]), 1e-3 * mass * np.eye(3)))
+    model.inertias[frame.parentJoint] = model.inertias[frame.parentJoint] + load
+    data = model.createData()
+    states = zip(motion.q, motion.dq, motion.ddq, strict=True)
+    return np.array([pin.rnea(model, data, *state) for state in states]) - rigid_torque(ROBOT, motion)
+
+
+def logged(gain, *, power):
+    """Runs without and with the load, of drives whose torque is read too high by a gain; power is right."""
+    made = []
+    for seed in range(6):
+        role, mass = ("reference", 0.0) if seed < 3 else ("observed", LOAD)
+        motion = replace(swing(ROBOT, seed, seconds=10.0), run=f"run_{seed}")
+        shown = measure(ROBOT, motion, noise=0.3, seed=seed)
+        added = loaded_torque(motion, mass) if mass else np.zeros_like(motion.dq)
+        heat = (truth(ROBOT)["R"] * ((shown.current + added / 8) ** 2 - shown.current**2)).sum(axis=1)
+        taken = shown.power + (added * motion.dq).sum(axis=1) + heat if power else None
+        run = as_run(replace(shown, torque=gain * (shown.torque + added), power=taken, current=None))
+        made.append(replace(run, role=role))
+    return DataSet(Path("arm"), ROBOT, tuple(made), (*BASELINE, "copper_loss"), None, "dc_bus", False, {})
+
+
+def mass_of(diagnosis):
+    cause = next(cause for cause in diagnosis.document.causes if cause.effect == "payload")
+    return next(one for one in cause.parameters if one.name == "m")
+
+
+@pytest.mark.slow
+def test_a_mass_weighed_by_drives_that_read_high_lies_in_its_interval():
+    found = diagnose(logged(GAIN, power=False))
+    mass = mass_of(found)
+    assert mass.value == pytest.approx(GAIN * LOAD, rel=0.03)
+    assert mass.interval95[0] < LOAD < mass.interval95[1]
+    said = found.document.torque_scale
+    assert (said.uncertainty95, said.source) == (0.1, "assumed")
+    assert "nominal constants" in said.why
+    finding, cause = found.causes[0]
+    of_fit = next(one for one in quantities(ROBOT, finding, cause) if one.name == "m")
+    assert of_fit.lower > LOAD
+
+
+def scale(**changes):
+    data = replace(logged(1.0, power=False), **changes)
+    return torque_scale(data, [], lambda motion: motion.torque, LIMITS)
+
+
+def test_where_the_uncertainty_comes_from():
+    assert scale().source == "assumed"
+    assert (scale(notes={"torque": "joint torque sensor"}).uncertainty, scale(simulated=True).uncertainty) == (0.02, 0)
+    stated = scale(torque_scale_uncertainty=0.05, notes={"torque": "joint torque sensor"})
+    assert (stated.source, stated.uncertainty) == ("stated", 0.05)
+
+
+@pytest.mark.parametrize("gain", [0.92, 1.0, GAIN])
+def test_power_on_the_bus_narrows_the_scale(gain):
+    data = logged(gain, power=True)
+    motions = [condition(run, ROBOT, 10.0) for run in data.runs]
+    offset = gain * truth(ROBOT)["c"]
+
+    def real(motion):
+        return motion.torque - offset
+
+    found = torque_scale(data, motions, real, LIMITS)
+    assert found.low < 1 / gain < found.high
+    assert found.high - found.low < 0.06
+    assert "narrows" in found.why
+    at_mains = torque_scale(replace(data, power_at="mains"), motions, real, LIMITS)
+    assert (at_mains.low, at_mains.high) == (1 / 1.1, 1 / 0.9)
+
+
+def test_power_that_contradicts_does_not_count():
+    data = logged(1.6, power=True)
+    motions = [condition(run, ROBOT, 10.0) for run in data.runs]
+    found = torque_scale(data, motions, lambda motion: motion.torque - 1.6 * truth(ROBOT)["c"], LIMITS)
+    assert (found.low, found.high) == (1 / 1.1, 1 / 0.9)
+    assert "does not count" in found.why
+
+
+@pytest.mark.parametrize(
+    ("unit", "degree"),
+    [
+        ("N m", 1), ("N", 1), ("kg", 1), ("kg m^2", 1), ("N m s/(rad K)", 1), ("N m/rad", 1), ("W/(N m)^2", -2),
+        ("W/(N m)", -1), ("rad", 0), ("1", 0), ("W", 0), ("ohm", 0), ("K", 0), ("W s/rad", 0), ("s", 0), ("m", 0),
+    ],
+)  # fmt: skip
+def test_what_goes_with_torque(unit, degree):
+    assert torque_degree(unit) == degree
+
+
+@given(st.floats(-100, 100), st.floats(0.01, 10), st.floats(0.5, 1.0), st.floats(1.0, 2.0))
+def test_a_wider_interval_holds_the_narrow_one_and_the_scaled_value(value, half, low, high):
+    said = TorqueScale(0.1, "assumed", low, high, "")
+    wide = said.widened(Quantity("m", None, value, "kg", value - half, value + half))
+    assert wide.lower <= min(value - half, low * value, high * value) + 1e-9
+    assert wide.upper >= max(value + half, low * value, high * value) - 1e-9
+    angle = Quantity("e", None, value, "rad", value - half, value + half)
+    assert said.widened(angle) == angle
