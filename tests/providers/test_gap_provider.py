@@ -161,6 +161,21 @@ def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> Non
     assert found == {"stribeck_friction": (3.9, 0.99), "payload": (0.1, None)}
 
 
+def test_a_finding_is_kept_with_its_joints_and_members(workspace: Workspace) -> None:
+    record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
+    with workspace.reading() as session:
+        finding = session.scalars(select(gap_schema.GapFinding)).one()
+        joints = set(session.scalars(select(gap_schema.GapFindingJoint.joint)))
+        members = session.scalars(select(gap_schema.GapFindingMember)).all()
+    assert (finding.finding_id, finding.family, finding.rank, finding.matters) == ("friction@all", "friction", 1, True)
+    assert (finding.share, finding.share_lower, finding.share_upper, finding.confidence) == (0.9, 0.8, 1.0, 0.98)
+    assert joints == {"joint_1", "joint_2"}
+    assert {(one.effect, one.cause_id, one.confidence) for one in members} == {
+        ("coulomb_friction", "coulomb_friction@all", 0.97),
+        ("stribeck_friction", "coulomb_friction@all", 0.01),
+    }
+
+
 def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
     found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     twin_id = adopt(workspace, ROBOT)
@@ -206,7 +221,7 @@ def test_a_run_apart_from_its_twin_has_energy_but_no_error(workspace: Workspace)
 def test_nothing_to_adopt_is_an_error(workspace: Workspace) -> None:
     with pytest.raises(InputError, match="no diagnosis"):
         adopt(workspace, ROBOT)
-    record(workspace, ROBOT, diagnosis(verdict="unexplained", causes=[]), NOTHING)
+    record(workspace, ROBOT, diagnosis(verdict="unexplained", findings=[], causes=[]), NOTHING)
     with pytest.raises(InputError, match="added nothing to the twin"):
         adopt(workspace, ROBOT)
 

@@ -112,6 +112,7 @@ DIAGNOSIS = Document(
     robot=NAME,
     gap=Gap(energy_error_percent=None),
     locations=(),
+    findings=(),
     causes=(),
     not_testable=(),
     shrink=NOTHING_CLOSED,

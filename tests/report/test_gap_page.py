@@ -163,6 +163,15 @@ def test_findings_stand_in_a_table_and_what_closes_little_is_folded(tmp_path: Pa
     assert "1. Viscous friction on joint_a3</h3>" in few and "2. Payload</h3>" in little.split('id="shrink"')[0]
 
 
+def test_without_a_floor_it_is_said_what_the_first_finding_closes(tmp_path: Path) -> None:
+    said = gap_cases.diagnosis("attributed")
+    said["shrink"]["closed_fraction"] = None
+    said["findings"][0]["share_of"] = "the mean square, as no floor is known"
+    page = html.unescape(page_of(tmp_path, said)).replace("\N{NO-BREAK SPACE}", " ")
+    assert "<b>93 %</b><span>closed by friction</span>" in page
+    assert "<small>of the mean square, as no floor is known, in torque</small>" in page
+
+
 def test_stretches_of_one_run_have_bars_of_their_own(tmp_path: Path) -> None:
     drawn = gap_cases.evidence("attributed")
     drawn["runs"] = [line | {"run": "work_1"} for line in drawn["runs"]]
