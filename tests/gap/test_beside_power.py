@@ -82,10 +82,10 @@ def test_power_tells_what_torque_alone_cannot(made, effect):
     changed = case(**made, changed=True)
     beside = found(changed)
     assert names(beside) == [f"{effect} changed joint_2"]
-    assert verdict_of([beside], FLOOR, DEFAULT.verdict) == ATTRIBUTED
+    assert verdict_of([beside], FLOOR, DEFAULT) == ATTRIBUTED
     alone = found(changed, power=False)
     assert {"asymmetric_friction", "torque_offset"} <= {alone.causes[0].effect, *alone.causes[0].rivals}
-    assert verdict_of([alone], FLOOR, DEFAULT.verdict) == AMBIGUOUS
+    assert verdict_of([alone], FLOOR, DEFAULT) == AMBIGUOUS
 
 
 def test_a_meter_out_of_scale_is_no_torque():

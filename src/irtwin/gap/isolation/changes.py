@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,27 +19,33 @@ def shown_before(
 ) -> frozenset[str]:
     """Return the effects among the causes that are said to have changed, but act in the reference runs as well.
 
-    Each is fitted to all runs alike, beside the other causes; equations weighted by `noise` (g,). An effect that is
-    `inside` the twin is in all runs, and only its size has changed.
+    Each is tried in all runs beside all causes, itself in the observed ones, so that the reference runs alone tell what
+    it gains there; equations weighted by `noise` (g,). An effect that is `inside` the twin is in all runs, and only its
+    size has changed.
     """
     moments = system.moments(noise)
+    chosen = [k for cause in causes for k in cause.columns]
+    weights, seen = rows(system), system.group_observed
     found = set()
     for cause in causes:
         if cause.scope != CHANGED or cause.effect in inside:
             continue
-        others = [k for other in causes if other is not cause for k in other.columns]
-        gain = gains(system, attempt(system, moments, others, [[_everywhere(system, cause)]]))[0]
-        before, now = (
-            float(np.average(gain[of], weights=rows(system)[of]))
-            for of in (~system.group_observed, system.group_observed)
-        )
-        if now > 0 and before >= limits.before * now:
+        others = [k for k in chosen if k not in cause.columns]
+        now = gains(system, attempt(system, moments, others, [[_joined(cause)]]))[0]
+        before = gains(system, attempt(system, moments, chosen, [[_everywhere(system, cause)]]))[0]
+        gained = float(np.average(now[seen], weights=weights[seen]))
+        if float(np.average(before[~seen], weights=weights[~seen])) >= limits.before * gained > 0:
             found.add(cause.effect)
     return frozenset(found)
 
 
+def _joined(cause: Cause) -> Variant:
+    """Return a cause of several joints as one variant."""
+    terms = tuple(term for variant in cause.variants for term in variant.terms)
+    return Variant(cause.variants[0].effect, tuple(cause.columns), terms)
+
+
 def _everywhere(system: System, cause: Cause) -> Variant:
     """Return a cause of observed runs with the same coefficients in all runs."""
-    columns = tuple(k - len(system.columns) if k >= system.changed else k for k in cause.columns)
-    terms = tuple(term for variant in cause.variants for term in variant.terms)
-    return Variant(cause.variants[0].effect, columns, terms)
+    one = _joined(cause)
+    return replace(one, columns=tuple(k - len(system.columns) if k >= system.changed else k for k in one.columns))
