@@ -162,7 +162,7 @@ def main(robots: int, seconds: float, on_server: bool, with_twin: bool) -> None:
         )
         graph.load_ontology()
         twin = LiveTwin(place, graph, print)
-        reader = StateReader(twin.joints, twin.names)
+        reader = StateReader(twin.robots.joints, twin.robots.names)
         with listening(0, lambda lines: feed(lines, reader, twin.receive, print)) as port:
             command = [sys.executable, __file__, "send", str(port), str(robots), str(seconds)]
             with watched_by_queries(graph, seen):

@@ -71,14 +71,14 @@ def watch(
         if performs is not None and robot is not None:
             find_plan(place, find_robot(place, robot), performs)
             receive = _performing(receive, performs)
-        reader = StateReader(twin.joints, twin.names)
+        reader = StateReader(twin.robots.joints, twin.robots.names)
 
         def take(lines: Iterable[bytes]) -> None:
             feed(lines, reader, twin.receive, refuse)
 
         if replay is not None:
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
-            after = twin.stored_until(replay.robot_id)
+            after = twin.robots.times.end(replay.robot_id)
             replay.play(_refusing(receive, refuse), done, after=after, ahead=AHEAD)
         elif rtde is not None and robot is not None:
             _follow(_arm(place, rtde, robot), receive, twin.check, refuse, done, announce)
