@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sqlalchemy import select
 
@@ -19,7 +20,8 @@ from irtwin.providers.records import ingest
 from irtwin.resources import folder as resource
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Base
+from irtwin.storage.journal import Header, Journal
+from irtwin.storage.schema import LIVE, Base
 from tests.data_sets import irtwin
 from tests.small_robots import data_set
 
@@ -188,6 +190,19 @@ def test_a_graph_in_use_is_not_repaired(workspace: Path) -> None:
         process.stdout.readline()
         assert "another process has the graph open; stop it first" in one_line(workspace, "repair")
         process.kill()
+
+
+def test_a_live_run_that_a_crash_left_is_dropped_by_its_name(workspace: Path, unreasoned: None) -> None:
+    header = Header("First.live_1", "First", 0.0, ("time", "q_joint_1"))
+    journal = Journal(workspace / LIVE, header)
+    journal.append(np.array([[1e9, 0.0], [1e9 + 1, 0.1]]))
+    drop = ("drop", "First", "--run", "live_1")
+    assert '"live_1" is being watched; stop `irtwin live` first' in one_line(workspace, *drop)
+    journal.close()
+    assert irtwin(*drop, "--workspace", workspace).status == 0
+    assert not list((workspace / LIVE).iterdir())
+    assert 'the robot has no run "live_1"; the nearest is' in one_line(workspace, *drop)
+    assert asked(workspace, NAMES).split() == ["name", "First", "Second", "arm"]
 
 
 def test_a_dropped_robot_is_forgotten(workspace: Path, unreasoned: None) -> None:

@@ -155,6 +155,9 @@ def test_the_log_stays_beside_the_data_set_and_is_judged(improved: tuple[Path, S
     page = (workspace / "reports" / "arm_2.html").read_text(encoding="utf-8")
     assert ">Rounds of improvement</h3>" in page
     assert "logged since and cut in time: again" in page
+    dropped = irtwin("drop", "arm_2", "--run", "again", "--workspace", workspace)
+    assert dropped.status == 2
+    assert 'the twin was bettered or judged by "again"; it goes with its robot' in dropped.err
 
 
 def test_the_same_data_set_again_leaves_the_better_twin(improved: tuple[Path, Said], tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from sqlalchemy import select
 from tests import small_robots, synthetic
 
 from irtwin.errors import InputError
+from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.rules import graph_of
 from irtwin.knowledge.shacl.validation import validate
@@ -149,6 +150,11 @@ def test_a_gap_that_lasts_raises_one_alarm_and_clears_it(
     assert [line.partition(":")[2].split(":")[0] for line in lines if "alarm" in line] == [
         " alarm active", " alarm cleared"
     ]  # fmt: skip
+    (why,) = explain(graph, "? irt:Alarm_Reason ?")
+    assert why.by == 'the rule "gap alarm", in SHACL'
+    assert {"irt:Excursion_Lasted", "irt:Peak_Residual", "irt:Gap_Alarm_Time"} <= {
+        one.what.split()[1] for one in why.because
+    }
     found = graph.triples(graph_of(RULE))
     reason(graph)
     assert graph.triples(graph_of(RULE)) == found  # what was raised live is what the rules conclude of the whole graph

@@ -13,12 +13,10 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
 from pyoxigraph import Quad
-from sqlalchemy import select
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -26,14 +24,12 @@ from irtwin.live import live_run
 from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State
 from irtwin.live.kept_run import energy_tables, keep, left_by_a_crash
+from irtwin.live.known_robots import KnownRobots
 from irtwin.live.shown import ShownRuns
-from irtwin.live.stored_times import StoredTimes
 from irtwin.live.watched_run import HOLE, WatchedRun
-from irtwin.providers.live_energy import KnownTwin, known_twin
-from irtwin.providers.records import find_plan
 from irtwin.storage.database import Workspace
-from irtwin.storage.journal import Header, Journal, Rows, read_journal
-from irtwin.storage.schema import LIVE, Joint, Robot
+from irtwin.storage.journal import Header, Rows, read_journal
+from irtwin.storage.schema import LIVE
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
@@ -48,7 +44,7 @@ class LiveTwin:
     """Watches the robots of a workspace; to be used as a context, whose end stores what is left.
 
     `stored`, `superseded` and `waited` (s) count what became of the states; `announce` is told what one should know.
-    `joints`: names of a robot's joints, base to flange, and `names` of the robots, by robot_id.
+    `robots`: what the workspace knows of them.
     """
 
     def __init__(
@@ -62,9 +58,7 @@ class LiveTwin:
         self._place, self._announce, self._broadcast = place, announce, broadcast
         self._folder = place.folder / LIVE
         self._shown = ShownRuns(place, graph)
-        self._twins: dict[str, KnownTwin | None] = {}
-        self._plans: dict[tuple[str, str], str] = {}  # run_id of each that was said
-        self.joints, self.names = _joints(place), _names(place)
+        self.robots = KnownRobots(place, announce)
         self.stored = self.superseded = 0
         self.waited = 0.0
         self._waiting = 0
@@ -79,7 +73,6 @@ class LiveTwin:
         self._room = threading.Condition(self._lock)
         self._over = threading.Condition(self._lock)
         self._showing = threading.Lock()  # of the graph's view of runs
-        self._times = StoredTimes(place)
         for path, header, samples in left_by_a_crash(self._folder, announce):
             self._close(path, header, samples, {}, None)
         self._refresh()
@@ -105,14 +98,14 @@ class LiveTwin:
         """
         if state.time > time.time() + AHEAD:
             raise InputError(f"{state.robot_id}: a state more than {AHEAD:g} s ahead of the clock here; not stored")
-        self._plan_of(state)
+        self.robots.plan(state)
         with self._lock:
             if self._waiting >= MOST_WAITING:
                 self._wait_for_room()
             self.check()
             if self._stop.is_set():
                 raise InputError("watching has ended; not stored")
-            if (stored := self._times.run_at(state.robot_id, state.time)) is not None:
+            if (stored := self.robots.times.run_at(state.robot_id, state.time)) is not None:
                 raise InputError(f"{state.robot_id}: the stored run {stored} covers this time; not stored again")
             run = self._runs.get(state.robot_id) or self._begin(state)
             is_next = run.is_next(state)
@@ -138,7 +131,7 @@ class LiveTwin:
         was_stale = run.health.stale_since is not None
         run.take(state)
         if was_stale and run.health.stale_since is None:
-            self._announce(f"{self.names[state.robot_id]}: the stream flows again")
+            self._announce(f"{self.robots.names[state.robot_id]}: the stream flows again")
         if self._broadcast is not None:
             self._broadcast.state(state)
         self._waiting += 1
@@ -177,36 +170,16 @@ class LiveTwin:
             thread.join()
         self.check()
 
-    def stored_until(self, robot_id: str) -> float:
-        """Return the time from which on a robot has no stored run, s since 1970; 0 where it has none at all."""
-        return self._times.end(robot_id)
-
     def check(self) -> None:
         """Raise what ended the background work, if something did."""
         if self._failure is not None:
             raise self._failure
 
     def _begin(self, state: State) -> WatchedRun:
-        robot_id, joints = state.robot_id, self.joints[state.robot_id]
-        began = datetime.fromtimestamp(state.time, UTC)
-        run_id = f"{robot_id}.{LIVE}_{began:%Y%m%dT%H%M%S%f}"
-        com = state.payload_com or (0.0, 0.0, 0.0)
-        header = Header(run_id, robot_id, state.payload or 0.0, live_run.columns(joints), com, self._plan_of(state))
-        try:
-            journal = Journal(self._folder, header)
-        except FileExistsError:
-            raise InputError(f"{robot_id}: another stream of this robot began at the same moment") from None
-        self._runs[robot_id] = WatchedRun(header, joints, journal, [0.0] * len(joints))
-        return self._runs[robot_id]
-
-    def _plan_of(self, state: State) -> str | None:
-        """Return the run_id of the plan that a state says. Raises InputError where its robot has none of that name."""
-        if state.performs is None:
-            return None
-        of = (state.robot_id, state.performs)
-        if of not in self._plans:
-            self._plans[of] = find_plan(self._place, *of).run_id
-        return self._plans[of]
+        joints = self.robots.joints[state.robot_id]
+        run = WatchedRun.begun(self._folder, state, joints, self.robots.plan(state))
+        self._runs[state.robot_id] = run
+        return run
 
     def _wait_for_room(self) -> None:
         began = time.monotonic()
@@ -236,7 +209,7 @@ class LiveTwin:
                     self._shown.show(run.header.run_id, run.shown, quads)
                     run.shown = quads
                     for line in run.alarms.news(quads):
-                        self._announce(f"{self.names[run.header.robot_id]}: {line}")
+                        self._announce(f"{self.robots.names[run.header.robot_id]}: {line}")
 
     # Energy and gap
 
@@ -256,10 +229,10 @@ class LiveTwin:
             states, run.unworked = run.unworked, []
             if run.health.look():
                 kept = "its states are stored" if run.health.frozen else "the last good state is kept"
-                self._announce(f"{self.names[robot_id]}: stale: {run.health.reason}; {kept}")
+                self._announce(f"{self.robots.names[robot_id]}: stale: {run.health.reason}; {kept}")
                 self._make_due(run)
         if states:
-            stretches = run.work_out(states, self._twin_of(robot_id))
+            stretches = run.work_out(states, self.robots.twin(robot_id))
             if self._broadcast is not None:
                 self._broadcast.stretches(robot_id, stretches)
         now = time.monotonic()
@@ -268,15 +241,6 @@ class LiveTwin:
             with self._lock:
                 run.worked_at, run.energy_tables = now, tables
                 self._make_due(run)
-
-    def _twin_of(self, robot_id: str) -> KnownTwin | None:
-        if robot_id not in self._twins:
-            try:
-                self._twins[robot_id] = known_twin(self._place, robot_id)
-            except InputError as error:
-                self._announce(f"{self.names[robot_id]}: watched without its twin: {error}")
-                self._twins[robot_id] = None
-        return self._twins[robot_id]
 
     # To storage
 
@@ -335,7 +299,7 @@ class LiveTwin:
         """Make a run of a journal, in the database and in the graph, and drop the journal."""
         if len(samples):
             with self._lock:
-                self._times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
+                self.robots.times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
             tables = keep(self._place, header, samples, {**counts, "stream_state": "ended"}, self._announce)
             self._shown.show(header.run_id, shown, self._shown.mapped(tables))
         path.unlink()
@@ -359,16 +323,3 @@ class LiveTwin:
         with self._lock:
             for condition in (self._news, self._room, self._over):
                 condition.notify_all()
-
-
-def _joints(place: Workspace) -> dict[str, list[str]]:
-    joints: dict[str, list[str]] = {}
-    with place.reading() as session:
-        for robot_id, name in session.execute(select(Joint.robot_id, Joint.name).order_by(Joint.position)):
-            joints.setdefault(robot_id, []).append(name)
-    return joints
-
-
-def _names(place: Workspace) -> dict[str, str]:
-    with place.reading() as session:
-        return {robot_id: name for robot_id, name in session.execute(select(Robot.robot_id, Robot.name))}

@@ -71,13 +71,13 @@ def watch(
         if performs is not None and robot is not None:
             find_plan(place, find_robot(place, robot), performs)
             receive = _performing(receive, performs)
-        reader = StateReader(twin.joints, twin.names)
+        reader = StateReader(twin.robots.joints, twin.robots.names)
 
         def take(lines: Iterable[bytes]) -> None:
             feed(lines, reader, twin.receive, refuse)
 
         if replay is not None:
-            start = replay.start(after=twin.stored_until(replay.robot_id), ahead=AHEAD)
+            start = replay.start(after=twin.robots.times.end(replay.robot_id), ahead=AHEAD)
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
             replay.play(_refusing(receive, refuse), done, start)
         elif rtde is not None and robot is not None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Self
 
 from pyoxigraph import Quad
 
@@ -16,6 +19,7 @@ from irtwin.live.shown import AlarmNews, ShownRuns
 from irtwin.live.stream_health import StreamHealth
 from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.journal import Header, Journal
+from irtwin.storage.schema import LIVE
 from irtwin.twin.so_far import Stretch
 
 LEAST = 0.2  # s of samples that are worked out at once
@@ -53,6 +57,22 @@ class WatchedRun:
     shown: set[Quad] | None = field(default_factory=set)
     doubted: State | None = None
     _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
+
+    @classmethod
+    def begun(cls, folder: Path, state: State, joints: Sequence[str], plan: str | None) -> Self:
+        """Begin a run and its journal in a folder with a state that is still to be taken; `plan`: its run_id.
+
+        Raises InputError where another run of the robot began at the same moment.
+        """
+        began = datetime.fromtimestamp(state.time, UTC)
+        run_id = f"{state.robot_id}.{LIVE}_{began:%Y%m%dT%H%M%S%f}"
+        com = state.payload_com or (0.0, 0.0, 0.0)
+        header = Header(run_id, state.robot_id, state.payload or 0.0, live_run.columns(joints), com, plan)
+        try:
+            journal = Journal(folder, header)
+        except FileExistsError:
+            raise InputError(f"{state.robot_id}: another stream of this robot began at the same moment") from None
+        return cls(header, joints, journal, [0.0] * len(joints))
 
     @property
     def length(self) -> float:

@@ -152,7 +152,8 @@
       ?run irt:run_of ${iri} ; a irt:Live_Run ; irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
       OPTIONAL { ?run irt:Stale_Since ?since ; irt:Stale_Reason ?why }
       OPTIONAL { ?run irt:Energy_Consumption ?energy ; irt:Energy_From ?from ; irt:Run_Power ?mean }
-      OPTIONAL { ?run irt:Energy_Error ?error } } }`;
+      OPTIONAL { ?run irt:Energy_Error ?error }
+      OPTIONAL { ?run irt:performs ?planned . ?planned irt:Run_Name ?plan OPTIONAL { ?planned irt:Planned_Energy ?expected } } } }`;
   const JOINTS = `SELECT ?label ?energy { ?taken a irt:Joint_Energy ; irt:of_Run ?RUN ; irt:of_Joint ?joint ; irt:Energy ?energy .
     ?joint irt:Joint_Name ?label ; irt:Joint_Number ?number } ORDER BY ?number`;
   const EFFECTS = `SELECT ?label (SUM(?each) AS ?energy) { ?share a irt:Energy_Share ; irt:of_Run ?RUN ; irt:of_Effect ?effect ; irt:Energy ?each .
@@ -192,7 +193,9 @@
     const [energy, unit] = run.energy === undefined ? ["–", "J"] : inJoules(Number(run.energy));
     find("energy").value = energy;
     find("energy-unit").textContent = unit;
-    find("from").textContent = run.from ? "(" + run.from + ")" : "";
+    const plan = run.plan && "plan " + run.plan + (run.expected === undefined ? "" : ": " + inJoules(Number(run.expected)).join(" "));
+    const said = [run.from, plan].filter(Boolean).join("; ");
+    find("from").textContent = said && "(" + said + ")";
     find("mean").value = run.mean === undefined ? "–" : written(Number(run.mean), 0);
     find("error").value = run.error === undefined ? "–" : written(Number(run.error), 1);
     find("lasts").value = run.lasts === undefined ? "–" : written(Number(run.lasts), 0);
