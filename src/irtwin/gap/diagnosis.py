@@ -29,7 +29,8 @@ from irtwin.gap.experiment.planned_equations import planned_equations
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
-from irtwin.gap.isolation.finding import Finding, find
+from irtwin.gap.isolation.finding import Finding, find, keeping
+from irtwin.gap.isolation.memory import standing
 from irtwin.gap.isolation.power_consistency import filtered, refuted
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.verdict import NO_GAP, beside, verdict_of
@@ -154,6 +155,7 @@ def diagnose(
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
             torque = _balanced(case, power_stack, torque, below, frozenset(unknown), seed)
+        torque = ExplainedTorque(stack, _remembering(case, torque, predicted, seed), below)
         explained.append(torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
@@ -261,7 +263,14 @@ def _power(
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
-    return explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
+    found = explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
+    return explained_power(stack, _remembering(case, found, torque, seed), torque, power_of)
+
+
+def _remembering(case: Case, explained: Explained, torque: Torque, seed: int) -> Finding:
+    """Return the finding with the causes that stand though residuals remember longer than a block of time."""
+    kept = standing(explained, case.seen, torque, case.thresholds.selection, seed)
+    return keeping(explained.finding, kept, seed)
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

@@ -120,10 +120,34 @@ def find(
         candidates += hypotheses(system.columns, system.changed, CHANGED, whole=power)
     candidates = [one for one in candidates if one.effect not in without]
     found = attribute(system, candidates, seed, case.thresholds, floor)
+    return _finding(name, places, case.observed, system, found, floor, seed)
+
+
+def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
+    """Return a finding with some of its causes alone, all fitted again."""
+    if len(causes) == len(finding.causes):
+        return finding
+    system, found = finding.system, finding.attribution
+    noise = system.residual_rms([k for cause in causes for k in cause.columns], found.noise)
+    found = replace(found, causes=tuple(causes), noise=noise)
+    kept = _finding(finding.name, finding.places, finding.observed, system, found, finding.floor, seed)
+    said = tuple(balance for cause in causes if (balance := finding.balance(cause)) is not None)
+    return replace(kept, power_balances=said)
+
+
+def _finding(
+    name: str,
+    places: tuple[str | None, ...],
+    observed: frozenset[str],
+    system: System,
+    found: Attribution,
+    floor: np.ndarray | None,
+    seed: int,
+) -> Finding:
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     parts = shares(system, found, seed)
-    return Finding(name, places, case.observed, system, found, judged, floor, _estimate(system, chosen), parts)
+    return Finding(name, places, observed, system, found, judged, floor, _estimate(system, chosen), parts)
 
 
 def _estimate(system: System, chosen: Sequence[int]) -> Estimate:
