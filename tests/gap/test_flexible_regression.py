@@ -47,7 +47,12 @@ def of(motions, tried=("stribeck_friction",)):
         {m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.admission.fewest_groups
     )
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
-    case = SimpleNamespace(effects=BASELINE, robot=ROBOT, observed=grouping.observed, thresholds=DEFAULT)
+    case = SimpleNamespace(
+        modelled=frozenset((effect, None) for effect in BASELINE),
+        robot=ROBOT,
+        observed=grouping.observed,
+        thresholds=DEFAULT,
+    )
     finding = find("torque", case, system, np.full(2, NOISE), 0)
     channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
     return finding, flexible_regression(channel, motions, 0)

@@ -31,8 +31,9 @@ from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
-from irtwin.gap.isolation.finding import Finding, Without, find
+from irtwin.gap.isolation.finding import Finding, Without, find, keeping
 from irtwin.gap.isolation.floor_left import floor_left
+from irtwin.gap.isolation.memory import standing
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.torque_scale import TorqueScale, torque_scale
@@ -176,6 +177,7 @@ def diagnose(
         if case.shows("power"):
             found = replace(found, power_balances=power_balances(case, power_stack, torque))
             torque = ExplainedTorque(stack, found, below)
+        torque = ExplainedTorque(stack, _remembering(case, torque, predicted, seed), below)
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
@@ -296,7 +298,14 @@ def _power(
     finding, _, refusals = find_possible(
         case, lambda without: (find("power", case, system, level, seed, without), floor), unknown
     )
-    return explained_power(stack, finding, torque, power_of), refusals
+    found = explained_power(stack, finding, torque, power_of)
+    return explained_power(stack, _remembering(case, found, torque, seed), torque, power_of), refusals
+
+
+def _remembering(case: Case, explained: Explained, torque: Torque, seed: int) -> Finding:
+    """Return the finding with the causes that stand though residuals remember longer than a block of time."""
+    kept = standing(explained, case.seen, torque, case.thresholds.selection, seed)
+    return keeping(explained.finding, kept, seed)
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

@@ -169,6 +169,12 @@ class Selection:
     alpha: float = _threshold(0.02, "largest p, adjusted for the catalogue", _P, "decisions/gap-bounds-of-a-cause.md")
     large_gain: float = _threshold(0.3, "gain from which `alpha_of_large` holds", _RESIDUAL, _CASES)
     alpha_of_large: float = _threshold(0.1, "largest p of a large gain", _P, "decisions/gap-bounds-of-a-cause.md")
+    alpha_where_remembered: float = _threshold(
+        0.1,
+        "largest p, adjusted for the catalogue, with blocks as alike as residuals are, where runs are few",
+        _P,
+        "decisions/gap-residuals-that-remember.md",
+    )
     least_t: float = _threshold(2.3, "least t of the gain", _ERRORS, "decisions/gap-bounds-of-a-cause.md")
     second_joint_gain: float = _threshold(
         0.5, "least gain at a second joint", "share of `least_gain`", "decisions/gap-second-joints.md"

@@ -134,10 +134,35 @@ def find(
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
     places = (None,) if name == "power" else case.robot.joint_names
     found = attributed(case, system, floor, seed, without)
+    return _finding(name, places, case.observed, system, found, floor, seed)
+
+
+def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
+    """Return a finding with some of its causes alone, all fitted again."""
+    if len(causes) == len(finding.causes):
+        return finding
+    system, found = finding.system, finding.attribution
+    noise = system.residual_rms([k for cause in causes for k in cause.columns], found.noise)
+    found = replace(found, causes=tuple(causes), noise=noise)
+    kept = _finding(finding.name, finding.places, finding.observed, system, found, finding.floor, seed)
+    said = tuple(balance for cause in causes if (balance := finding.balance(cause)) is not None)
+    return replace(kept, power_balances=said)
+
+
+def _finding(
+    name: str,
+    places: tuple[str | None, ...],
+    observed: frozenset[str],
+    system: System,
+    found: Attribution,
+    floor: np.ndarray | None,
+    seed: int,
+) -> Finding:
+    """Return the finding of an attribution: judged on groups left out, its coefficients estimated."""
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), found.noise, chosen)
     closed = closed_squares(system, found, seed)
-    return Finding(name, places, case.observed, system, found, judged, floor, estimate_of(system, chosen), closed)
+    return Finding(name, places, observed, system, found, judged, floor, estimate_of(system, chosen), closed)
 
 
 def attributed(

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.load import ExternalContact
+from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.thresholds import Contact
@@ -112,18 +113,25 @@ class _Chance:
     middle: float
     decay: float
     count: int
+    apart: float  # how many of the stretches are as if independent, by which the decay is known
 
     @classmethod
     def of(cls, runs: Sequence[_Run], clock: Clock, limits: Contact) -> _Chance:
         best = [value for run in runs for value in run.best_of_stretches(_away(run, clock))]
         logs = np.log(np.maximum(best, 1.0)) if best else np.zeros(1)
         middle, upper = np.quantile(logs, [0.5, 0.75])
-        return cls(float(middle), max(limits.decay * float(upper - middle), limits.least_decay), max(len(best), 1))
+        decay = max(limits.decay * float(upper - middle), limits.least_decay)
+        memory = float(np.median([run.memory for run in runs]))
+        apart = len(best) * min(1.0, _STRETCH / max(2 * memory, 1e-9))
+        return cls(float(middle), decay, max(len(best), 1), max(apart, 1.0))
 
     def p(self, gain: float, count: int) -> float:
-        """Return how likely chance reaches a gain in one of so many stretches."""
-        above = (np.log(max(gain, 1.0)) - self.middle) / self.decay
-        return float(-np.expm1(count * np.log1p(-min(0.5 * np.exp(-above), 0.5))))
+        """Return how likely chance reaches a gain in one of so many stretches.
+
+        Beyond the median it decays exponentially; as the decay is known by few stretches, less than that.
+        """
+        above = max((np.log(max(gain, 1.0)) - self.middle) / self.decay, 0.0)
+        return float(-np.expm1(count * np.log1p(-0.5 * (1 + above / self.apart) ** -self.apart)))
 
 
 def _away(run: _Run, clock: Clock) -> np.ndarray:
@@ -143,6 +151,7 @@ class _Run:
         self._limits = limits
         motion = left.motion
         self.name, self.label, self.time, self.observed = motion.run, left.label, motion.time, left.observed
+        self.memory = float(np.median([correlation_samples(one) for one in left.residual.T])) / motion.rate  # s
         known = np.isfinite(left.residual)
         residual = np.where(known, left.residual, 0.0) / noise
         jacobian = np.where(known[:, :, None], jacobian, 0.0) / noise[:, None]

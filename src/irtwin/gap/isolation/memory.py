@@ -1,0 +1,100 @@
+"""Whether causes stand where residuals remember and runs are few: stretches of a run are then fewer than they look.
+
+The search draws signs for blocks of time, and compares stretches of a run, as if these were independent. A cause that
+passes is judged again, with blocks as alike as what is left without it is correlated. Where each programmed motion is a
+group, runs that know nothing of each other agree on a cause, and nothing is to be judged again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.explained import Explained
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.regression.channel_equations import Torque
+from irtwin.gap.regression.correlation import correlation_samples
+from irtwin.gap.regression.cross_validation import scores
+from irtwin.gap.regression.hypotheses import Hypothesis, Variant
+from irtwin.gap.regression.residuals import as_filtered, power_traces, torque_traces
+from irtwin.gap.regression.significance import likeness, p_values
+from irtwin.gap.regression.transient import is_transient
+from irtwin.gap.thresholds import Selection
+from irtwin.signals.filter import decimation
+from irtwin.signals.motion import Motion
+
+
+def standing(
+    explained: Explained, motions: Sequence[Motion], torque: Torque, limits: Selection, seed: int
+) -> tuple[Cause, ...]:
+    """Return the causes that chance does not reach where residuals remember; `torque` as for the channel's traces.
+
+    An episode is not judged: joints agree on it, not blocks. Nor are bodies, nor what is so rare that no t tells.
+    """
+    finding = explained.finding
+    if not finding.causes or not _cut(finding):
+        return finding.causes
+    return tuple(
+        cause
+        for cause, memories in zip(finding.causes, memory(explained, motions, torque), strict=True)
+        if _stands(finding, cause, memories, limits, seed)
+    )
+
+
+def _cut(finding: Finding) -> bool:
+    """Return whether groups are stretches of runs."""
+    groups = [set(runs) for runs in finding.groups]
+    return any(one & other for k, one in enumerate(groups) for other in groups[:k])
+
+
+def _stands(finding: Finding, cause: Cause, memories: np.ndarray, limits: Selection, seed: int) -> bool:
+    system, effect = finding.system, cause.variants[0].effect
+    if cause.of_bodies or is_transient(effect) or (effect.rare and cause.t < limits.least_t):
+        return True
+    alike = likeness(system.blocks, float(memories[system.equations(cause.columns)].max()))
+    if cause.t >= limits.least_t > cause.t * _shrunk(alike, system.group):
+        return False
+    return _p(finding, cause, alike, seed) <= limits.alpha_where_remembered
+
+
+def _shrunk(alike: np.ndarray, group: np.ndarray) -> float:
+    """Return by how much a t between groups is less where groups are stretches of a run, each like the next."""
+    same = group[:, None] == group
+    return float(np.sqrt(alike[same].sum() / alike.sum()))
+
+
+def memory(explained: Explained, motions: Sequence[Motion], torque: Torque) -> list[np.ndarray]:
+    """Return, for each cause, (g,) for how long, s, what the twin and the other causes leave is correlated.
+
+    Of each equation; the median over runs, so that no odd run decides.
+    """
+    finding, stack = explained.finding, explained.stack
+    traces = (torque_traces if finding.name == "torque" else power_traces)(
+        stack, motions, lambda run: explained.values, torque
+    )
+    found: list[list[list[float]]] = [[] for _ in finding.causes]
+    for trace in traces:
+        shape = trace.residual.shape
+        parts = [as_filtered(trace.motion, explained.added(one, trace.motion)).reshape(shape) for one in finding.causes]
+        step = decimation(trace.motion.rate, trace.motion.cutoff) if trace.motion.cutoff else 1
+        for own, part in zip(found, parts, strict=True):
+            left = (trace.residual - sum(parts) + part)[::step]
+            own.append([correlation_samples(one) * step / trace.motion.rate for one in left.T])
+    return [np.asarray(np.median(own, axis=0)) for own in found]
+
+
+def _p(finding: Finding, cause: Cause, alike: np.ndarray, seed: int) -> float:
+    """Return the p-value of a cause beside the others, adjusted for the catalogue."""
+    system, noise = finding.system, finding.attribution.noise
+    others = [k for one in finding.causes if one is not cause for k in one.columns]
+    columns, terms = cause.columns, tuple(term for one in cause.variants for term in one.terms)
+    whole = Hypothesis(cause.effect, None, cause.scope, (Variant(cause.variants[0].effect, columns, terms),))
+    rest = [
+        one
+        for one in finding.attribution.hypotheses
+        if not any(set(variant.columns) & {*others, *columns} for variant in one.variants)
+    ]
+    block_scores, products = scores(system, system.moments(noise), noise, others)
+    return float(p_values(block_scores, products, [whole, *rest], seed, alike)[0])
