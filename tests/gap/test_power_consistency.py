@@ -55,6 +55,8 @@ def test_power_says_of_what_kind_a_cause_is(made, said):
     assert first["joints"] == ["joint_1"]
     assert first["evidence"]["power_says"] == said
     assert {SIDES[KNOWN[one].channel] for one in (first["effect"], *first["indistinguishable_from"])} == {said}
+    power = document["shrink"]["power_rmse"]
+    assert power["before"] > 1.2 * power["after"]  # the twin's torque was wrong, and so was what it takes
 
 
 def test_power_decides_where_its_change_is_large_and_sure():

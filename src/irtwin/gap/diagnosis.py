@@ -147,7 +147,7 @@ def diagnose(
     energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        explained.append(_power(case, power_stack, floor, torque, frozenset(unknown), seed, tell))
+        explained.append(_power(case, power_stack, floor, predicted, torque, frozenset(unknown), seed, tell))
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
     verdict = verdict_of(findings, floor, thresholds.verdict)
@@ -234,14 +234,24 @@ def _torque(
 
 
 def _power(
-    case: Case, stack: Stack, floor: Floor, torque: Torque, unknown: Set[str], seed: int, tell: Progress
+    case: Case,
+    stack: Stack,
+    floor: Floor,
+    predicted: Torque,
+    torque: Torque,
+    unknown: Set[str],
+    seed: int,
+    tell: Progress,
 ) -> Explained:
+    """Find the causes of power on the joint torque that is explained; `predicted` is that of the twin as it is."""
     power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
-    return explained_power(stack, find("power", case, system, level, seed, without=unknown), torque, power_of)
+    plain = None if torque is predicted else TwinPower(stack, case.with_power, case.grouping, predicted).system
+    found = find("power", case, system, level, seed, without=unknown, plain=plain)
+    return explained_power(stack, found, torque, power_of)
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

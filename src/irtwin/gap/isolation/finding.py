@@ -29,7 +29,8 @@ class Finding:
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `shares`: each cause's
-    part of what they close together, none where they close nothing; `power_balances`: what power says of each.
+    part of what they close together, none where they close nothing; `power_balances`: what power says of each; `plain`:
+    power's equation on the torque of the twin as it is, where `system` stands on torque that causes explain.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Finding:
     estimate: Estimate
     shares: tuple[float, ...] = ()
     power_balances: tuple[PowerBalance, ...] = ()
+    plain: System | None = None
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -76,11 +78,17 @@ class Finding:
         """(g,) mean square over the floor's, less one."""
         return None if self.floor is None else np.asarray(self.rmse**2 / self.floor**2 - 1)
 
+    @property
+    def before(self) -> System:
+        """The equations of the twin as it is."""
+        return self.plain or self.system
+
     @cached_property
     def fitted(self) -> tuple[np.ndarray, np.ndarray]:
         """(g,) RMS left in observed runs by fits to all runs: of the twin as it is, and with the causes."""
+        before = self.before
         return (
-            observed_rms(self.system, (), noise_before(self.system)),
+            observed_rms(before, (), noise_before(before)),
             observed_rms(self.system, self.chosen, self.attribution.noise),
         )
 
@@ -109,14 +117,18 @@ def find(
     floor: np.ndarray | None,
     seed: int,
     without: Set[str] = frozenset(),
+    plain: System | None = None,
 ) -> Finding:
-    """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
+    """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
+
+    `plain` as a finding's.
+    """
     places = (None,) if name == "power" else case.robot.joint_names
     found = attribute(system, hypotheses_of(case, system, without), seed, case.thresholds, floor)
     chosen = [k for cause in found.causes for k in cause.columns]
-    judged = held_out(system, noise_before(system), found.noise, chosen)
-    parts = shares(system, found, seed)
-    return Finding(name, places, case.observed, system, found, judged, floor, estimate_of(system, chosen), parts)
+    judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain)
+    parts, fitted = shares(system, found, seed), estimate_of(system, chosen)
+    return Finding(name, places, case.observed, system, found, judged, floor, fitted, parts, plain=plain)
 
 
 def hypotheses_of(case: Case, system: System, without: Set[str]) -> list[Hypothesis]:
