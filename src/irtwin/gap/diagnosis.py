@@ -32,6 +32,7 @@ from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
 from irtwin.gap.isolation.finding import Finding, find
 from irtwin.gap.isolation.floor_left import floor_left
+from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.verdict import NO_GAP, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
@@ -141,8 +142,7 @@ def diagnose(
         found, floor = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
-            found = replace(found, power_balances=power_balances(case, power_stack, torque))
-            torque = ExplainedTorque(stack, found, below)
+            torque = ExplainedTorque(stack, _weighed(found, power_balances(case, power_stack, torque)), below)
         explained.append(torque)
     energies: EnergyErrors | None = None
     if case.shows("power"):
@@ -231,6 +231,13 @@ def _torque(
     return find_beside_power(
         case, stack, both, below, predicted, floor, seed, transient=found.contact, without=unknown, tell=tell
     )
+
+
+def _weighed(found: Finding, balances: tuple[PowerBalance, ...]) -> Finding:
+    """Return what torque showed with what power says of each cause, without the rivals that it refutes."""
+    pairs = zip(found.causes, balances, strict=True)
+    causes = tuple(filtered(cause, balance, catalogue()) for cause, balance in pairs)
+    return replace(found, attribution=replace(found.attribution, causes=causes), power_balances=balances)
 
 
 def _power(
