@@ -74,8 +74,9 @@ def test_torque_in_some_runs_and_power_in_others():
     diagnosis = diagnose(data_set(grease))
     named = {(channel.name, cause.effect, cause.scope, cause.joints) for channel, cause in diagnosis.causes}
     assert named == {("torque", "viscous_friction", "changed", ("joint_1",))}
-    power = diagnosis.to_json()["gap"]["power"]
-    assert power["excess"] < 0.5  # the friction that torque showed explains it in runs without torque too
+    power = diagnosis.to_json()["shrink"]["power_rmse"]
+    assert power["before"] > 10 * power["after"]  # the friction that torque showed takes it in runs without torque too
+    assert (power["after"] / power["noise_floor"]) ** 2 - 1 < 0.5
 
 
 def test_torque_in_the_reference_runs_alone():

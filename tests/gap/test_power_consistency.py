@@ -11,7 +11,8 @@ from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.isolation.power_consistency import PowerBalance
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
@@ -55,9 +56,28 @@ def test_power_says_of_what_kind_a_cause_is(made, said):
     assert first["joints"] == ["joint_1"]
     assert first["evidence"]["power_says"] == said
     assert {SIDES[KNOWN[one].channel] for one in (first["effect"], *first["indistinguishable_from"])} == {said}
+    power = document["shrink"]["power_rmse"]
+    assert power["before"] > 1.2 * power["after"]  # the twin's torque was wrong, and so was what it takes
 
 
 def test_power_decides_where_its_change_is_large_and_sure():
     limits = DEFAULT.power_consistency
     said = [PowerBalance(*one, limits).kind for one in ((0.5, 8.0), (-0.5, -8.0), (0.5, 1.0), (0.01, 9.0))]
     assert said == ["mechanical", "sensor", None, None]
+
+
+def test_power_drops_rivals_of_the_other_kind():
+    limits = DEFAULT.power_consistency
+    mechanical, sensor, undecided = (PowerBalance(*one, limits) for one in ((0.5, 8.0), (-0.5, -8.0), (0.5, 1.0)))
+    friction = Cause(
+        "load_dependent_friction",
+        "missing",
+        ("joint_1",),
+        (),
+        1.0,
+        5.0,
+        0.001,
+        ("torque_constant_error", "stribeck_friction"),
+    )
+    assert filtered(friction, mechanical, KNOWN).rivals == ("stribeck_friction",)
+    assert filtered(friction, sensor, KNOWN) == filtered(friction, undecided, KNOWN) == friction

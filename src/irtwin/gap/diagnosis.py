@@ -34,6 +34,7 @@ from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained
 from irtwin.gap.isolation.finding import Finding, Without, find, keeping
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.memory import standing
+from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.torque_scale import TorqueScale, torque_scale
@@ -175,7 +176,7 @@ def diagnose(
         found, floor, refusals = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
         torque = ExplainedTorque(stack, found, below)
         if case.shows("power"):
-            found = replace(found, power_balances=power_balances(case, power_stack, torque))
+            found = _weighed(found, power_balances(case, power_stack, torque))
             torque = ExplainedTorque(stack, found, below)
         torque = ExplainedTorque(stack, _remembering(case, torque, predicted, seed), below)
         explained.append(torque)
@@ -183,7 +184,7 @@ def diagnose(
     energies: EnergyErrors | None = None
     if case.shows("power"):
         tell("Trying every effect on power")
-        of_power, wrong = _power(case, power_stack, floor, torque, frozenset(unknown), seed, tell)
+        of_power, wrong = _power(case, power_stack, floor, predicted, torque, frozenset(unknown), seed, tell)
         explained.append(of_power)
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
@@ -287,17 +288,35 @@ def _torque(
     return find_possible(case, alone, unknown)
 
 
+def _weighed(found: Finding, balances: tuple[PowerBalance, ...]) -> Finding:
+    """Return what torque showed with what power says of each cause, without the rivals that it refutes."""
+    pairs = zip(found.causes, balances, strict=True)
+    causes = tuple(filtered(cause, balance, catalogue()) for cause, balance in pairs)
+    return replace(found, attribution=replace(found.attribution, causes=causes), power_balances=balances)
+
+
 def _power(
-    case: Case, stack: Stack, floor: Floor, torque: Torque, unknown: Set[str], seed: int, tell: Progress
+    case: Case,
+    stack: Stack,
+    floor: Floor,
+    predicted: Torque,
+    torque: Torque,
+    unknown: Set[str],
+    seed: int,
+    tell: Progress,
 ) -> tuple[Explained, Refusals]:
+    """Find the causes of power on the joint torque that is explained; `predicted` is that of the twin as it is."""
     power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
-    finding, _, refusals = find_possible(
-        case, lambda without: (find("power", case, system, level, seed, without), floor), unknown
-    )
+    plain = None if torque is predicted else TwinPower(stack, case.with_power, case.grouping, predicted).system
+
+    def search(without: Set[Without]) -> tuple[Finding, Floor]:
+        return find("power", case, system, level, seed, without, plain), floor
+
+    finding, _, refusals = find_possible(case, search, unknown)
     found = explained_power(stack, finding, torque, power_of)
     return explained_power(stack, _remembering(case, found, torque, seed), torque, power_of), refusals
 

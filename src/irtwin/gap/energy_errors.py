@@ -37,11 +37,13 @@ class EnergyErrors:
 
 def energy_errors(finding: Finding, motions: Sequence[Motion]) -> EnergyErrors:
     """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones."""
-    system = finding.system
-    ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
     mean = {m.run: float(np.mean(m.power)) for m in motions if m.power is not None}
     errors = []
-    for columns, noise in (((), finding.rmse), (finding.chosen, finding.attribution.noise)):
+    for system, columns, noise in (
+        (finding.before, (), finding.rmse),
+        (finding.system, finding.chosen, finding.attribution.noise),
+    ):
+        ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
         moments = system.moments(noise)
         total = np.sum(moments, axis=0)
         part = []

@@ -220,7 +220,12 @@ def shrink(
 ) -> document.Shrink:
     """Return how far the gap shrinks on runs that took no part in the fit; `named`: every cause with its id."""
     changes = {finding.name: _change(finding, seed) for finding in findings}
-    with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.causes]
+    torque_too = any(finding.causes for finding in findings if finding.name == "torque")
+    with_floor = [
+        (one.held_out, one.floor)
+        for one in findings
+        if one.floor is not None and (one.causes or (torque_too and one.plain is not None))
+    ]
     closed = closed_fraction(with_floor, seed) if with_floor else None
     return document.Shrink(
         held_out_runs=tuple(runs),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from irtwin.effects.effect import Effect
+from irtwin.effects.effect import Effect, JointEffect
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
@@ -20,12 +20,16 @@ from irtwin.gap.isolation.shares import closed_squares
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
+from irtwin.gap.regression.cross_validation import attempt
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
-from irtwin.gap.regression.normal_equations import noise_before
+from irtwin.gap.regression.normal_equations import System, noise_before
 from irtwin.gap.regression.progress import Tell
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.estimators import Estimate
+from irtwin.twin.identify import power_slope
+
+_STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
 
 def find_beside_power(
@@ -46,28 +50,64 @@ def find_beside_power(
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
     `predicted` the joint torque by the twin. Where real torque was found, the search is repeated with the floor that is
-    left, and with power linear about that torque if the twin has losses that grow with its square.
+    left, and with power linear about that torque if losses, which grow with its square, make a difference; each effect
+    is then tried in its best shape only.
     """
 
-    def about(torque: Torque, power: TwinPower) -> JointEquations:
-        found = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, tell)
+    def about(torque: Torque, power: TwinPower, of_torque: Sequence[Effect]) -> JointEquations:
+        tried = (of_torque, effects[1])
+        found = joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell)
         return replace(found, whole=replace(found.whole, transient=transient))
 
-    equations = about(predicted, TwinPower(stack, case.with_power, case.grouping, predicted))
-    first = _find(case, equations, floor, seed, without)
-    if not any(cause.variants[0].effect.channel == "torque" for cause in first.causes):
+    before = TwinPower(stack, case.with_power, case.grouping, predicted)
+    equations = about(predicted, before, effects[0])
+    first, both = _find(case, equations, floor, seed, without)
+    if not any(cause.carries_power for cause in first.causes):
         return first, floor
     explained = ExplainedTorque(stack, first, below)
     power = TwinPower(stack, case.with_power, case.grouping, explained)
     left = floor_left(case, floor, explained, power)
-    if any(effect.needs == "torque" and not effect.carries_torque for effect, _ in stack.power_terms):
-        equations = about(explained, power)
+    if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * noise_before(power.system)[0]:
+        equations = about(explained, power, _best_shapes(equations.whole, both))
     elif left is floor:
         return first, floor
-    return _find(case, equations, left, seed, without), left
+    return _find(case, equations, left, seed, without)[0], left
 
 
-def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]) -> Finding:
+def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:
+    """Return by how much power, linear about the torque before, misses what it is with the torque after: RMS, W."""
+    squares, rows = 0.0, 0
+    for motion in case.with_power:
+        one, other = before[0](motion), after[0](motion)
+        slope = power_slope(stack, motion, one, before[1].values)
+        missed = after[1](motion, other)[0] - after[1](motion, one)[0] - (slope * (other - one)).sum(axis=1)
+        squares, rows = squares + float(missed @ missed), rows + len(missed)
+    return float(np.sqrt(squares / max(rows, 1)))
+
+
+def _best_shapes(system: System, found: Attribution) -> list[Effect]:
+    """Return the effects on torque, each joint's in the shape that explains most beside what was found."""
+    chosen = [k for cause in found.causes for k in cause.columns]
+    every = [one.variants for one in found.hypotheses if one.variants[0].effect.signal == "torque"]
+    best = attempt(system, system.moments(found.noise), chosen, every).best
+    variants = [variant for own in every for variant in own]
+    kept = [*(variants[k] for k in best), *(variant for cause in found.causes for variant in cause.variants)]
+    shapes: dict[tuple[int, str | None], Effect] = {}
+    for variant in kept:
+        effect, joint = variant.effect, variant.terms[0].joint
+        if effect.signal != "torque":
+            continue
+        if isinstance(effect, JointEffect) and joint is not None:
+            shapes[id(effect), joint] = effect.on(joint)
+        else:
+            shapes[id(effect), None] = effect
+    return list(shapes.values())
+
+
+def _find(
+    case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]
+) -> tuple[Finding, Attribution]:
+    """Return what both equations show of torque, and all that they show."""
     whole, torque = equations.whole, equations.torque
     n = len(torque.pattern)
     levels = [np.zeros(n) if floor.torque is None else floor.torque, [floor.power or 0.0]]
@@ -82,7 +122,7 @@ def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, withou
     used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
     fitted = Estimate(fitted.values[used], fitted.covariance[np.ix_(used, used)], fitted.noise[:n], fitted.blocks)
     names = case.robot.joint_names
-    return Finding("torque", names, case.observed, torque, found, judged, floor.torque, fitted, closed)
+    return Finding("torque", names, case.observed, torque, found, judged, floor.torque, fitted, closed), both
 
 
 def _causes_of_torque(found: Attribution) -> list[Cause]:

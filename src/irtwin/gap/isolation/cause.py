@@ -48,6 +48,11 @@ class Cause:
         return self.variants[0].effect.bodies
 
     @property
+    def carries_power(self) -> bool:
+        """Whether it is real torque."""
+        return self.variants[0].effect.channel == "torque"
+
+    @property
     def columns(self) -> tuple[int, ...]:
         """The indices of its columns."""
         return tuple(k for variant in self.variants for k in variant.columns)

@@ -19,9 +19,9 @@ def shown_before(
 ) -> frozenset[str]:
     """Return the effects among the causes that are said to have changed, but act in the reference runs as well.
 
-    Each is tried in all runs beside all causes, itself in the observed ones, so that the reference runs alone tell what
-    it gains there; equations weighted by `noise` (g,). An effect that is `inside` the twin is in all runs, and only its
-    size has changed.
+    Each is tried in all runs alike, beside the other causes; and beside itself in the observed ones too, so that the
+    reference runs alone tell what it gains there. Equations are weighted by `noise` (g,). An effect that is `inside`
+    the twin is in all runs, and only its size has changed.
     """
     moments = system.moments(noise)
     chosen = [k for cause in causes for k in cause.columns]
@@ -31,8 +31,9 @@ def shown_before(
         if cause.scope != CHANGED or cause.effect in inside:
             continue
         others = [k for k in chosen if k not in cause.columns]
+        alike = [[_everywhere(system, cause)]]
         now = gains(system, attempt(system, moments, others, [[_joined(cause)]]))[0]
-        before = gains(system, attempt(system, moments, chosen, [[_everywhere(system, cause)]]))[0]
+        before = np.minimum(*(gains(system, attempt(system, moments, beside, alike))[0] for beside in (chosen, others)))
         gained = float(np.average(now[seen], weights=weights[seen]))
         if float(np.average(before[~seen], weights=weights[~seen])) >= limits.before * gained > 0:
             found.add(cause.effect)

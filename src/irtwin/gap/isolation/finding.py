@@ -35,7 +35,8 @@ class Finding:
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
     each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
-    of each; `part`: theirs of all that is closed, beside what does not repeat.
+    of each; `part`: theirs of all that is closed, beside what does not repeat; `plain`: power's equation on the torque
+    of the twin as it is, where `system` stands on torque that causes explain.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Finding:
     closed_squares: np.ndarray
     power_balances: tuple[PowerBalance, ...] = ()
     part: float = 1.0
+    plain: System | None = None
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -97,11 +99,17 @@ class Finding:
         """(g,) mean square over the floor's, less one."""
         return None if self.floor is None else np.asarray(self.rmse**2 / self.floor**2 - 1)
 
+    @property
+    def before(self) -> System:
+        """The equations of the twin as it is."""
+        return self.plain or self.system
+
     @cached_property
     def fitted(self) -> tuple[np.ndarray, np.ndarray]:
         """(g,) RMS left in observed runs by fits to all runs: of the twin as it is, and with the causes."""
+        before = self.before
         return (
-            observed_rms(self.system, (), noise_before(self.system)),
+            observed_rms(before, (), noise_before(before)),
             observed_rms(self.system, self.chosen, self.attribution.noise),
         )
 
@@ -130,11 +138,15 @@ def find(
     floor: np.ndarray | None,
     seed: int,
     without: Set[Without] = frozenset(),
+    plain: System | None = None,
 ) -> Finding:
-    """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS."""
+    """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
+
+    `plain` as a finding's.
+    """
     places = (None,) if name == "power" else case.robot.joint_names
     found = attributed(case, system, floor, seed, without)
-    return _finding(name, places, case.observed, system, found, floor, seed)
+    return _finding(name, places, case.observed, system, found, floor, seed, plain)
 
 
 def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
@@ -144,7 +156,7 @@ def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
     system, found = finding.system, finding.attribution
     noise = system.residual_rms([k for cause in causes for k in cause.columns], found.noise)
     found = replace(found, causes=tuple(causes), noise=noise)
-    kept = _finding(finding.name, finding.places, finding.observed, system, found, finding.floor, seed)
+    kept = _finding(finding.name, finding.places, finding.observed, system, found, finding.floor, seed, finding.plain)
     said = tuple(balance for cause in causes if (balance := finding.balance(cause)) is not None)
     return replace(kept, power_balances=said)
 
@@ -157,12 +169,13 @@ def _finding(
     found: Attribution,
     floor: np.ndarray | None,
     seed: int,
+    plain: System | None,
 ) -> Finding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated."""
     chosen = [k for cause in found.causes for k in cause.columns]
-    judged = held_out(system, noise_before(system), found.noise, chosen)
-    closed = closed_squares(system, found, seed)
-    return Finding(name, places, observed, system, found, judged, floor, estimate_of(system, chosen), closed)
+    judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain)
+    closed, fitted = closed_squares(system, found, seed), estimate_of(system, chosen)
+    return Finding(name, places, observed, system, found, judged, floor, fitted, closed, plain=plain)
 
 
 def attributed(

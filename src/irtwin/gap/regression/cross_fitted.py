@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import Torque, power_system
@@ -52,7 +53,7 @@ class LeftOut:
 class TwinPower:
     """The power that the twin predicts for a run, (N,) W, and the part that its axes take.
 
-    `values` (L,): its coefficients of power; `system`: the equation that they were fitted to.
+    `values` (L,): its coefficients of power; `system`: the equation that they were fitted to, with a column of ones.
     """
 
     def __init__(self, stack: Stack, motions: Sequence[Motion], grouping: Grouping, torque: Torque):
@@ -62,7 +63,8 @@ class TwinPower:
             return np.zeros(len(torque)), np.zeros(len(torque))
 
         self._stack = stack
-        self.system = power_system(stack, motions, grouping, (), torque, none)
+        ones = [effect for effect in catalogue().values() if effect.drawn_at_rest]
+        self.system = power_system(stack, motions, grouping, ones, torque, none)
         self.values = np.array([term.expected for _, term in stack.power_terms], dtype=float)
         total = np.sum(self.system.moments(noise_before(self.system)), axis=0)
         self.values[~stack.fixed] = twin_values(self.system, self.system.solution((), total))

@@ -26,14 +26,18 @@ class HeldOut:
         return np.asarray(np.sqrt(squares.sum(axis=0) / np.maximum(self.rows.sum(axis=0), 1)))
 
 
-def held_out(system: System, noise: np.ndarray, noise_after: np.ndarray, chosen: Sequence[int]) -> HeldOut:
+def held_out(
+    system: System, noise: np.ndarray, noise_after: np.ndarray, chosen: Sequence[int], plain: System | None = None
+) -> HeldOut:
     """Refit everything without each observed group in turn, with the chosen columns and without them.
 
-    Equations are weighted by what each model leaves, `noise` and `noise_after` (g,).
+    Equations are weighted by what each model leaves, `noise` and `noise_after` (g,). `plain`: those of the same groups
+    before anything was added, if others.
     """
     judged = np.flatnonzero(system.group_observed)
-    before = _left_out(system, system.moments(noise), (), judged)
-    after = _left_out(system, system.moments(noise_after), chosen, judged) if len(chosen) else before
+    before = _left_out(plain or system, (plain or system).moments(noise), (), judged)
+    anything = len(chosen) > 0 or plain is not None
+    after = _left_out(system, system.moments(noise_after), chosen, judged) if anything else before
     return HeldOut(before, after, system.rows[judged])
 
 

@@ -154,9 +154,17 @@ class System:
             for equation in range(len(self.pattern)):
                 factors = [self.factor(int(block), equation) for block in blocks]
                 stacked = np.concatenate([factor for factor, _ in factors])
-                own.append((np.append(factors[0][1], self._size), stacked.T @ stacked))
+                own.append(self._spread(np.append(factors[0][1], self._size), stacked.T @ stacked))
             found.append(own)
         return found
+
+    def _spread(self, places: np.ndarray, products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the products with zeros for what an equation lacks, if it has most columns: these add up faster."""
+        if 2 * len(places) < self._size:
+            return places, products
+        found = np.zeros((self._size + 1, self._size + 1))
+        found[np.ix_(places, places)] = products
+        return np.arange(self._size + 1), found
 
     def moments(self, noise: np.ndarray) -> list[np.ndarray]:
         """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,).
@@ -175,7 +183,10 @@ class System:
         total = np.zeros((self._size + 1, self._size + 1))
         for group in groups:
             for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
-                total[np.ix_(places, places)] += products / float(level) ** 2
+                if len(places) == len(total):
+                    total += products / float(level) ** 2
+                else:
+                    total[np.ix_(places, places)] += products / float(level) ** 2
         return total
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
