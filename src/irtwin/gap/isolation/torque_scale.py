@@ -23,7 +23,7 @@ from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 
 STATED, SIMULATED, SENSOR, ASSUMED = "stated", "simulated", "sensor", "assumed"
-_SENSOR = re.compile(r"\bsensors?\b", re.IGNORECASE)
+_SENSOR = re.compile(r"\b(?:sensors?|link-side)\b", re.IGNORECASE)
 _FORCES = re.compile(r"\b(?:kg|N)\b")
 _POWER_OF = re.compile(r"\)\^(\d+)$")
 _LOSSES = (  # of joint torques and speeds, (N, n) each
