@@ -80,6 +80,9 @@ def scale(**changes):
 def test_where_the_uncertainty_comes_from():
     assert scale().source == "assumed"
     assert (scale(notes={"torque": "joint torque sensor"}).uncertainty, scale(simulated=True).uncertainty) == (0.02, 0)
+    assert scale(notes={"torque": "link-side joint torque"}).source == "sensor"
+    assert scale(notes={"torque": "motor torque times gear ratio"}).source == "assumed"
+    assert scale(simulated=True).why == "The scale of torque is exact: a simulator made it"
     stated = scale(torque_scale_uncertainty=0.05, notes={"torque": "joint torque sensor"})
     assert (stated.source, stated.uncertainty) == ("stated", 0.05)
 

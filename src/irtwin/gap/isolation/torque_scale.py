@@ -23,7 +23,7 @@ from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 
 STATED, SIMULATED, SENSOR, ASSUMED = "stated", "simulated", "sensor", "assumed"
-_SENSOR = re.compile(r"\bsensors?\b", re.IGNORECASE)
+_SENSOR = re.compile(r"\b(?:sensors?|link-side)\b", re.IGNORECASE)
 _FORCES = re.compile(r"\b(?:kg|N)\b")
 _POWER_OF = re.compile(r"\)\^(\d+)$")
 _LOSSES = (  # of joint torques and speeds, (N, n) each
@@ -94,12 +94,12 @@ def _stated(data_set: DataSet, limits: ScaleOfTorque) -> TorqueScale:
     if data_set.torque_scale_uncertainty is not None:
         share, source, why = data_set.torque_scale_uncertainty, STATED, "the data set states it"
     elif data_set.simulated:
-        share, source, why = 0.0, SIMULATED, "simulated torque is exact"
+        share, source, why = 0.0, SIMULATED, "a simulator made it"
     elif isinstance(note, str) and _SENSOR.search(note):
         share, source, why = limits.sensor, SENSOR, "a sensor measured torque"
     else:
         share, source, why = limits.assumed, ASSUMED, "torque of drives comes from nominal constants"
-    words = f"The scale of torque is uncertain by {100 * share:.3g} %: {why}"
+    words = f"The scale of torque is {f'uncertain by {100 * share:.3g} %' if share else 'exact'}: {why}"
     return TorqueScale(share, source, 1 / (1 + share), 1 / (1 - share), words)
 
 
