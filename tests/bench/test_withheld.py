@@ -91,22 +91,22 @@ def test_the_page_says_what_came_first_what_was_missed_and_how_often_shams_are_b
         "ur10",
         tuple(gap_cases.JOINTS),
         Answer(gap_cases.diagnosis("no_gap"), 1.0),
-        {"stribeck_friction": shown, "coulomb_friction": shown},
-        {"stribeck_friction": ("joint_a3", "joint_a4"), "coulomb_friction": ("joint_a1",)},
+        {"viscous_friction": shown, "coulomb_friction": shown},
+        {"viscous_friction": ("joint_a3", "joint_a4"), "coulomb_friction": ("joint_a1",)},
         Adopted(
             Answer(gap_cases.diagnosis("no_gap"), 1.0),
-            {"stribeck_friction": shown, "coulomb_friction": shown},
-            {"stribeck_friction": ("joint_a3",), "coulomb_friction": ("joint_a1",)},
+            {"viscous_friction": shown, "coulomb_friction": shown},
+            {"viscous_friction": ("joint_a3",), "coulomb_friction": ("joint_a1",)},
         ),
         {"default twin": [[], ["payload"], []]},
     )
     text = page([robot], ["ur3_power"], "python bench/withheld.py DATA_FOLDER")
     assert "Of 2 effects withheld, the one withheld is the first cause in 1" in text
-    assert "| ur10 | stribeck_friction | attributed | cause 1 | cause 1 | 1 of 2 | joint_a4 | - | 0.96 | none |" in text
+    assert "| ur10 | viscous_friction | attributed | cause 1 | cause 1 | 1 of 2 | joint_a4 | - | 0.70 | none |" in text
     assert "| ur10 | coulomb_friction | attributed | not named |" in text
     assert "| the default twin | 1 of 2 | 2 of 2 | 0 of 2 |" in text
     assert "| the adopted twin | 1 of 2 | 2 of 2 | 1 of 2 |" in text
-    assert "| ur10 | stribeck_friction | cause 1 | stribeck_friction (friction) | 1 of 2 | cause 1 |" in text
+    assert "| ur10 | viscous_friction | cause 1 | viscous_friction (friction) | 1 of 2 | cause 1 |" in text
     assert "with the adopted twin as it is: ur10 no_gap." in text
     assert "| ur10 | default twin | 3 | 1 (33 %) | 6 to 79 % | payload 1 |" in text
     assert "not run yet: ur3_power" in text

@@ -74,8 +74,8 @@ def individuals() -> str:
     for scope, matters in (("missing", "true"), ("missing", "false"), ("changed", "false")):
         lines.append(
             f":{scope}_{matters} a irt:Gap_Cause ; irt:cause_of :d_arm ; irt:caused_by_Effect effect:payload ; "
-            f"irt:has_Scope scope:{scope} . :m_{scope}_{matters} irt:member_by_Cause :{scope}_{matters} ; "
-            f"irt:member_of_Finding :f_{scope}_{matters} . :f_{scope}_{matters} irt:Matters {matters} ."
+            f"irt:has_Scope scope:{scope} ; irt:part_of_Finding :f_{scope}_{matters} . "
+            f":f_{scope}_{matters} irt:Matters {matters} ."
         )
     for number, (verdict, closed, saved) in enumerate(VERDICTS):
         lines.append(f":v{number} a irt:Gap_Diagnosis ; irt:diagnosis_of :arm ; irt:has_Verdict verdict:{verdict} .")

@@ -30,7 +30,7 @@ def told(answers: Answers) -> list[Finding]:
 
 def matters(cause: str, answers: Answers) -> bool:
     """Return whether a cause (its IRI) is of a finding that matters."""
-    of = [one["finding"] for one in answers["finding_members"].rows if one["cause"] == cause]
+    of = {one["finding"] for one in answers["finding_members"].rows if one["cause"] == cause}
     return any(row["matters"] for row in answers["findings"].rows if row["finding"] in of)
 
 
