@@ -82,7 +82,10 @@ def _height(pairs: Sequence[Watched], width: float, limits: NotRepeating) -> flo
     if len(heights) < 2:
         return None
     level = float(np.median(heights))
-    return level if np.mean(np.abs(heights - level) <= limits.alike * level) >= 1 - limits.alike else None
+    off = np.minimum(
+        np.abs(heights - level), np.abs(heights - 2 * level)
+    )  # twice: on in one as it goes off in the other
+    return level if np.mean(off <= limits.alike * level) >= limits.fewest_alike else None
 
 
 def _followed(
