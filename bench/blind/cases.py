@@ -38,6 +38,7 @@ SEEDS = {
     "development_3": 13_000_000,
     "development_4": 19_000_000,
     "test": 25_000_000,
+    "test_2": 31_000_000,
 }
 LEVELS = (0.1, 0.3, 1.0, 3.0)
 SECONDS = 8.0
