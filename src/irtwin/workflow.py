@@ -28,6 +28,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
 from irtwin.knowledge.vocabulary import shorten
 from irtwin.next_experiment import motion_text, next_experiment, save_motion
+from irtwin.providers.effects_of_ontology import check_effects
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.mesh_files import meshes_of_graph
@@ -255,6 +256,7 @@ def populate_apart(apart: Workspace, announce: Announce) -> None:
     """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
     with KnowledgeGraph(workspace=apart.folder) as graph:
         graph.load_ontology()
+        check_effects(graph)
         map_rows(apart, graph)
         populate(apart, graph, lambda: map_rows(apart, graph), announce)
 
@@ -269,7 +271,8 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
 
 
 def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) -> None:
-    """Reason over the graph and check its constraints; say what was found."""
+    """Reason over the graph and check its constraints; say what was found. InputError as `check_effects` has it."""
+    check_effects(graph)
     announce("Reasoning")
     inferred = reason(graph, engine)
     by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"

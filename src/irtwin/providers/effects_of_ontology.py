@@ -1,0 +1,25 @@
+"""The effects that are installed and those that the ontology describes are the same."""
+
+from __future__ import annotations
+
+from irtwin.effects.catalogue import catalogue
+from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import EFFECT
+
+_DESCRIBED = "SELECT ?effect { ?effect a irt:Effect ; rdfs:label ?label ; irt:has_Channel ?channel }"
+
+
+def check_effects(graph: KnowledgeGraph) -> None:
+    """Raise InputError where an effect is installed or described alone: answers would lose its energy unsaid."""
+    described = {str(row["effect"]).removeprefix(EFFECT) for row in graph.query(_DESCRIBED)}
+    if alone := sorted(catalogue().keys() - described):
+        raise InputError(
+            f'ontology/effects.ttl: lacks the effect "{alone[0]}", which is installed; without it, answers would lose '
+            f"its energy: describe <{EFFECT}{alone[0]}> as an irt:Effect with label and channel"
+        )
+    if alone := sorted(described - catalogue().keys()):
+        raise InputError(
+            f'ontology/effects.ttl: describes the effect "{alone[0]}", which is not installed; install its package, or '
+            "take it out"
+        )
