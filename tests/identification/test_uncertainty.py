@@ -13,7 +13,7 @@ def found(columns, measured, values, spread, count=25):
     rows = np.column_stack([columns, measured])
     blocks = [Block("run", 0, 1, np.array([len(part)]), (triangle(part),)) for part in np.array_split(rows, count)]
     noise = np.array([1.0])
-    return covariance(blocks, PATTERN, [triangle(rows)], values, noise, spread)
+    return covariance(blocks, PATTERN, [triangle(rows)], values, noise, spread, np.eye(len(spread)))
 
 
 def test_independent_noise_gives_the_textbook_covariance():
