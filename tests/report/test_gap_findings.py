@@ -25,7 +25,7 @@ def finding(family: str = "friction", **changes: Any) -> Finding:
     return Finding(family=family, **(known | changes))
 
 
-def said(verdict: str, *findings: Finding, where: str = "", closes: str = "") -> str:
+def said(verdict: str, *findings: Finding, where: str = "", closes: str | None = "") -> str:
     return sentence(verdict, findings, where, closes).replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -51,6 +51,17 @@ def test_the_family_is_said_before_its_effects() -> None:
 def test_a_finding_is_set_against_the_runs_that_lack_it(against: str, claim: str) -> None:
     one = finding("load", joints=(), against=against, confidence=0.94, members=((("payload", 0.94),),))
     assert said("attributed", one) == f"Load {claim}: payload (94 %)."
+
+
+def test_where_nothing_is_known_of_the_whole_the_first_finding_says_what_it_closes() -> None:
+    told = said("attributed", finding(), finding("sensing", share=0.2), closes=None)
+    assert told.endswith(
+        "The first of these closes 44 % of the gap in torque on held-out runs (95 % interval 38 % to 50 %)."
+    )
+    alone = said("attributed", finding(of="the mean square, as no floor is known"), closes=None)
+    assert alone.endswith(
+        "That closes 44 % of the mean square of torque on held-out runs (95 % interval 38 % to 50 %)."
+    )
 
 
 def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> None:

@@ -173,7 +173,8 @@ class NotRepeating:
             for one in self.channels
             if one.floor is not None and (one.causes or self._of(one.name))
         ]
-        closed = closed_fraction(closing, seed) if closing else None
+        known = all(one.floor is not None for one in self.channels if one.causes)
+        closed = closed_fraction(closing, seed) if closing and known else None
         fraction = closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1]))
         return replace(shrink, closed_fraction=fraction, by_cause=(*shrink.by_cause, *self._by_cause()))
 

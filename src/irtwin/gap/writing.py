@@ -218,7 +218,10 @@ def shrink(
     yardstick: Mapping[str, Closeable],
     seed: int,
 ) -> document.Shrink:
-    """Return how far the gap shrinks on runs that took no part in the fit; `named`: every cause with its id."""
+    """Return how far the gap shrinks on runs that took no part in the fit; `named`: every cause with its id.
+
+    What is closed of it together is left out where causes act in a channel whose floor nobody knows.
+    """
     changes = {finding.name: _change(finding, seed) for finding in findings}
     torque_too = any(finding.causes for finding in findings if finding.name == "torque")
     with_floor = [
@@ -226,7 +229,8 @@ def shrink(
         for one in findings
         if one.floor is not None and (one.causes or (torque_too and one.plain is not None))
     ]
-    closed = closed_fraction(with_floor, seed) if with_floor else None
+    known = all(one.floor is not None for one in findings if one.causes)
+    closed = closed_fraction(with_floor, seed) if with_floor and known else None
     return document.Shrink(
         held_out_runs=tuple(runs),
         noise_floor_from=floor.source,

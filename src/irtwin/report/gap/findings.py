@@ -65,8 +65,11 @@ _CLAIMS = {
 }
 
 
-def sentence(verdict: str, findings: Sequence[Finding], where: str, closes: str) -> str:
-    """Return the verdict in plain words; `where` the gap lies, and how much of it `closes`, may be empty."""
+def sentence(verdict: str, findings: Sequence[Finding], where: str, closes: str | None) -> str:
+    """Return the verdict in plain words; `where` the gap lies may be empty.
+
+    closes: how much of it is closed; None: unknown of the whole, and said of the first finding.
+    """
     if verdict == "no_gap":
         if not findings:
             return "There is no gap: the twin explains the data down to the noise floor."
@@ -80,7 +83,19 @@ def sentence(verdict: str, findings: Sequence[Finding], where: str, closes: str)
     if verdict == "unexplained":
         part = f" Part of it is closed: {said}." if said else ""
         return f"There is a gap{where}, and no effect in the catalogue closes it.{part}{beside}"
+    if closes is None:
+        closes = "".join(_closes(one, len(told)) for one in told[:1])
     return f"{said[:1].upper()}{said[1:]}.{closes}{beside}"
+
+
+def _closes(one: Finding, count: int) -> str:
+    """Say what the first of so many findings closes by itself."""
+    what = "That" if count == 1 else "The first of these"
+    ends = " to ".join(map(wording.share, one.interval))
+    of = "gap in" if one.of.startswith("the gap") else "mean square of"
+    return (
+        f" {what} closes {wording.share(one.share)} of the {of} {one.channel} on held-out runs (95 % interval {ends})."
+    )
 
 
 def folded(count: int, channel: str, share: float) -> str:

@@ -17,7 +17,7 @@ def line(diagnosis: Document, against: str | None) -> str:
         diagnosis.verdict,
         told,
         "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime)),
-        "" if closed is None else closes(closed.value, closed.interval95),
+        None if closed is None else closes(closed.value, closed.interval95),
     )
     return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
 

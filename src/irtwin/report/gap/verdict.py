@@ -19,7 +19,7 @@ def sentence(answers: Answers) -> str:
         verdict,
         told(answers),
         "" if place is None else where(place["channel"], place["joint"], place["regime"]),
-        "" if closed is None else closes(closed["closed"], ends),
+        None if closed is None else closes(closed["closed"], ends),
     )
 
 
