@@ -228,9 +228,9 @@ def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], befo
     """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
     try:
         return _infer(ontology, premises, before)
-    except Contradiction:
+    except Contradiction as clash:
         common, of_parts = parts.groups(ontology, premises)
-        bad = _contradictory(ontology, common, of_parts, before)
+        bad = _contradictory(ontology, common, of_parts, before, clash)
         found = _infer(ontology, premises.difference(*(part for part, _ in bad)), before)
         said = ((robot, reason) for part, reason in bad for robot in parts.robots(ontology, part))
         found.made_by = {Triple(robot, _CONTRADICTION, Literal(reason)) for robot, reason in said}
@@ -238,22 +238,20 @@ def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], befo
 
 
 def _contradictory(
-    ontology: Ontology, common: set[Triple], of_parts: list[set[Triple]], before: set[Quad]
+    ontology: Ontology, common: set[Triple], of_parts: list[set[Triple]], before: set[Quad], clash: Contradiction
 ) -> list[tuple[set[Triple], str]]:
-    """Return the parts that contradict themselves, and how, by halves: most do not."""
-    try:
-        _infer(ontology, common.union(*of_parts), before)
-    except Contradiction as clash:
-        if not of_parts:
-            raise
-        if len(of_parts) == 1:
-            return [(of_parts[0], str(clash))]
-        half = len(of_parts) // 2
-        return [
-            *_contradictory(ontology, common, of_parts[:half], before),
-            *_contradictory(ontology, common, of_parts[half:], before),
-        ]
-    return []
+    """Return which of the parts, that show a `clash` together, contradict themselves, and how: by halves."""
+    if not of_parts:
+        raise clash
+    if len(of_parts) == 1:
+        return [(of_parts[0], str(clash))]
+    found, half = [], len(of_parts) // 2
+    for some in (of_parts[:half], of_parts[half:]):
+        try:
+            _infer(ontology, common.union(*some), before)
+        except Contradiction as own:
+            found += _contradictory(ontology, common, some, before, own)
+    return found
 
 
 def _infer_by(engine: str, ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
