@@ -45,8 +45,9 @@ WRITTEN = (
 )
 LONGEST_LINE = 2000  # characters of an error
 _STEP = re.compile(  # what a command says while it works, and of the log
-    r"^\s*\d+\.\d s  |^\s*\d+ s  step |^  |^\w+ \((cure first|doubtful|mended)\): "
+    r"^\s*\d+\.\d s  |^\s*\d+ s  step |^  |^\w[\w ]* \((cure first|doubtful|mended)\): "
 )
+_CURE = re.compile(r"^\w[\w ]* \(cure first\): ", re.M)  # all that `check` says where it refuses a log
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
 
 
@@ -264,9 +265,9 @@ def fault_of(done: Done, writes: list[Path]) -> str | None:
         return re.sub(r"^.*/(src|site-packages)/", "", found[0])[:200]
     if done.status:
         lines = [line for line in done.err.splitlines() if line.strip() and not _STEP.match(line)]
-        if len(lines) != 1:
+        if len(lines) != 1 and (lines or not _CURE.search(done.err)):
             return f"{len(lines)} lines of error"
-        if len(lines[0]) > LONGEST_LINE:
+        if max(map(len, lines), default=0) > LONGEST_LINE:
             return "an error of many characters"
         return next((f"{file.name} written beside an error" for file in writes if file.exists()), None)
     return next((f"{file.name} is not whole" for file in writes if not _whole(file)), None)

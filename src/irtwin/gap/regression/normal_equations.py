@@ -147,6 +147,7 @@ class System:
     @cached_property
     def _products(self) -> list[list[tuple[np.ndarray, np.ndarray]]]:
         """Per group and equation: the indices of its columns, the measurement's (D) last, and their products."""
+        self._fits_in_memory()
         found = []
         for group in range(self.groups):
             blocks = np.flatnonzero(self.group == group)
@@ -157,6 +158,15 @@ class System:
                 own.append(self._spread(np.append(factors[0][1], self._size), stacked.T @ stacked))
             found.append(own)
         return found
+
+    def _fits_in_memory(self) -> None:
+        """Refuse what would take too much, before any is taken."""
+        size = 8 * self.groups * (self._size + 1) ** 2
+        if size > _MOST_BYTES:
+            raise InputError(
+                f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {2 * size / 1e9:.1f} GB of "
+                f"memory, and {2 * _MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
+            )
 
     def _spread(self, places: np.ndarray, products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the products with zeros for what an equation lacks, if it has most columns: these add up faster."""
@@ -171,12 +181,6 @@ class System:
 
         Raises InputError where they would take too much memory.
         """
-        size = 8 * self.groups * (self._size + 1) ** 2
-        if size > _MOST_BYTES:
-            raise InputError(
-                f"trying every effect on {len(self.pattern)} joints takes {2 * size / 1e9:.1f} GB of memory, and "
-                f"{2 * _MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
-            )
         return [self._weighted([group], noise) for group in range(self.groups)]
 
     def _weighted(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> np.ndarray:
