@@ -164,8 +164,8 @@ class System:
         size = 8 * self.groups * (self._size + 1) ** 2
         if size > _MOST_BYTES:
             raise InputError(
-                f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {2 * size / 1e9:.1f} GB of "
-                f"memory, and {2 * _MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
+                f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {2 * size / 1e9:.1f} GB "
+                f"of memory, and {2 * _MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
             )
 
     def _spread(self, places: np.ndarray, products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
