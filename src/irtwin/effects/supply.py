@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate
 from typing import ClassVar
 
 import numpy as np
@@ -88,10 +87,25 @@ class BusCapacitor(Effect):
         """Return (N, 1) the flow into the store, over E."""
         assert predicted is not None and predicted.axes is not None
         step = 1 / motion.rate
-        given = (-step * predicted.axes).tolist()
-        stored = accumulate(given, lambda before, more: min(max(before + more, 0.0), self.E), initial=0.0)
-        flow = np.diff(np.fromiter(stored, dtype=float, count=len(given) + 1)) / step
+        stored = _kept_between(-step * predicted.axes, self.E)
+        flow = np.diff(stored, prepend=0.0) / step
         return flow[:, None] / self.E
+
+
+def _kept_between(given: np.ndarray, most: float) -> np.ndarray:
+    """Return (N,) what a store of `most` holds after each of N gifts, from empty on: x -> min(max(x + given, 0), most).
+
+    Maps of the form x -> clip(x + a, low, high) compose to one of that form, so all are joined by doubling.
+    """
+    added, low, high = given.copy(), np.zeros_like(given), np.full_like(given, most)
+    reach = 1
+    while reach < len(given):
+        mine, lowest, highest = added[reach:], low[reach:], high[reach:]
+        joined = (np.clip(ends[:-reach] + mine, lowest, highest) for ends in (low, high))
+        low[reach:], high[reach:] = joined
+        added[reach:] = added[:-reach] + mine
+        reach *= 2
+    return np.clip(added, low, high)
 
 
 @dataclass(frozen=True)

@@ -181,17 +181,30 @@ class System:
 
         Raises InputError where they would take too much memory.
         """
-        return [self._weighted([group], noise) for group in range(self.groups)]
+        return [self._weighted(group, noise) for group in range(self.groups)]
 
-    def _weighted(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> np.ndarray:
+    def _weighted(self, group: int, noise: np.ndarray) -> np.ndarray:
         total = np.zeros((self._size + 1, self._size + 1))
+        for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
+            if len(places) == len(total):
+                total += products / float(level) ** 2
+            else:
+                total[np.ix_(places, places)] += products / float(level) ** 2
+        return total
+
+    def _weighted_among(
+        self, inside: np.ndarray, groups: Sequence[int] | np.ndarray, noise: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the products among `inside` columns (k, k), and with the measurement (k,), over some groups."""
+        position = np.full(self._size + 1, -1)
+        position[[*inside, self._size]] = np.arange(len(inside) + 1)
+        total = np.zeros((len(inside) + 1, len(inside) + 1))
         for group in groups:
             for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
-                if len(places) == len(total):
-                    total += products / float(level) ** 2
-                else:
-                    total[np.ix_(places, places)] += products / float(level) ** 2
-        return total
+                here = np.flatnonzero(position[places] >= 0)
+                there = position[places[here]]
+                total[np.ix_(there, there)] += products[np.ix_(here, here)] / float(level) ** 2
+        return total[:-1, :-1], total[:-1, -1]
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
         """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.
@@ -210,15 +223,22 @@ class System:
         of: Sequence[int] | np.ndarray,
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
-        vector = self.solution(chosen, self._weighted(fitted, noise))
+        inside = self._inside(chosen)
+        vector = self._solved(inside, *self._weighted_among(inside, fitted, noise))
         squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
         return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
     def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
-        inside = np.append(np.arange(self.base), np.array(chosen, dtype=int))
+        inside = self._inside(chosen)
+        return self._solved(inside, total[np.ix_(inside, inside)], total[inside, -1])
+
+    def _inside(self, chosen: Sequence[int]) -> np.ndarray:
+        return np.append(np.arange(self.base), np.array(chosen, dtype=int))
+
+    def _solved(self, inside: np.ndarray, among: np.ndarray, right: np.ndarray) -> np.ndarray:
         vector = np.zeros(self._size)
-        vector[inside] = solved(factored(total[np.ix_(inside, inside)], self.prior(chosen)), total[inside, -1])
+        vector[inside] = solved(factored(among, self.prior(inside[self.base :])), right)
         return vector
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
