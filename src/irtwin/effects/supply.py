@@ -105,7 +105,7 @@ def _kept_between(given: np.ndarray, most: float) -> np.ndarray:
         low[reach:], high[reach:] = joined
         added[reach:] = added[:-reach] + mine
         reach *= 2
-    return np.clip(added, low, high)
+    return np.asarray(np.clip(added, low, high))
 
 
 @dataclass(frozen=True)
