@@ -16,11 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.effects.catalogue import catalogue
+
 ENOUGH = 0.8  # floors, what still counts as a gap of 1
 ABSTAIN = {"unexplained", "no_gap"}
 # aims of the project: score, at least (or at most) what
 AIMS = {
     "right effect first": ">= 95 %",
+    "family of the first finding right": ">= 99 %",
     "truth in the class": ">= 98 %",
     "class size": "<= 2",
     "joint right": ">= 97 %",
@@ -69,6 +72,7 @@ def judge(diagnosis: dict[str, Any], label: dict[str, Any]) -> dict[str, float]:
         return scores
     scores |= {
         "right effect first": float(right),
+        "family of the first finding right": float(_family_first(diagnosis, truth["effect"])),
         "truth in the class": float(first is not None and truth["effect"] in family(first)),
         "any cause names it": float(any(truth["effect"] in family(cause) for cause in causes)),
         "silent": float(first is None),
@@ -87,6 +91,11 @@ def judge(diagnosis: dict[str, Any], label: dict[str, Any]) -> dict[str, float]:
     if truth["regimes"]:
         scores["regime right"] = float(_regime(diagnosis, truth))
     return scores
+
+
+def _family_first(diagnosis: dict[str, Any], effect: str) -> bool:
+    findings = diagnosis.get("findings", [])
+    return bool(findings) and findings[0]["family"] == catalogue()[effect].family
 
 
 def _regime(diagnosis: dict[str, Any], truth: dict[str, Any]) -> bool:
