@@ -10,7 +10,7 @@ from io import TextIOWrapper
 import click
 
 from irtwin import __version__
-from irtwin.cli import graph, motion, robot, service, twin, upkeep
+from irtwin.cli import fleet, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import say
 from irtwin.errors import InputError
 
@@ -59,5 +59,6 @@ for command in (
     *(service.serve, service.live),
     *(upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
     robot.robot,
+    fleet.fleet,
 ):
     cli.add_command(command)

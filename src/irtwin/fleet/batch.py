@@ -1,0 +1,154 @@
+"""A batch: some data sets of a fleet, worked through one after the other, and a record of what became of each."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from irtwin import __version__, workflow
+from irtwin.errors import InputError
+from irtwin.fleet.data_sets import at_hand, checksum
+from irtwin.storage.files import write
+
+RUN, DIAGNOSE = "run", "diagnose"
+BEGUN, DONE, REFUSED, FAILED = "begun", "done", "refused", "failed"
+_ATTEMPTS = 2  # of a data set whose process ended: memory may have been short for another's sake
+_SETS = "sets.json"
+
+
+@dataclass(frozen=True)
+class Record:
+    """What became of a data set: `state`, and `said`, one line where it was refused or failed.
+
+    `attempts`: how often it was begun since it last changed; `checksum`: of its files; `irtwin`: the version.
+    """
+
+    data_set: str
+    state: str
+    said: str = ""
+    seconds: float = 0.0
+    attempts: int = 1
+    checksum: str = ""
+    irtwin: str = __version__
+
+    @property
+    def final(self) -> bool:
+        """Whether there is nothing more to try."""
+        return self.state in (DONE, REFUSED, FAILED)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A folder of a fleet: `sets.json`, `records/`, and the results, a workspace or `diagnoses/`."""
+
+    folder: Path
+
+    @classmethod
+    def create(cls, folder: Path, kind: str, places: Sequence[str]) -> Batch:
+        """Write down which data sets a new batch has."""
+        write(folder / _SETS, json.dumps({"kind": kind, "data_sets": list(places)}, indent=1).encode())
+        return cls(folder)
+
+    @property
+    def kind(self) -> str:
+        """`run` or `diagnose`."""
+        return str(self._sets()["kind"])
+
+    @property
+    def places(self) -> list[str]:
+        """Its data sets."""
+        found = self._sets()["data_sets"]
+        assert isinstance(found, list)
+        return found
+
+    def _sets(self) -> dict[str, object]:
+        file = self.folder / _SETS
+        try:
+            found: dict[str, object] = json.loads(file.read_text())
+            return found
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"{file}: cannot be read ({error}); remove its folder, and its sets are taken again"
+            ) from None
+
+    def record(self, place: str) -> Record | None:
+        """Return what is known of a data set; None where it was never begun, or its record is damaged."""
+        try:
+            return Record(**json.loads(self._record_file(place).read_text()))
+        except (OSError, ValueError, TypeError):
+            return None  # it is tried again
+
+    def records(self) -> Iterator[Record | None]:
+        """Yield the record of each data set."""
+        yield from map(self.record, self.places)
+
+    def _record_file(self, place: str) -> Path:
+        return self.folder / "records" / f"{key(place)}.json"
+
+    def _write(self, record: Record) -> None:
+        write(self._record_file(record.data_set), json.dumps(asdict(record), indent=1).encode())
+
+    def work(self) -> None:
+        """Take each data set through what the batch is for, but those that are done and have not changed.
+
+        A data set that is refused or fails costs no other. Where the process ends, the next one goes on from there.
+        """
+        with self._alone():
+            kind = self.kind
+            for place in self.places:
+                self._take(kind, place)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        with (self.folder / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # a scheduler may take a worker for lost that is still at work
+            yield
+
+    def _take(self, kind: str, place: str) -> None:
+        before, began = self.record(place), time.monotonic()
+        attempts = 1
+        try:
+            with at_hand(place) as data_set:
+                now = checksum(data_set)
+                if before is not None and before.checksum == now and before.irtwin == __version__:
+                    if before.state in (DONE, REFUSED):
+                        return
+                    attempts = before.attempts + 1 if before.state == BEGUN else 1
+                if attempts > _ATTEMPTS:
+                    said = f"the process ended {_ATTEMPTS} times while it worked on this; memory may be short"
+                    return self._write(Record(place, FAILED, said, attempts=attempts, checksum=now))
+                self._write(Record(place, BEGUN, attempts=attempts, checksum=now))
+                state, said = self._done(kind, place, data_set)
+        except OSError as error:  # a storage that does not answer
+            now, state, said = "", FAILED, str(error)
+        self._write(Record(place, state, said, time.monotonic() - began, attempts, now))
+
+    def _done(self, kind: str, place: str, data_set: Path) -> tuple[str, str]:
+        """Return the state that a data set has come to, and what is to be said of it."""
+        trace = self.folder / "records" / f"{key(place)}.traceback.txt"
+        trace.unlink(missing_ok=True)
+        try:
+            if kind == RUN:
+                workflow.run(data_set, self.folder / "workspace")
+            else:
+                results = self.folder / "diagnoses" / key(place)
+                workflow.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
+        except InputError as error:
+            return REFUSED, str(error)
+        except Exception as error:  # a bug in one costs no other; its traceback is kept
+            write(trace, traceback.format_exc().encode())
+            return FAILED, f"{type(error).__name__}, see {trace}"
+        return DONE, ""
+
+
+def key(place: str) -> str:
+    """Return the name of a data set's files: its folder's, and what tells it from others of that name."""
+    name = "".join(sign if sign.isalnum() or sign in "-_." else "_" for sign in Path(place).name)[:80]
+    return f"{name}-{hashlib.sha256(place.encode()).hexdigest()[:8]}"

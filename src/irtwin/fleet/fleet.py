@@ -1,0 +1,91 @@
+"""A fleet: batches of data sets in one folder, made, worked on and counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+
+from irtwin.errors import InputError
+from irtwin.fleet.batch import DONE, FAILED, REFUSED, Batch, Record
+from irtwin.fleet.data_sets import find_data_sets
+from irtwin.fleet.schedule import work_here, work_on_cluster
+
+_NAME = "batch_{:04d}"
+
+
+@dataclass(frozen=True)
+class Status:
+    """How many data sets are in each state (`left` where none is final), and the records of those set aside."""
+
+    counts: Counter[str]
+    set_aside: tuple[Record, ...]
+
+
+def work(
+    source: str,
+    folder: Path,
+    kind: str,
+    *,
+    batch: int,
+    workers: int,
+    scheduler: str | None = None,
+    announce: Callable[[str], None] = lambda line: None,
+) -> Status:
+    """Take every data set of a source through `run` or `diagnose`, results below `folder`.
+
+    What was done before and has not changed is not done again. `batch`: at most so many data sets share a workspace.
+    Raises InputError where the source holds none, or the folder is of another kind.
+    """
+    _plan(find_data_sets(source), folder, kind, batch, workers)
+    batches = [one for one in batches_of(folder) if one.kind == kind]
+    ended = count(1)
+
+    def tell(one: Batch) -> None:
+        announce(f"{one.folder.name}, {next(ended)} of {len(batches)}: {_line(status_of([one]).counts)}")
+
+    if scheduler is None:
+        work_here(batches, workers, tell)
+    else:
+        work_on_cluster(batches, scheduler, tell)
+    return status_of(batches)
+
+
+def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: int) -> None:
+    """Put data sets that no batch has into new ones, enough for each worker to have one."""
+    there = batches_of(folder)
+    if there and {one.kind for one in there} != {kind}:
+        raise InputError(f"{folder}: holds a fleet of `{there[0].kind}`; give `{kind}` a folder of its own")
+    known = {place for one in there for place in one.places}
+    new = [place for place in places if place not in known]
+    share = max(1, min(size, -(-len(new) // max(workers, 1))))
+    for number, start in enumerate(range(0, len(new), share), start=len(there) + 1):
+        Batch.create(folder / _NAME.format(number), kind, new[start : start + share])
+
+
+def batches_of(folder: Path) -> list[Batch]:
+    """Return the batches in a fleet's folder."""
+    return [Batch(file.parent) for file in sorted(folder.glob("*/sets.json"))]
+
+
+def status_of(batches: Sequence[Batch]) -> Status:
+    """Count what became of the data sets of some batches."""
+    counts: Counter[str] = Counter()
+    aside = []
+    for record in _records(batches):
+        state = record.state if record is not None and record.final else "left"
+        counts[state] += 1
+        if record is not None and state in (REFUSED, FAILED):
+            aside.append(record)
+    return Status(counts, tuple(aside))
+
+
+def _records(batches: Sequence[Batch]) -> Iterator[Record | None]:
+    for one in batches:
+        yield from one.records()
+
+
+def _line(counts: Counter[str]) -> str:
+    return ", ".join(f"{counts[state]} {state}" for state in (DONE, REFUSED, FAILED, "left") if counts[state])

@@ -1,0 +1,107 @@
+"""What becomes of a batch's data sets: each by itself, once, and on record."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from irtwin import workflow
+from irtwin.errors import InputError
+from irtwin.fleet.batch import Batch, Record, key
+
+
+def _refuse(said: str) -> Any:
+    raise InputError(said)
+
+
+WAYS: dict[str, Callable[[], Any]] = {"bad": lambda: _refuse("runs/a.csv, line 3: not a number"), "odd": lambda: 1 / 0}
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The data sets that were diagnosed."""
+    found: list[str] = []
+
+    def diagnose(data_set: Path, json_file: Path, twin_file: Path) -> None:
+        found.append(data_set.name)
+        WAYS.get(data_set.name, lambda: None)()
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        json_file.write_text("{}")
+
+    monkeypatch.setattr(workflow, "diagnose", diagnose)
+    return found
+
+
+def _batch(folder: Path, *names: str) -> Batch:
+    places = []
+    for name in names:
+        (folder / name).mkdir()
+        (folder / name / "dataset.toml").write_text(name)
+        places.append(str(folder / name))
+    return Batch.create(folder / "out" / "batch_0001", "diagnose", places)
+
+
+def _states(batch: Batch) -> list[str]:
+    return [record.state if record else "" for record in batch.records()]
+
+
+def test_a_data_set_that_is_refused_or_fails_costs_no_other(tmp_path: Path, asked: list[str]) -> None:
+    batch = _batch(tmp_path, "bad", "odd", "good")
+    batch.work()
+    assert _states(batch) == ["refused", "failed", "done"]
+    refused, failed, _ = batch.records()
+    assert refused is not None and refused.said == "runs/a.csv, line 3: not a number"
+    assert failed is not None and failed.said.startswith("ZeroDivisionError, see ")
+    trace = Path(failed.said.removeprefix("ZeroDivisionError, see "))
+    assert "1 / 0" in trace.read_text()
+    assert (batch.folder / "diagnoses" / key(batch.places[2]) / "gap.json").exists()
+
+
+def test_only_what_changed_or_failed_is_taken_again(tmp_path: Path, asked: list[str]) -> None:
+    batch = _batch(tmp_path, "bad", "odd", "good", "other")
+    batch.work()
+    (tmp_path / "good" / "dataset.toml").write_text("changed")
+    asked.clear()
+    batch.work()
+    assert asked == ["odd", "good"]
+
+
+def test_a_data_set_of_which_processes_die_is_set_aside(tmp_path: Path, asked: list[str]) -> None:
+    batch = _batch(tmp_path, "large", "good")
+    batch.work()
+    records = batch.folder / "records"
+    for attempts, state in ((1, "done"), (2, "failed")):
+        one = next(batch.records())
+        assert one is not None
+        batch._write(Record(one.data_set, "begun", attempts=attempts, checksum=one.checksum))
+        batch.work()
+        assert _states(batch) == [state, "done"]
+    found = next(batch.records())
+    assert found is not None and found.said.startswith("the process ended 2 times while it worked on this")
+    assert len(list(records.iterdir())) == 2
+
+
+def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str]) -> None:
+    batch = _batch(tmp_path, "good")
+    batch.work()
+    (batch.folder / "records" / f"{key(batch.places[0])}.json").write_text('{"state"')
+    batch.work()
+    assert _states(batch) == ["done"] and asked == ["good", "good"]
+
+
+def test_a_storage_that_does_not_answer_fails_one_data_set(tmp_path: Path, asked: list[str]) -> None:
+    batch = Batch.create(tmp_path / "b", "diagnose", ["memory://nothing/here", *_batch(tmp_path, "good").places])
+    batch.work()
+    assert _states(batch) == ["failed", "done"]
+
+
+def test_a_damaged_list_of_sets_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "sets.json").write_text("{")
+    with pytest.raises(InputError, match=r"sets\.json: cannot be read .*; remove its folder"):
+        _ = Batch(tmp_path).places
+
+
+def test_folders_of_one_name_have_files_of_their_own() -> None:
+    assert key("/plant/a/robot 1") != key("/plant/b/robot 1")
+    assert key("/plant/a/robot 1").startswith("robot_1-")

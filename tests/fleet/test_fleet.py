@@ -1,0 +1,58 @@
+"""`irtwin fleet`: data sets in, results by batch, and what was set aside."""
+
+from pathlib import Path
+
+import pytest
+from tests import data_sets, small_robots
+
+from irtwin.fleet.fleet import batches_of
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two good data sets and one with a misspelt key."""
+    folder = tmp_path_factory.mktemp("robots")
+    for seed, name in enumerate(("A", "B")):
+        small_robots.data_set(folder / name, f"Arm {name}", seed=10 * seed)
+    (folder / "C").mkdir()
+    (folder / "C" / "dataset.toml").write_text('[robot]\nnam = "Arm C"\n')
+    return folder
+
+
+@pytest.fixture(scope="module")
+def out(robots: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("out")
+
+
+def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, out: Path) -> None:
+    first = data_sets.irtwin("fleet", "run", robots, "--out", out, "--workers", 2)
+    assert first.status == 3, first.err
+    assert first.out == "done     2\nrefused  1\n"
+    assert "nam" in first.err and "Traceback" not in first.err
+    workspaces = [batch.folder / "workspace" for batch in batches_of(out)]
+    assert len(workspaces) == 2
+    pages = [page for place in workspaces for page in place.glob("reports/*.html")]
+    assert len(pages) == 2
+    written = {page: page.stat().st_mtime_ns for page in pages}
+    again = data_sets.irtwin("fleet", "run", robots, "--out", out, "--workers", 2)
+    assert again.out == first.out
+    assert {page: page.stat().st_mtime_ns for page in pages} == written
+
+
+def test_status_says_what_became_of_each(out: Path) -> None:
+    said = data_sets.irtwin("fleet", "status", out)
+    assert said.status == 0 and said.out == "done     2\nrefused  1\n"
+    assert said.err.startswith("refused: ") and said.err.count("\n") == 1
+
+
+def test_a_folder_is_of_one_kind(robots: Path, out: Path) -> None:
+    said = data_sets.irtwin("fleet", "diagnose", robots, "--out", out)
+    assert said.status == 2
+    assert "holds a fleet of `run`; give `diagnose` a folder of its own" in said.err
+
+
+def test_a_folder_without_a_fleet_has_no_status(tmp_path: Path) -> None:
+    said = data_sets.irtwin("fleet", "status", tmp_path)
+    assert said.status == 2 and "holds no fleet" in said.err
