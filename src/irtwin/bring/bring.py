@@ -21,6 +21,7 @@ from irtwin.bring.robot_library import robot_of
 from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take
 from irtwin.bring.told import Told, told
 from irtwin.check.check import check
+from irtwin.check.plausibility import urdf_finding
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.log import read_data_set
@@ -69,11 +70,10 @@ class Form:
 
 @dataclass(frozen=True)
 class Brought:
-    """What was brought: forms of logs, and lines of what was done and of what `irtwin check` says of the result."""
+    """What was brought: forms of logs, and a line for each thing that was done in reading."""
 
     forms: tuple[Form, ...]
     said: tuple[str, ...]
-    found: tuple[str, ...]
 
 
 def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: Ask | None = None) -> Brought:
@@ -84,6 +84,8 @@ def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: A
     """
     _check_place(out)
     described, origin = robot_of(robot)
+    if (wrong := urdf_finding(described)) is not None:
+        raise InputError(f"{robot}: {wrong.say}")
     topics = dict(_topic(text) for text in options.topics)
     logs = [_read(file, described, topics) for file in files]
     while True:
@@ -114,7 +116,7 @@ def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: A
             pa.parquet.write_table(pa.table(dict(run.columns)), folder / run_text.file)
         (folder / "dataset.toml").write_text(text, encoding="utf-8")
     shown = tuple(Form(tuple(log.path for log in form.logs), form.logs[0].form, form.taken.columns) for form in forms)
-    return Brought(shown, tuple(line for form in forms for line in form.said), _found(out))
+    return Brought(shown, tuple(line for form in forms for line in form.said))
 
 
 def init(out: Path, robot: str | None, name: str | None) -> None:
@@ -200,8 +202,8 @@ def _name(path: Path, taken: Mapping[Path, tuple[RunText, TakenRun]]) -> str:
     return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(files) + 3))) if one not in files)
 
 
-def _found(folder: Path) -> tuple[str, ...]:
-    """Return what reading and checking say of the data set that was written."""
+def found_in(folder: Path) -> tuple[str, ...]:
+    """Return what reading and checking say of a data set that was written."""
     try:
         data_set = read_data_set(folder)
     except InputError as error:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.csv
 
-from irtwin.bring.head import LOOKED_AT, Head, head_of
+from irtwin.bring.head import LOOKED_AT, Head, head_of, numbers_in
 from irtwin.bring.recording import Recording, as_columns
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
@@ -75,7 +75,13 @@ def _form(path: Path, lines: Sequence[str]) -> Form:
             f"{path}: no delimiter (comma, semicolon, tab, blank) makes even columns of numbers of it; export it as "
             "CSV, one line of names and one line a sample, in semicolons where decimals have commas"
         )
-    return max(found, key=lambda form: (form.head.names is not None, len(form.rows[-1])))
+    return max(found, key=_fit)
+
+
+def _fit(form: Form) -> tuple[bool, float, int]:
+    """Return how well a form fits: a delimiter that is none cuts numbers in two, and names elsewhere than samples."""
+    sample = form.rows[form.head.first]
+    return form.head.names is not None, numbers_in(sample) / len(sample), len(sample)
 
 
 def _decimal(samples: Sequence[Sequence[str]], delimiter: str) -> str:

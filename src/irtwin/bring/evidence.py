@@ -12,7 +12,8 @@ from irtwin.bring.unit import Unit, units
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.sampling import interval
 
-_BEYOND = 1.5  # times a joint's range that positions may span, and its greatest position that they may reach
+_BEYOND = 1.5  # times a joint's range that positions may span, and times its greatest position that they may reach
+_TURNED = 6 * np.pi  # rad: a wrist without an end counts its turns (that of a measured UR3 stood at 4 pi)
 _WIDE = 100.0  # rad (m) that a joint without limits may span
 _FAST = 4.0  # times a joint's speed limit
 _SLOW = 0.01
@@ -21,7 +22,7 @@ _INTERVALS = (1e-4, 5.0)  # s between samples of any log
 _LATEST = 4.2e9  # s: a clock that counts from 1970 has passed fewer
 _USUAL = (2e-4, 0.5)  # s, of nearly all
 _MOVES = 0.02  # rad (m)
-_NEAR = 0.1  # share by which a factor may miss a unit's
+_NEAR = 1.5  # factor by which a speed may miss the derivative: units lie farther apart, noise and filters do not
 _ALIKE = 0.8  # correlation of a speed and its position's
 _TORQUE = (0.1, 100.0)  # logged over that of the description's bodies
 _POWER = (0.3, 300.0)  # electrical over mechanical
@@ -82,7 +83,7 @@ def _within(joints: Sequence[Joint], runs: Sequence[np.ndarray]) -> bool:
         high = max(float(q[:, index].max()) for q in runs)
         bounded = np.isfinite(joint.lower) and np.isfinite(joint.upper) and joint.upper > joint.lower
         wide = _BEYOND * (joint.upper - joint.lower) if bounded else _WIDE
-        far = _BEYOND * max(abs(joint.lower), abs(joint.upper)) if bounded else _WIDE
+        far = max(_BEYOND * max(abs(joint.lower), abs(joint.upper)), _TURNED) if bounded else _WIDE
         if high - low > wide or max(abs(low), abs(high)) > far:
             return False
     return True
@@ -142,7 +143,7 @@ def rate(
     if not gains:
         return Evidence(None, tuple(known), "no joint moves, or none as its position's derivative says")
     gain = float(np.median(gains))
-    fits = [unit for unit in known if abs(gain * unit.factor - 1) < _NEAR]
+    fits = [unit for unit in known if 1 / _NEAR < gain * unit.factor < _NEAR]
     why = f"by a check: {gain:.4g} times the {['first', 'second'][order - 1]} derivative of the positions"
     return Evidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,15 +34,13 @@ class Head:
 
 
 def head_of(rows: Sequence[Sequence[str]]) -> Head | None:
-    """Return the head of a table: samples are the last of its rows, of one length, that hold numbers.
+    """Return the head of a table: samples begin with the first row of numbers that is as long as most rows are.
 
-    None where its last row is no sample.
+    None where no row of two cells or more is one.
     """
-    width = len(rows[-1]) if rows else 0
-    first = len(rows)
-    while first > 0 and len(rows[first - 1]) == width and _is_sample(rows[first - 1]):
-        first -= 1
-    if width < 2 or first == len(rows):
+    width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
+    first = next((number for number, row in enumerate(rows) if len(row) == width and _is_sample(row)), None)
+    if width < 2 or first is None:
         return None
     above = [number for number in range(first) if len(rows[number]) == width]
     units = above[-1] if len(above) > 1 and _are_units(rows[above[-1]]) else None
@@ -49,9 +48,14 @@ def head_of(rows: Sequence[Sequence[str]]) -> Head | None:
     return Head(names[-1] if names else None, units, first)
 
 
+def numbers_in(cells: Sequence[str]) -> int:
+    """Return how many cells are numbers."""
+    return sum(bool(_NUMBER.fullmatch(cell.strip())) for cell in cells)
+
+
 def _is_sample(cells: Sequence[str]) -> bool:
     """Whether a row holds numbers, in half of it at least: times and texts may stand beside them."""
-    numbers = sum(bool(_NUMBER.fullmatch(cell.strip())) for cell in cells)
+    numbers = numbers_in(cells)
     blank = sum(cell.strip().lower() in MISSING for cell in cells)
     return numbers > 0 and 2 * (numbers + blank) >= len(cells)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from irtwin.bring.column_name import said_by, words_of
 from irtwin.bring.doubt import Answer, DoubtError
 from irtwin.bring.recording import Recording
-from irtwin.bring.rtde_names import JOINTS, is_rtde, variable
+from irtwin.bring.rtde_names import JOINTS, PAYLOAD, is_rtde, variable
 from irtwin.bring.told import LEFT_OUT, Target, Told
 from irtwin.bring.unit import Unit, unit_of
 from irtwin.errors import InputError
@@ -106,7 +106,7 @@ def _by_name(name: str, recording: Recording, robot: Robot) -> Meaning:
     if is_rtde(recording.columns):
         said = variable(name)
         if said is None:
-            return Meaning(name, None, why="RTDE's, of no channel that was measured")
+            return Meaning(name, None, why=_rtde_unused(name))
         field, unit, index = said
         if index is not None and len(robot.joints) != JOINTS:
             raise InputError(f"{recording.path}: RTDE records {JOINTS} joints, {robot.name} has {len(robot.joints)}")
@@ -132,6 +132,12 @@ def _by_name(name: str, recording: Recording, robot: Robot) -> Meaning:
         said_name.weak,
     )
     return replace(meaning, joint=_joint_by_words(meaning, robot))
+
+
+def _rtde_unused(name: str) -> str:
+    if name in PAYLOAD:
+        return "but as the run's payload"
+    return "what the controller wanted" if name.startswith("target_") else "RTDE's, of no channel"
 
 
 def _exact(name: str, channel: Channel, recording: Recording, robot: Robot) -> Meaning:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -23,6 +23,7 @@ _VARIABLES = {
     "actual_robot_voltage": ("meter_voltage", "V"),
     "actual_robot_current": ("meter_current", "A"),
 }
+PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")  # of a run, not of a sample
 _INDEXED = re.compile(r"(.+)_([0-5])")
 
 
@@ -44,15 +45,15 @@ def payload(recording: Recording) -> tuple[float, tuple[float, float, float]] | 
 
     Raises InputError where it changes within the log: a run has one payload.
     """
-    mass = _constant(recording, recording.columns, ["payload"])
+    mass = _constant(recording, recording.columns, PAYLOAD[:1])
     if mass is None:
         return None
-    centre = _constant(recording, recording.columns, [f"payload_cog_{axis}" for axis in range(3)])
+    centre = _constant(recording, recording.columns, PAYLOAD[1:])
     x, y, z = centre if centre is not None else (0.0, 0.0, 0.0)
     return mass[0], (x, y, z)
 
 
-def _constant(recording: Recording, columns: Mapping[str, np.ndarray], names: list[str]) -> list[float] | None:
+def _constant(recording: Recording, columns: Mapping[str, np.ndarray], names: Sequence[str]) -> list[float] | None:
     if any(name not in columns for name in names):
         return None
     for name in names:

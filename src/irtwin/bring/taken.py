@@ -172,7 +172,7 @@ class _Taking:
                 self.units[each.column] = seen.choice, seen.why
             else:
                 unit = _known(each.unit)
-                if seen is not None and seen.allowed and unit not in seen.allowed:
+                if seen is not None and unit not in seen.allowed:
                     question = f"is in {unit.name} {each.unit_why}, and cannot be: {seen.why}"
                     raise self._doubt(each, question, [*([seen.choice] if seen.choice else seen.allowed), unit])
                 self.units[each.column] = unit, each.unit_why

@@ -58,13 +58,13 @@ def import_(
     Parquet or an Excel file. Units are told by names and by checks against other columns, and shown. What cannot be
     told is asked on a terminal; elsewhere the command stops and says what to give.
     """
-    from irtwin.bring.bring import Options, bring
+    from irtwin.bring.bring import Options, bring, found_in
 
     options = Options(name, maps, gear_ratios, topics, power_at, payload_mass, payload_com, repair)
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)
-    for line in (*brought.said, *brought.found):
+    for line in (*brought.said, *found_in(out)):
         say(f"irtwin: {line}")
     say(f"Written: {out}. Read its dataset.toml; then: irtwin run {out}")
 
