@@ -238,6 +238,17 @@ def test_what_cannot_be_told_stops_with_what_to_give(
     assert sorted(tmp_path.iterdir()) == [log]
 
 
+def test_numbers_of_a_message_of_ros_say_no_joint(tmp_path: Path) -> None:
+    columns = {"time": good()["time"]} | per_joint("q", "/joint_states/position[{}]", 0)
+    log = write_text(tmp_path / "run.csv", columns | per_joint("tau", "/joint_states/effort[{}]", 0))
+    with pytest.raises(DoubtError, match="joints come in any order") as doubt:
+        bring([log], tmp_path / "set", NAME, Options())
+    (answer,) = doubt.value.answers
+    assert answer.text == "--map '/joint_states/position[*]=q'"
+    bring([log], tmp_path / "set", NAME, Options(), lambda doubt: doubt.answers[0])
+    assert_same(read_data_set(tmp_path / "set"), "q torque")
+
+
 def test_an_answer_is_taken_as_if_it_had_been_typed(tmp_path: Path) -> None:
     log = plain(tmp_path, power=good()["power"], **{f"load{k}": good()[f"tau_joint_a{k}"] for k in range(1, 7)})
     asked: list[str] = []

@@ -13,9 +13,10 @@ import pyarrow.parquet
 
 from irtwin.bring import rtde_names
 from irtwin.bring.aligned import aligned
+from irtwin.bring.choice import meanings
 from irtwin.bring.data_set_text import RunText, data_set_text
 from irtwin.bring.doubt import Answer, DoubtError
-from irtwin.bring.meaning import Meaning, meanings
+from irtwin.bring.meaning import Meaning
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of
 from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take

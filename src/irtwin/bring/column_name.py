@@ -115,7 +115,7 @@ def said_by(name: str, unit_text: str | None = None) -> Said:
         unit = any_unit if field is not None else None
         weak = weak and field is None
     if weak:
-        field = "q"
+        field = "q"  # as positions are often logged; their range is held against the joints' limits
     why = _unused(words, field)
     return Said(None if why else field, unit, kept, numbers, measured, motor, weak, why)
 

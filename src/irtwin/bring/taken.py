@@ -196,7 +196,7 @@ class _Taking:
         """Return the times of each log, s, and when it started where its times say that."""
         (column,) = self._of("time")
         if self.logs[0].time.dtype.kind == "M":
-            self.units[column.column] = units("s")[0], "dates and times; s from the first"
+            self.units[column.column] = units("s")[0], "from the first date and time on"
             return (
                 [(log.time - log.time[0]).astype("int64") / 1e9 for log in self.logs],
                 [_moment(int(log.time[0].astype("int64"))) for log in self.logs],
