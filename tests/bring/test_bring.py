@@ -216,7 +216,7 @@ def plain(folder: Path, **changes: np.ndarray) -> Path:
         (
             {f"position_filtered{k}": f"q_joint_a{k}" for k in range(1, 7)}, Options(),
             "columns pos1 to pos6 and position_filtered1 to position_filtered6 could each be position",
-            "--map position_filtered1=- --map",
+            "--map 'position_filtered*=-' or --map pos1=-",
         ),
         (
             {f"motor_torque{k}": f"tau_joint_a{k}" for k in range(1, 7)}, Options(maps=("trq*=-",)),
@@ -300,6 +300,11 @@ def test_a_word_that_says_nothing_is_refused(tmp_path: Path, options: Options, s
         ("just a line of words", "no delimiter"),
         ("\0\0\0", "is no text"),
         ("time,a,b\n" + "0,1,2\n" * 30 + "1,2\n", "line 32: 2 values instead of 3"),
+        (
+            "t,a,b,c\n" + "0,1,2,5,1,2,3,4\n" * 30,
+            "have 8 values, the line above them 4 names; where decimals",
+        ),
+        ("time,a,b\n" + "10:30:00,1,2\n" * 30, "column time holds neither numbers nor dates and times of ISO 8601"),
         ("time,a,a\n" + "0,1,2\n" * 30, "column a occurs twice"),
         ("time,a,b\n" + "0,1,2\n" * 60 + "0,x,2\n", "line 62, column a: 'x' is no number"),
     ],
@@ -340,6 +345,21 @@ def test_a_robot_is_known_by_name_where_its_package_is_installed(
     robots.cache_clear()
     assert found.joint_names == robot().joint_names
     assert origin == "arm6 of example-robot-data"
+
+
+def test_a_joint_that_is_not_logged_can_be_fixed(tmp_path: Path) -> None:
+    columns = {"time": good()["time"]} | {f"q_joint_a{k}": good()[f"q_joint_a{k}"] for k in range(1, 6)}
+    log = write_text(
+        tmp_path / "run.csv", columns | {f"tau_joint_a{k}": good()[f"tau_joint_a{k}"] for k in range(1, 6)}
+    )
+    with pytest.raises(InputError, match="--map COLUMN=q_joint_a6, or, where the joint stood still, --fixed joint_a6"):
+        bring([log], tmp_path / "set", NAME, Options())
+    bring([log], tmp_path / "set", NAME, Options(fixed=("joint_a6",)))
+    data_set = read_data_set(tmp_path / "set")
+    assert data_set.robot.joint_names == robot().joint_names[:5]
+    np.testing.assert_array_equal(data_set.runs[0].signals.q, signals(good()).q[:, :5])
+    with pytest.raises(InputError, match=r"--fixed joint_7: the robot has no joint .joint_7. .it has"):
+        bring([log], tmp_path / "other", NAME, Options(fixed=("joint_7",)))
 
 
 def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:

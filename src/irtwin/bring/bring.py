@@ -18,7 +18,7 @@ from irtwin.bring.data_set_text import RunText, data_set_text
 from irtwin.bring.doubt import Answer, DoubtError
 from irtwin.bring.meaning import Meaning
 from irtwin.bring.recording import Recording, read_recording
-from irtwin.bring.robot_library import robot_of
+from irtwin.bring.robot_library import robot_of, with_fixed
 from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take
 from irtwin.bring.told import Told, told
 from irtwin.check.check import check
@@ -36,12 +36,13 @@ _TOPIC = re.compile(r'say which in dataset\.toml: \[topics\] (\S+) = "(.*)"$')
 
 @dataclass(frozen=True)
 class Options:
-    """What the user says: `maps`, `gear_ratios` and `topics` as they are typed, payload in kg and m."""
+    """What the user says: `maps`, `gear_ratios`, `topics`, `fixed` as they are typed, payload in kg and m."""
 
     name: str | None = None
     maps: tuple[str, ...] = ()
     gear_ratios: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
     power_at: str | None = None
     payload_mass: float | None = None
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -85,6 +86,7 @@ def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: A
     """
     _check_place(out)
     described, origin = robot_of(robot)
+    described = with_fixed(described, options.fixed)
     if (wrong := urdf_finding(described)) is not None:
         raise InputError(f"{robot}: {wrong.say}")
     topics = dict(_topic(text) for text in options.topics)

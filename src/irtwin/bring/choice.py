@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from irtwin.bring.column_name import words_of
+import numpy as np
+
+from irtwin.bring.column_name import said_by, words_of
 from irtwin.bring.doubt import Answer, DoubtError
 from irtwin.bring.meaning import Meaning, field_of, first_meaning
 from irtwin.bring.recording import Recording
-from irtwin.bring.told import LEFT_OUT, Told
+from irtwin.bring.told import LEFT_OUT, Told, fits
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
@@ -31,7 +33,7 @@ def meanings(recording: Recording, robot: Robot, told: Told) -> list[Meaning]:
         candidates = [each for each in first.values() if field_of(each, robot) == field]
         choose = _per_joint if channel.per_joint else _of_robot
         chosen |= {each.column: each for each in choose(recording, field, candidates, robot)}
-    _check(recording, robot, chosen)
+    _check(recording, robot, chosen, {each.joint for each in first.values() if each.field == "q"})
     texts = {name: Meaning(name, None, why="holds neither numbers nor times of ISO 8601") for name in recording.texts}
     return [{**chosen, **texts}[name] for name in recording.names]
 
@@ -55,7 +57,11 @@ def _per_joint(recording: Recording, field: str, found: Sequence[Meaning], robot
         lone = "the log format has it of each joint, or of none"
         return [*(each.unused(f"no {label} of a joint that is known: {lone}") for each in strong or rest), *weak]
     used = {each.column for each in taken.values()}
-    others = [each.unused("another column was taken") for each in strong or rest if each.column not in used]
+    others = [
+        each.unused("other columns were taken for the robot's joints")
+        for each in strong or rest
+        if each.column not in used
+    ]
     return [*taken.values(), *others, *weak]
 
 
@@ -85,6 +91,8 @@ def _by_number(recording: Recording, group: Sequence[Meaning], names: Sequence[s
     """Return the joint of each column by a number in its name, that counts from 0 or 1, base to flange."""
     if len(group) < len(names) or len({len(each.numbers) for each in group}) != 1:
         return {}
+    if len(group) > len(names):
+        group = _without_others(recording, group, len(names))
     for place in range(len(group[0].numbers)):
         numbers = [each.numbers[place] for each in group]
         start = min(numbers)
@@ -104,12 +112,24 @@ def _by_number(recording: Recording, group: Sequence[Meaning], names: Sequence[s
     return {}
 
 
+def _without_others(recording: Recording, group: Sequence[Meaning], count: int) -> Sequence[Meaning]:
+    """Return the first columns of more than the robot's joints: axes that never move are no axes of it."""
+    ordered = sorted(group, key=lambda each: each.numbers)
+    others = [each.column for each in ordered[count:]]
+    if any(np.ptp(recording.columns[name][np.isfinite(recording.columns[name])]) > 0 for name in others):
+        raise InputError(
+            f"{recording.path}: columns {_shown([each.column for each in ordered])} are of {len(group)} joints, the robot "
+            f"has {count}; leave out what is not of it, as --map {others[0]}={LEFT_OUT}"
+        )
+    return ordered[:count]
+
+
 def _in_any_order(recording: Recording, group: Sequence[Meaning], names: Sequence[str]) -> DoubtError:
     """Return the doubt about numbers of an array of ROS, whose joints come in any order."""
     columns = [each.column for each in group]
     field = str(group[0].field)
     prefix = CHANNELS[field].prefix
-    pattern = re.sub(r"\d+", "*", columns[0])
+    pattern = _pattern(columns[0])
     return DoubtError(
         f"{recording.path}: columns {_shown(columns)} are numbered as in a message of ROS, whose joints come in any "
         f"order, often that of their letters; say each, as --map {columns[0]}={prefix}_{names[0]}, or that they go "
@@ -149,25 +169,39 @@ def _several(recording: Recording, field: str, sets: Sequence[Sequence[str]]) ->
     answers = []
     for chosen in sets:
         others = [column for columns in sets if columns is not chosen for column in columns]
+        patterns = {_pattern(column) for column in others}
+        if not any(fits(pattern, column) for pattern in patterns for column in chosen):
+            others = sorted(patterns)
         options = tuple(("--map", f"{column}={LEFT_OUT}") for column in others)
         answers.append(Answer(f"take {_shown(chosen)}, leave out {_shown(others)}", options))
     both = " and ".join(_shown(columns) for columns in sets)
     return DoubtError(f"{recording.path}: columns {both} could each be {CHANNELS[field].label}", answers)
 
 
+def _pattern(column: str) -> str:
+    return re.sub(r"\d+", "*", column)
+
+
 def _shown(columns: Sequence[str]) -> str:
     return columns[0] if len(columns) == 1 else f"{columns[0]} to {columns[-1]}"
 
 
-def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning]) -> None:
+def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], seen: Collection[str | None]) -> None:
     positions = {each.joint for each in chosen.values() if each.field == "q"}
-    missing = [name for name in robot.joint_names if name not in positions]
+    missing = sorted((name for name in robot.joint_names if name not in positions), key=lambda name: name in seen)
     timed = any(each.field == "time" for each in chosen.values())
     if missing or not timed:
         what, column = (f"the position of {missing[0]}", f"q_{missing[0]}") if missing else ("the time", "time")
+        held = f", or, where the joint stood still, --fixed {missing[0]}" if missing else ""
+        times = [name for name in recording.texts if not timed and said_by(name).field == "time"]
+        if times:
+            raise InputError(
+                f"{recording.path}: column {times[0]} holds neither numbers nor dates and times of ISO 8601, as "
+                "2026-03-02T08:00:00.012; convert it"
+            )
         there = ", ".join(recording.names)
         shown = there if len(there) < 400 else f"{there[:400]} ..."
         raise InputError(
-            f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column} "
+            f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column}{held} "
             f"(there are {shown})"
         )

@@ -46,6 +46,7 @@ def read_text(path: Path) -> Recording:
     kept = [number for number, line in enumerate(lines) if line.strip()][:LOOKED_AT]
     form = _form(path, [lines[number] for number in kept])
     before = kept[form.head.first]
+    _check_names(path, form)
     names, units = form.head.names_in(form.rows), form.head.units_in(form.rows)
     table = _table(path, text.split("\n", before)[-1], form, names, before)
     columns, texts = as_columns(path, table, ("line", before + 1))
@@ -76,6 +77,17 @@ def _form(path: Path, lines: Sequence[str]) -> Form:
             "CSV, one line of names and one line a sample, in semicolons where decimals have commas"
         )
     return max(found, key=_fit)
+
+
+def _check_names(path: Path, form: Form) -> None:
+    """Raise InputError where the line above the samples has many names, but not one for each value."""
+    above = form.rows[form.head.first - 1] if form.head.first and form.head.names is None else []
+    values = len(form.rows[form.head.first])
+    if values > len(above) > values / 3:
+        raise InputError(
+            f"{path}: samples have {values} values, the line above them {len(above)} names; where decimals have "
+            "commas, columns need another delimiter: export it with semicolons"
+        )
 
 
 def _fit(form: Form) -> tuple[bool, float, int]:

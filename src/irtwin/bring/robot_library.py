@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from xml.etree.ElementTree import tostring
+
+from defusedxml.ElementTree import fromstring
 
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
-from irtwin.robot.urdf import read_urdf
+from irtwin.robot.urdf import parse_urdf, read_urdf
 from irtwin.signals.log import read_robot
 
 _PACKAGE = "example-robot-data"
@@ -40,11 +45,33 @@ def robot_of(said: str) -> tuple[Robot, str]:
 def robots() -> dict[str, Path]:
     """Return the URDF files of all robots that are known by a name."""
     shipped = {file.stem: file for file in sorted((resources.folder("ontology") / "robots").glob("*.urdf"))}
-    others: dict[str, Path] = {}
-    for file in _installed():
-        name = file.stem.removesuffix("_robot")
-        others[file.stem if name in others else name] = file
-    return {**others, **shipped}
+    files = _installed()
+    whole = {file.stem.removesuffix("_robot"): file for file in files if file.stem.endswith("_robot")}
+    return {**{file.stem: file for file in files}, **whole, **shipped}
+
+
+def with_fixed(robot: Robot, joints: Sequence[str]) -> Robot:
+    """Return a robot some of whose joints, and those that mimic them, are fixed at zero. Raises InputError."""
+    for joint in joints:
+        if joint not in robot.joint_names:
+            raise InputError(
+                f'--fixed {joint}: the robot has no joint "{joint}" (it has {", ".join(robot.joint_names)})'
+            )
+    if not joints:
+        return robot
+    root = fromstring(robot.urdf.encode())
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if joint.get("name") in joints or (mimic is not None and mimic.get("joint") in joints):
+            joint.set("type", "fixed")
+            for part in [*joint.findall("axis"), *joint.findall("limit"), *joint.findall("mimic")]:
+                joint.remove(part)
+    fixed = parse_urdf(tostring(root, encoding="unicode"))
+    sheets = {joint.name: joint for joint in robot.joints}
+    return replace(
+        fixed, name=robot.name, joints=tuple(sheets[joint.name] for joint in fixed.joints), weight=robot.weight,
+        manufacturer=robot.manufacturer, type=robot.type,
+    )  # fmt: skip
 
 
 def _installed() -> list[Path]:

@@ -37,7 +37,7 @@ class Told:
         """Return what was said of a column: of it alone before what is said of many."""
         if column in self.columns:
             return self.columns[column]
-        patterns = (pattern for pattern in self.columns if "*" in pattern and _fits(pattern, column))
+        patterns = (pattern for pattern in self.columns if "*" in pattern and fits(pattern, column))
         found = max(patterns, key=len, default=None)
         return None if found is None else self.columns[found]
 
@@ -45,7 +45,7 @@ class Told:
         """Raise InputError where something was said of a column that no file has."""
         names = list(columns)
         for said in self.columns:
-            if said not in names and not any("*" in said and _fits(said, name) for name in names):
+            if said not in names and not any("*" in said and fits(said, name) for name in names):
                 raise InputError(f"--map {said}=...: no file has such a column; there are {', '.join(names[:12])}")
 
 
@@ -61,7 +61,8 @@ def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot
     return Told(dict(_target(text, robot) for text in maps), gears, power_at)
 
 
-def _fits(pattern: str, name: str) -> bool:
+def fits(pattern: str, name: str) -> bool:
+    """Whether a pattern, in which * stands for any letters, is of a name."""
     return re.fullmatch(".*".join(map(re.escape, pattern.split("*"))), name, re.DOTALL) is not None
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import Number, payload_com_option, say
+from irtwin.cli.options import Number, payload_com_option, printable, say
 
 if TYPE_CHECKING:
     from irtwin.bring.bring import Brought
@@ -36,6 +36,9 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 )  # fmt: skip
 @click.option("--power-at", type=click.Choice(["mains", "dc_bus"]), help="Where electrical power was measured.")
 @click.option("--topic", "topics", metavar="COLUMN=TOPIC", multiple=True, help="Which topic of a bag to take.")
+@click.option(
+    "--fixed", metavar="JOINT", multiple=True, help="Joint that stood still and is not logged, as a gripper's."
+)
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
 @payload_com_option
 @click.option("--repair", is_flag=True, help="Drop samples whose time does not rise, and say how many.")
@@ -48,6 +51,7 @@ def import_(
     gear_ratios: tuple[str, ...],
     power_at: str | None,
     topics: tuple[str, ...],
+    fixed: tuple[str, ...],
     payload_mass: float | None,
     payload_com: tuple[float, float, float],
     repair: bool,
@@ -60,7 +64,10 @@ def import_(
     """
     from irtwin.bring.bring import Options, bring, found_in
 
-    options = Options(name, maps, gear_ratios, topics, power_at, payload_mass, payload_com, repair)
+    options = Options(
+        name=name, maps=maps, gear_ratios=gear_ratios, topics=topics, fixed=fixed, power_at=power_at,
+        payload_mass=payload_mass, payload_com=payload_com, repair=repair,
+    )  # fmt: skip
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)
@@ -111,7 +118,8 @@ def _show(brought: Brought) -> None:
     wide = Console(width=None if console.is_terminal else _WIDE)
     for form in brought.forms:
         files = ", ".join(file.name for file in form.files[:4]) + (" ..." if len(form.files) > 4 else "")
-        table = Table("column", "channel", "unit", "conversion", "why", title=Text(f"{files}: {form.form}"))
+        title = Text(printable(f"{files}: {form.form}"))
+        table = Table("column", "channel", "unit", "conversion", "why", title=title)
         table.title_justify = "left"
         rows: dict[tuple[str, ...], list[Taken]] = {}
         for each in form.columns:
@@ -119,10 +127,12 @@ def _show(brought: Brought) -> None:
                 each
             )
         for said, columns in rows.items():
-            names, channels = "\n".join(each.column for each in columns), "\n".join(each.channel for each in columns)
             if columns[0].channel:
-                table.add_row(*map(Text, (names, channels, *said)))
+                names = "\n".join(printable(each.column) for each in columns)
+                channels = "\n".join(printable(each.channel) for each in columns)
+                table.add_row(*map(Text, (names, channels, *map(printable, said))))
         wide.print(table)
         for said, columns in rows.items():
             if not columns[0].channel:
-                wide.print(Text(f"not used, {said[-1]}: {', '.join(each.column for each in columns)}"))
+                names = ", ".join(each.column for each in columns)
+                wide.print(Text(printable(f"not used, {said[-1]}: {names}")))
