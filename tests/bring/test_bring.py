@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from tests.bring.dialects import NAME, good, per_joint, robot, signals, write_text
 from tests.data_sets import irtwin
+from tests.live.controller import Controller
 
 from irtwin.bring.bring import Options, bring, init
 from irtwin.bring.doubt import Answer, DoubtError
@@ -188,6 +189,21 @@ def test_a_recording_of_rtde_needs_no_word(tmp_path: Path, delimiter: str) -> No
     assert run.signals.torque is None  # target_moment is no measurement
     assert (run.payload_mass, run.payload_com, data_set.power_at) == (2.5, (0.0, 0.01, 0.02), "dc_bus")
     assert check(data_set).sound
+
+
+def test_a_recording_that_ur_rtde_made(tmp_path: Path) -> None:
+    """Made by RTDEReceiveInterface.startFileRecording of ur_rtde 1.6.5, connected to tests/live/controller.py."""
+    log, controller = Path(__file__).parent / "data" / "ur_rtde.csv", Controller()
+    said = bring([log], tmp_path / "set", NAME, Options(maps=("actual_qd_*=dq:rad/s",))).said  # they are no derivatives
+    assert said == (f"{log}: 3 rows left out, the first line 7: they repeat the row before, time and all",)
+    data_set = read_data_set(tmp_path / "set")
+    (run,) = data_set.runs
+    rows = np.round((run.signals.time - 1000.0) / controller.step).astype(int).tolist()
+    for field, variable in (("q", "actual_q"), ("dq", "actual_qd"), ("current", "actual_current")):
+        true = [controller.value(variable, row) for row in rows]
+        np.testing.assert_allclose(getattr(run.signals, field), true, atol=1e-6, err_msg=field)
+    assert run.signals.power == pytest.approx([48 * controller.value("actual_robot_current", row)[0] for row in rows])
+    assert (run.payload_mass, data_set.power_at) == (1.5, "dc_bus")
 
 
 def test_a_payload_that_changes_is_no_runs_payload(tmp_path: Path) -> None:

@@ -28,8 +28,8 @@ class Aligned:
 def aligned(recording: Recording, meanings: Sequence[Meaning], *, repair: bool) -> Aligned:
     """Return the columns in use, at rows that have a time and all positions; blanks are joined by straight lines.
 
-    Raises InputError where a column is blank, a value infinite, or time does not rise; with `repair` samples whose time
-    does not rise are dropped.
+    A row that repeats the one before is left out. Raises InputError where a column is blank, a value infinite, or time
+    does not rise; with `repair` samples whose time does not rise are dropped.
     """
     path = recording.path
     time_name = next(each.column for each in meanings if each.field == "time")
@@ -43,6 +43,13 @@ def aligned(recording: Recording, meanings: Sequence[Meaning], *, repair: bool) 
     if (count := int((~keep).sum())) and keep.any():
         first = recording.place(int(np.flatnonzero(~keep)[0]))
         said.append(f"{path}: {count} of {len(keep)} rows left out, the first {first}: a position or the time is blank")
+    again = _written_twice(recording, keep)
+    if again.any():
+        first = recording.place(int(np.flatnonzero(again)[0]))
+        said.append(
+            f"{path}: {int(again.sum())} rows left out, the first {first}: they repeat the row before, time and all"
+        )
+        keep &= ~again
     keep, dropped = _rising(recording, raw, keep, time_name, repair)
     said += dropped
     for column, values in used.items():
@@ -74,6 +81,16 @@ def _numbers(recording: Recording, column: str) -> np.ndarray:
     if np.isnan(numbers).all():
         raise InputError(f"{recording.path}: column {column} is blank throughout; leave it out: --map '{column}=-'")
     return numbers
+
+
+def _written_twice(recording: Recording, keep: np.ndarray) -> np.ndarray:
+    """Return the rows that repeat the one before to the last digit: a recorder was faster than what it records."""
+    same = np.zeros(len(keep), dtype=bool)
+    same[1:] = keep[1:] & keep[:-1]
+    for values in recording.columns.values():
+        numbers = values.astype("int64") if values.dtype.kind == "M" else values
+        same[1:] &= (numbers[1:] == numbers[:-1]) | ((numbers[1:] != numbers[1:]) & (numbers[:-1] != numbers[:-1]))
+    return same
 
 
 def _rising(

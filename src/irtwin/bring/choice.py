@@ -118,8 +118,8 @@ def _without_others(recording: Recording, group: Sequence[Meaning], count: int) 
     others = [each.column for each in ordered[count:]]
     if any(np.ptp(recording.columns[name][np.isfinite(recording.columns[name])]) > 0 for name in others):
         raise InputError(
-            f"{recording.path}: columns {_shown([each.column for each in ordered])} are of {len(group)} joints, the robot "
-            f"has {count}; leave out what is not of it, as --map {others[0]}={LEFT_OUT}"
+            f"{recording.path}: columns {_shown([each.column for each in ordered])} are of {len(group)} joints, the "
+            f"robot has {count}; leave out what is not of it, as --map {others[0]}={LEFT_OUT}"
         )
     return ordered[:count]
 
