@@ -20,6 +20,7 @@ from irtwin.bring.robot_library import robot_of, robots
 from irtwin.check.check import check
 from irtwin.errors import InputError
 from irtwin.ros.bags import write_bag
+from irtwin.signals.channels import columns_of
 from irtwin.signals.log import (
     DATA_SET_KEYS,
     ROBOT_KEYS,
@@ -30,6 +31,7 @@ from irtwin.signals.log import (
     read_data_set,
 )
 
+MEASURED = Path(__file__).parents[3] / "shared/data"
 STARTED = datetime(2026, 3, 2, 8, 0, 0, 250_000, tzinfo=UTC)
 MAINS = Options(power_at="mains")
 
@@ -189,6 +191,30 @@ def test_a_recording_of_rtde_needs_no_word(tmp_path: Path, delimiter: str) -> No
     assert run.signals.torque is None  # target_moment is no measurement
     assert (run.payload_mass, run.payload_com, data_set.power_at) == (2.5, (0.0, 0.01, 0.02), "dc_bus")
     assert check(data_set).sound
+
+
+@pytest.mark.system
+def test_a_measured_recording_comes_back_to_the_last_bit(tmp_path: Path) -> None:
+    if not MEASURED.is_dir():
+        pytest.skip("the measured logs are not here")
+    true = read_data_set(MEASURED / "ur3_power")
+    (run,) = true.runs
+    columns = {"timestamp": run.signals.time, "actual_robot_voltage": np.full(len(run.signals.time), 48.0)}
+    for prefix, name in (
+        ("q", "actual_q"),
+        ("dq", "actual_qd"),
+        ("i", "actual_current"),
+        ("temp", "joint_temperatures"),
+    ):
+        for joint, of in enumerate(true.robot.joint_names):
+            columns[f"{name}_{joint}"] = columns_of(run.signals, true.robot.joint_names)[f"{prefix}_{of}"]
+    assert run.signals.power is not None
+    log = write_text(tmp_path / "run.csv", columns | {"actual_robot_current": run.signals.power / 48.0}, " ")
+    bring([log], tmp_path / "set", str(MEASURED / "ur3_power"), Options())
+    (found,) = read_data_set(tmp_path / "set").runs
+    for field in ("time", "q", "dq", "current", "temperature"):
+        np.testing.assert_array_equal(getattr(found.signals, field), getattr(run.signals, field))
+    assert found.signals.power == pytest.approx(run.signals.power)
 
 
 def test_a_recording_that_ur_rtde_made(tmp_path: Path) -> None:

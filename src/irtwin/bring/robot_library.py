@@ -83,7 +83,7 @@ def _installed() -> list[Path]:
 
 
 def _home(file: Path) -> str:
-    return "irtwin" if file.is_relative_to(resources.folder("ontology").resolve()) else _PACKAGE
+    return "irtwin" if file.is_relative_to(resources.folder("ontology")) else _PACKAGE
 
 
 def _plain(name: str) -> str:
