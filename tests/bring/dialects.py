@@ -15,7 +15,7 @@ from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, from_columns
 
 NAME = "kuka_kr6_r700"
-N = 400  # samples: 4.8 s of exciting motion
+N = 400  # samples: 4.8 s of exciting motion; of 330 the checks tell less
 
 
 @cache

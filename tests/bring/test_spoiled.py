@@ -119,6 +119,17 @@ def test_check_says_what_is_wrong(tmp_path: Path, fault: str) -> None:
     assert said.status == (2 if spoiled.stops else 0)
 
 
+def test_check_says_which_key_of_the_robot_is_misspelt_and_what_it_dropped(tmp_path: Path) -> None:
+    _, data_set = written(tmp_path, TWELVE["a stamp twice"])
+    file = data_set / "dataset.toml"
+    file.write_text(file.read_text().replace("[[run]]", 'poweer_at = "dc_bus"\n[[run]]'))
+    said = irtwin("check", data_set, "--repair")
+    assert said.status == 0
+    assert "[robot] poweer_at is kept as a note; did you mean power_at?" in said.err
+    assert "1 samples dropped, column time does not rise: line 102" in said.err
+    assert "no fault found" not in said.err
+
+
 @pytest.mark.parametrize("fault", [fault for fault, spoiled in TWELVE.items() if spoiled.imported])
 def test_import_mends_it_or_says_it(tmp_path: Path, fault: str) -> None:
     spoiled, out = TWELVE[fault], tmp_path / "set"
