@@ -57,7 +57,8 @@ def _jitter(moving: Moving) -> Finding | None:
 
 
 def _dead(column: str, values: list[np.ndarray], moving: Moving) -> Finding | None:
-    if any(np.ptp(each) > 0 for each in values):
+    regulated = column == CHANNELS["meter_voltage"].prefix and values[0][0] != 0  # a supply that holds its voltage
+    if regulated or any(np.ptp(each) > 0 for each in values):
         return None
     say = f"{column} is {values[0][0]:g} throughout, though the robot moves; connect what measures it, or leave it out"
     return Finding("dead", column, moving.names, True, False, {"value": float(values[0][0])}, say)

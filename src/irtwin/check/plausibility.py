@@ -27,7 +27,7 @@ _MECHANICAL = 1.0  # W: less is friction's and noise's
 def plausibility_findings(data_set: DataSet, moving: Moving) -> list[Finding]:
     """Return what cannot be, by the robot's own sizes and limits."""
     found = [
-        _urdf(data_set),
+        urdf_finding(data_set.robot),
         *(_payload(data_set)),
         *(_position(moving, index, joint) for index, joint in enumerate(data_set.robot.joints)),
         _time(data_set.robot, moving),
@@ -36,8 +36,9 @@ def plausibility_findings(data_set: DataSet, moving: Moving) -> list[Finding]:
     return [finding for finding in found if finding is not None]
 
 
-def _urdf(data_set: DataSet) -> Finding | None:
-    longest = max((float(np.linalg.norm(at.translation)) for at in data_set.robot.model.jointPlacements), default=0.0)
+def urdf_finding(robot: Robot) -> Finding | None:
+    """Return the finding where a description's lengths are no metres."""
+    longest = max((float(np.linalg.norm(at.translation)) for at in robot.model.jointPlacements), default=0.0)
     if longest < _FARTHEST:
         return None
     say = f"robot.urdf puts two joints {longest:.4g} m apart: it looks like millimetres; give lengths in m"

@@ -10,7 +10,7 @@ from io import TextIOWrapper
 import click
 
 from irtwin import __version__
-from irtwin.cli import fleet, graph, motion, robot, service, twin, upkeep
+from irtwin.cli import bring, fleet, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import say
 from irtwin.errors import InputError
 
@@ -53,6 +53,7 @@ def cli() -> None:
 
 
 for command in (
+    *(bring.init, bring.import_),
     *(twin.check, twin.run, twin.demo, twin.case_study, twin.diagnose, twin.adopt, twin.improve),
     *(motion.plan, motion.predict, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),

@@ -55,5 +55,10 @@ payload_com_option = click.option(
 
 
 def say(line: str) -> None:
-    """Write one line to standard error: names that were read may hold what breaks lines or steers a terminal."""
-    click.echo("".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line), err=True)
+    """Write one line to standard error."""
+    click.echo(printable(line), err=True)
+
+
+def printable(line: str) -> str:
+    """Return a line without what breaks lines or steers a terminal: names that were read may hold it."""
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)

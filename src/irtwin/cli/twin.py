@@ -51,11 +51,14 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
     from irtwin import modelling
 
     result = modelling.check_log(dataset, repair=repair, json_file=out)
+    for line in result.data_set.repairs:
+        say(line)
     for line in dict.fromkeys(f"{_state(finding)}: {finding.say}" for finding in result.findings):
         say(line)
     if not result.sound:
         sys.exit(2)
-    say("no fault found" if not result.findings else "nothing that must be cured first")
+    found = result.findings or result.data_set.repairs
+    say("nothing that must be cured first" if found else "no fault found")
 
 
 @click.command()

@@ -15,6 +15,7 @@ from irtwin.input_file import read_input
 from irtwin.signals.sources.source import MOST_COLUMNS, Source, first_line
 
 _LARGEST = 1_000_000_000  # bytes; held in memory while it is read
+_OTHERS = {b";": "semicolons", b"\t": "tabs", b"|": "bars"}
 
 
 class _Parsed(NamedTuple):
@@ -80,7 +81,13 @@ class CsvSource(Source):
         if b"\n" not in text:
             raise InputError(f"{self.path}: has no sample below its first line; an empty run cannot be used")
         self._check_characters(text)
-        columns = text.count(b",", 0, text.index(b"\n")) + 1
+        head = text[: text.index(b"\n")]
+        if b"," not in head and (other := next((sign for sign in (b";", b"\t", b"|") if sign in head), None)):
+            raise InputError(
+                f"{self.path}, line 1: columns are separated by {_OTHERS[other]}; separate them by commas, or let "
+                "`irtwin import` do that"
+            )
+        columns = head.count(b",") + 1
         if columns > MOST_COLUMNS:
             raise InputError(f"{self.path}, line 1: {columns} columns; a run has at most {MOST_COLUMNS}")
         return text

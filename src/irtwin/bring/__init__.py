@@ -1,0 +1,1 @@
+"""Logs and robots of others, brought into a data set."""

@@ -1,0 +1,239 @@
+"""The jobs: logs of others into a new data set, and an empty data set to fill in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet
+
+from irtwin.bring import rtde_names
+from irtwin.bring.aligned import aligned
+from irtwin.bring.choice import meanings
+from irtwin.bring.data_set_text import RunText, data_set_text
+from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.meaning import Meaning
+from irtwin.bring.recording import Recording, read_recording
+from irtwin.bring.robot_library import robot_of, with_fixed
+from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take
+from irtwin.bring.told import Told, told
+from irtwin.check.check import check
+from irtwin.check.plausibility import urdf_finding
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.signals.log import read_data_set
+from irtwin.signals.sampling import interval
+from irtwin.storage.files import working_folder
+
+Ask = Callable[[DoubtError], Answer]
+_PREFIX = ".irtwin-import-"
+_TOPIC = re.compile(r'say which in dataset\.toml: \[topics\] (\S+) = "(.*)"$')
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user says: `maps`, `gear_ratios`, `topics`, `fixed` as they are typed, payload in kg and m."""
+
+    name: str | None = None
+    maps: tuple[str, ...] = ()
+    gear_ratios: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
+    power_at: str | None = None
+    payload_mass: float | None = None
+    payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    repair: bool = False
+
+    def with_answer(self, answer: Answer) -> Options:
+        """Return them with an answer, as if it had been typed."""
+        result = self
+        for option, value in answer.options:
+            if option == "--power-at":
+                result = replace(result, power_at=value)
+            elif option == "--gear-ratio":
+                result = replace(result, gear_ratios=(*result.gear_ratios, value))
+            else:
+                result = replace(result, maps=(*result.maps, value))
+        return result
+
+
+@dataclass(frozen=True)
+class Form:
+    """Logs of the same columns: their files, and what each column was taken for."""
+
+    files: tuple[Path, ...]
+    form: str
+    columns: tuple[Taken, ...]
+
+
+@dataclass(frozen=True)
+class Brought:
+    """What was brought: forms of logs, and a line for each thing that was done in reading."""
+
+    forms: tuple[Form, ...]
+    said: tuple[str, ...]
+
+
+def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: Ask | None = None) -> Brought:
+    """Write logs as a new data set, a run a file.
+
+    `robot`: a URDF file, a data set, or a name. `ask` answers what cannot be told; DoubtError where it is None. Raises
+    InputError where a log cannot be used; nothing is written then.
+    """
+    _check_place(out)
+    described, origin = robot_of(robot)
+    described = with_fixed(described, options.fixed)
+    if (wrong := urdf_finding(described)) is not None:
+        raise InputError(f"{robot}: {wrong.say}")
+    topics = dict(_topic(text) for text in options.topics)
+    logs = [_read(file, described, topics) for file in files]
+    while True:
+        said = told(options.maps, options.gear_ratios, options.power_at, described)
+        try:
+            said.check(name for log in logs for name in log.names)
+            forms = [_Form(group, described, said, options.repair) for group in _of_one_form(logs)]
+            power_at = _one_place(forms)
+            break
+        except DoubtError as doubt:
+            if ask is None:
+                raise
+            options = options.with_answer(ask(doubt))
+    name = options.name or described.name
+    runs: dict[Path, tuple[RunText, TakenRun]] = {}
+    for form in forms:
+        for recording, run in zip(form.logs, form.taken.runs, strict=True):
+            runs[recording.path] = _run_text(recording, run, _name(recording.path, runs), form, options), run
+    listed = [runs[file] for file in dict.fromkeys(files)]
+    text = data_set_text(
+        described, name, [run for run, _ in listed], origin=origin, power_at=power_at[0], power_at_why=power_at[1],
+        gear_ratios=dict(said.gear_ratios),
+    )  # fmt: skip
+    with _new_folder(out) as folder:
+        (folder / "runs").mkdir()
+        (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
+        for run_text, run in listed:
+            pa.parquet.write_table(pa.table(dict(run.columns)), folder / run_text.file)
+        (folder / "dataset.toml").write_text(text, encoding="utf-8")
+    shown = tuple(Form(tuple(log.path for log in form.logs), form.logs[0].form, form.taken.columns) for form in forms)
+    return Brought(shown, tuple(line for form in forms for line in form.said))
+
+
+def init(out: Path, robot: str | None, name: str | None) -> None:
+    """Write an empty data set to fill in. Raises InputError where the folder is not empty."""
+    _check_place(out)
+    described, origin = (None, "put it beside this file") if robot is None else robot_of(robot)
+    text = data_set_text(described, name or (described.name if described else "NAME"), (), origin=origin)
+    with _new_folder(out) as folder:
+        (folder / "runs").mkdir()
+        if described is not None:
+            (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
+        (folder / "dataset.toml").write_text(text, encoding="utf-8")
+
+
+class _Form:
+    """Logs of the same columns, taken together: what one of them tells of a unit holds for all."""
+
+    def __init__(self, logs: Sequence[Recording], robot: Robot, said: Told, repair: bool) -> None:
+        self.logs = logs
+        means: list[Meaning] = meanings(logs[0], robot, said)
+        usable = [aligned(log, means, repair=repair) for log in logs]
+        self.said = [line for log in usable for line in (*log.recording.said, *log.said)]
+        self.taken: TakenLogs = take(usable, means, robot, said)
+
+
+def _of_one_form(logs: Sequence[Recording]) -> list[list[Recording]]:
+    groups: dict[tuple[object, ...], list[Recording]] = {}
+    for log in logs:
+        times = tuple(name for name, values in log.columns.items() if values.dtype.kind == "M")
+        groups.setdefault((log.names, log.texts, times, tuple(log.units.items()), log.is_bag), []).append(log)
+    return list(groups.values())
+
+
+def _one_place(forms: Sequence[_Form]) -> tuple[str | None, str]:
+    places = {form.taken.power_at: form.taken.power_at_why for form in forms if form.taken.power_at is not None}
+    if len(places) > 1:
+        files = " and ".join(f"{form.logs[0].path} ({form.taken.power_at})" for form in forms if form.taken.power_at)
+        raise InputError(f"power was measured at two places: {files}; make two data sets, or give --power-at")
+    return next(iter(places.items()), (None, ""))
+
+
+def _read(file: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
+    try:
+        return read_recording(file, robot, topics)
+    except InputError as error:
+        raise InputError(_TOPIC.sub(r"give --topic \1=\2", str(error))) from error
+
+
+def _topic(text: str) -> tuple[str, str]:
+    column, sign, topic = text.partition("=")
+    if not sign or not topic:
+        raise InputError(f"--topic {text}: give COLUMN=TOPIC, as joint_states=/arm/joint_states")
+    return column, topic
+
+
+def _run_text(log: Recording, run: TakenRun, name: str, form: _Form, options: Options) -> RunText:
+    time = run.columns["time"]
+    lasts = f"{len(time)} samples, {time[-1] - time[0]:.4g} s at {1 / interval(time):.4g} Hz"
+    text = RunText(
+        f"runs/{name}.parquet",
+        f"from {log.path.name} ({log.form}): {lasts}",
+        started=run.started,
+        columns=form.taken.columns if log is form.logs[0] else (),
+    )
+    load = rtde_names.payload(log) if rtde_names.is_rtde(log.columns) else None
+    if options.payload_mass is not None:
+        return replace(
+            text,
+            payload_mass=options.payload_mass,
+            payload_com=options.payload_com,
+            payload_why="as --payload-mass says",
+        )
+    if load is not None:
+        return replace(
+            text, payload_mass=load[0], payload_com=load[1], payload_why="what the controller was told, by RTDE"
+        )
+    return text
+
+
+def _name(path: Path, taken: Mapping[Path, tuple[RunText, TakenRun]]) -> str:
+    name = re.sub(r"[^\w\-]+", "_", path.stem).strip("_") or "run"
+    files = {Path(text.file).stem for text, _ in taken.values()}
+    return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(files) + 3))) if one not in files)
+
+
+def found_in(folder: Path) -> tuple[str, ...]:
+    """Return what reading and checking say of a data set that was written."""
+    try:
+        data_set = read_data_set(folder)
+    except InputError as error:
+        return (f"to do: {error}",)
+    lines = [f"note: {line}" for line in data_set.repairs]
+    for finding in check(data_set).findings:
+        state = "cure first" if finding.stops else "mended when it is read" if finding.mended else "to be looked at"
+        lines.append(f"{finding.fault} ({state}): {finding.say}")
+    return tuple(dict.fromkeys(lines))
+
+
+def _check_place(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: is a file; name a new folder for the data set")
+    if out.is_dir() and any(out.iterdir()):
+        raise InputError(f"{out}: is not empty; name a new folder for the data set")
+
+
+@contextmanager
+def _new_folder(out: Path) -> Iterator[Path]:
+    """Give a folder that becomes `out` at the end, whole or not at all."""
+    try:
+        out.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with working_folder(out.absolute().parent, _PREFIX) as folder:
+            made = folder / "data_set"
+            made.mkdir()
+            yield made
+            made.replace(out)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); choose another place") from error

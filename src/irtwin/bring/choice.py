@@ -1,0 +1,207 @@
+"""Of the columns that could be a channel, those that are: one a joint, or one of the whole robot."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from irtwin.bring.column_name import said_by, words_of
+from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.meaning import Meaning, field_of, first_meaning
+from irtwin.bring.recording import Recording
+from irtwin.bring.told import LEFT_OUT, Told, fits
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS
+
+_TIMES = ("__time", "time", "timestamp")  # the first of these that is there
+_ARRAY = (frozenset(("joint", "states")), frozenset(("jointstates",)), frozenset(("field",)))  # of ROS' joint states
+
+
+def meanings(recording: Recording, robot: Robot, told: Told) -> list[Meaning]:
+    """Return what each column of a log was taken for.
+
+    Raises DoubtError where that cannot be told, InputError where time or a position is missing.
+    """
+    first = {name: first_meaning(name, recording, robot, told.of(name)) for name in recording.columns}
+    chosen = {name: each for name, each in first.items() if each.field is None}
+    for field, channel in CHANNELS.items():
+        candidates = [each for each in first.values() if field_of(each, robot) == field]
+        choose = _per_joint if channel.per_joint else _of_robot
+        chosen |= {each.column: each for each in choose(recording, field, candidates, robot)}
+    _check(recording, robot, chosen, {each.joint for each in first.values() if each.field == "q"})
+    texts = {name: Meaning(name, None, why="holds neither numbers nor times of ISO 8601") for name in recording.texts}
+    return [{**chosen, **texts}[name] for name in recording.names]
+
+
+def _per_joint(recording: Recording, field: str, found: Sequence[Meaning], robot: Robot) -> list[Meaning]:
+    """Return the columns of a channel, each with its joint, and those that are not used."""
+    given: dict[str, Meaning] = {each.joint: each for each in found if each.given and each.joint is not None}
+    rest = [each for each in found if each not in given.values()]
+    if len(given) == len(robot.joints):
+        return [*given.values(), *(each.unused("others were given by --map") for each in rest)]
+    strong = [each for each in rest if not each.weak]
+    weak = [each.unused("its name says no channel") for each in rest if each.weak and strong]
+    sets = _sets(recording, strong or rest, robot, len(given))
+    if len(sets) > 1 and (measured := [one for one in sets if all(each.measured for each in one.values())]):
+        sets = measured if len(measured) == 1 else sets
+    if len(sets) > 1:
+        raise _several(recording, field, [[each.column for each in one.values()] for one in sets])
+    taken = {**(sets[0] if sets else {}), **given}
+    if len(taken) < len(robot.joints):
+        label = CHANNELS[field].label
+        lone = "the log format has it of each joint, or of none"
+        return [*(each.unused(f"no {label} of a joint that is known: {lone}") for each in strong or rest), *weak]
+    used = {each.column for each in taken.values()}
+    others = [
+        each.unused("other columns were taken for the robot's joints")
+        for each in strong or rest
+        if each.column not in used
+    ]
+    return [*taken.values(), *others, *weak]
+
+
+def _sets(recording: Recording, found: Sequence[Meaning], robot: Robot, known: int) -> list[dict[str, Meaning]]:
+    """Return the sets of columns, one for each joint, whose names differ in the joint alone."""
+    names = robot.joint_names
+    groups: dict[tuple[str, ...], list[Meaning]] = defaultdict(list)
+    for each in found:
+        of_joint = set(words_of(each.joint)) if each.joint else set()
+        groups[tuple(word for word in each.words if word not in of_joint)].append(each)
+    complete = []
+    for group in groups.values():
+        by_joint = {each.joint: each for each in group if each.joint}
+        if len(by_joint) == len(group) and len(group) >= len(names) - known:
+            complete.append({str(joint): each for joint, each in by_joint.items()})
+        elif indexed := _by_number(recording, group, names):
+            complete.append(indexed)
+        elif len(group) == len(names) == 1:
+            complete.append({names[0]: group[0]})
+    if not complete and found and len(found) == len(names):
+        indexed = _by_number(recording, found, names)  # names that differ in more than the number
+        complete = [indexed] if indexed else []
+    return complete
+
+
+def _by_number(recording: Recording, group: Sequence[Meaning], names: Sequence[str]) -> dict[str, Meaning]:
+    """Return the joint of each column by a number in its name, that counts from 0 or 1, base to flange."""
+    if len(group) < len(names) or len({len(each.numbers) for each in group}) != 1:
+        return {}
+    if len(group) > len(names):
+        group = _without_others(recording, group, len(names))
+    for place in range(len(group[0].numbers)):
+        numbers = [each.numbers[place] for each in group]
+        start = min(numbers)
+        if (
+            start in (0, 1)
+            and len(set(numbers)) == len(group)
+            and sorted(numbers)[: len(names)] == list(range(start, start + len(names)))
+            and len(group) == len(names)
+        ):
+            if any(words <= set(group[0].words) for words in _ARRAY) and not group[0].given:
+                raise _in_any_order(recording, group, names)
+            why = f"{group[0].why}; its number counts joints from {start}, base to flange"
+            return {
+                names[number - start]: replace(each, joint=names[number - start], why=why)
+                for number, each in zip(numbers, group, strict=True)
+            }
+    return {}
+
+
+def _without_others(recording: Recording, group: Sequence[Meaning], count: int) -> Sequence[Meaning]:
+    """Return the first columns of more than the robot's joints: axes that never move are no axes of it."""
+    ordered = sorted(group, key=lambda each: each.numbers)
+    others = [each.column for each in ordered[count:]]
+    if any(np.ptp(recording.columns[name][np.isfinite(recording.columns[name])]) > 0 for name in others):
+        raise InputError(
+            f"{recording.path}: columns {_shown([each.column for each in ordered])} are of {len(group)} joints, the "
+            f"robot has {count}; leave out what is not of it, as --map {others[0]}={LEFT_OUT}"
+        )
+    return ordered[:count]
+
+
+def _in_any_order(recording: Recording, group: Sequence[Meaning], names: Sequence[str]) -> DoubtError:
+    """Return the doubt about numbers of an array of ROS, whose joints come in any order."""
+    columns = [each.column for each in group]
+    field = str(group[0].field)
+    prefix = CHANNELS[field].prefix
+    pattern = _pattern(columns[0])
+    return DoubtError(
+        f"{recording.path}: columns {_shown(columns)} are numbered as in a message of ROS, whose joints come in any "
+        f"order, often that of their letters; say each, as --map {columns[0]}={prefix}_{names[0]}, or that they go "
+        "from base to flange",
+        [Answer("they go from base to flange", (("--map", f"{pattern}={prefix}"),))],
+    )
+
+
+def _of_robot(recording: Recording, field: str, found: Sequence[Meaning], robot: Robot) -> list[Meaning]:
+    """Return the one column of a channel of the whole robot, and those that are not used."""
+    label = CHANNELS[field].label
+    given = [each for each in found if each.given]
+    rest = [each for each in found if not each.given]
+    of_joints = [each for each in rest if each.joint is not None or (each.numbers and field != "time")]
+    unused = [each.unused(f"{label} of a part; the log format has the whole robot's") for each in of_joints]
+    rest = [each for each in rest if each not in of_joints]
+    if field == "time" and not given:
+        first = [each for name in _TIMES for each in rest if each.column.strip().lower() == name]
+        given = first[:1]
+    if given:
+        why = f"{given[0].column} was taken"
+        return [
+            replace(given[0], field=field),
+            *(each.unused(why) for each in [*given[1:], *rest] if each != given[0]),
+            *unused,
+        ]
+    if len(rest) > 1:
+        measured = [each for each in rest if each.measured]
+        if len(measured) != 1:
+            raise _several(recording, field, [[each.column] for each in rest])
+        unused += [each.unused(f"{measured[0].column} was taken") for each in rest if each != measured[0]]
+        rest = measured
+    return [*(replace(each, field=field) for each in rest), *unused]
+
+
+def _several(recording: Recording, field: str, sets: Sequence[Sequence[str]]) -> DoubtError:
+    answers = []
+    for chosen in sets:
+        others = [column for columns in sets if columns is not chosen for column in columns]
+        patterns = {_pattern(column) for column in others}
+        if not any(fits(pattern, column) for pattern in patterns for column in chosen):
+            others = sorted(patterns)
+        options = tuple(("--map", f"{column}={LEFT_OUT}") for column in others)
+        answers.append(Answer(f"take {_shown(chosen)}, leave out {_shown(others)}", options))
+    both = " and ".join(_shown(columns) for columns in sets)
+    return DoubtError(f"{recording.path}: columns {both} could each be {CHANNELS[field].label}", answers)
+
+
+def _pattern(column: str) -> str:
+    return re.sub(r"\d+", "*", column)
+
+
+def _shown(columns: Sequence[str]) -> str:
+    return columns[0] if len(columns) == 1 else f"{columns[0]} to {columns[-1]}"
+
+
+def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], seen: Collection[str | None]) -> None:
+    positions = {each.joint for each in chosen.values() if each.field == "q"}
+    missing = sorted((name for name in robot.joint_names if name not in positions), key=lambda name: name in seen)
+    timed = any(each.field == "time" for each in chosen.values())
+    if missing or not timed:
+        what, column = (f"the position of {missing[0]}", f"q_{missing[0]}") if missing else ("the time", "time")
+        held = f", or, where the joint stood still, --fixed {missing[0]}" if missing else ""
+        times = [name for name in recording.texts if not timed and said_by(name).field == "time"]
+        if times:
+            raise InputError(
+                f"{recording.path}: column {times[0]} holds neither numbers nor dates and times of ISO 8601, as "
+                "2026-03-02T08:00:00.012; convert it"
+            )
+        there = ", ".join(recording.names)
+        shown = there if len(there) < 400 else f"{there[:400]} ..."
+        raise InputError(
+            f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column}{held} "
+            f"(there are {shown})"
+        )

@@ -1,0 +1,164 @@
+"""What the name of a column says: a channel, a unit, numbers that may be a joint's."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from irtwin.bring.unit import QUANTITIES, Unit, unit_of
+from irtwin.signals.channels import CHANNELS
+
+# words, in small letters, by field of Signals; of several in a name the last one counts
+_WORDS = {
+    "time": "time timestamp stamp datetime zeit zeitstempel clock elapsed t",
+    "q": "q pos position positions angle angles winkel theta act position_actual istposition lage jointposition",
+    "dq": "dq qd qdot vel velocity velocities speed speeds omega geschwindigkeit drehzahl",
+    "ddq": "ddq qdd qddot acc accel acceleration accelerations beschleunigung",
+    "torque": "tau torque torques trq effort efforts moment moments drehmoment",
+    "current": "i iq current currents curr cur strom motorstrom",
+    "temperature": "temp temps temperature temperatures temperatur",
+    "power": "power pwr leistung wirkleistung",
+    "meter_voltage": "voltage volt u spannung",
+}
+_FIELD = {word: field for field, words in _WORDS.items() for word in words.split()}
+_WEAK = frozenset(
+    ["joint", "axis", "achse", "j", "a", "axes", "joints", "gelenk"]
+)  # say a joint; alone with a number, its position
+_MEASURED = frozenset(["actual", "act", "measured", "meas", "ist", "real", "feedback", "fbk"])
+_NOT_MEASURED = frozenset(
+    [
+        "target",
+        "targets",
+        "desired",
+        "des",
+        "cmd",
+        "command",
+        "commanded",
+        "setpoint",
+        "set",
+        "soll",
+        "sollwert",
+        "ref",
+        "reference",
+        "goal",
+        "error",
+        "err",
+        "ff",
+        "feedforward",
+        "limit",
+        "max",
+        "min",
+        "mode",
+        "model",
+        "predicted",
+        "estimated",
+        "planned",
+    ]
+)
+_ELSEWHERE = frozenset(
+    [
+        "tcp",
+        "cartesian",
+        "tool",
+        "wrench",
+        "force",
+        "forces",
+        "imu",
+        "orientation",
+        "quaternion",
+        "pose",
+        "accelerometer",
+        "ambient",
+        "header",
+        "nsecs",
+    ]
+)
+_MOTOR = frozenset(["motor", "mot", "motors", "drive", "rotor", "antrieb", "encoder", "enc"])
+_TOKEN = re.compile(r"[^\W\d_]+|\d+")
+_BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
+_CAMEL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a name says. `field` of Signals, None where it says none, with `why` it is not used; `by_unit`: its unit
+    alone tells the field; `words`: all but numbers and those that say measured; `weak`: a joint and a number, no more.
+    """
+
+    field: str | None
+    unit: Unit | None
+    words: tuple[str, ...]
+    numbers: tuple[int, ...]
+    measured: bool = False
+    motor: bool = False
+    weak: bool = False
+    why: str = ""
+
+
+def said_by(name: str, unit_text: str | None = None) -> Said:
+    """Return what a column's name says; `unit_text` is what the file says of its unit beside the name."""
+    bare, text = _split(name)
+    tokens = words_of(bare)
+    words = tuple(token for token in tokens if not token.isdigit())
+    numbers = tuple(int(token) for token in tokens if token.isdigit() and len(token) < 10)
+    field = next((_FIELD[word] for word in reversed(words) if word in _FIELD), None)
+    unit = _unit(field, unit_text or text) if field is not None else None
+    if unit is None and field is not None and (found := _unit_within(bare, field)) is not None:
+        rest, unit = found
+        return replace(said_by(rest), unit=unit)
+    measured, motor = bool(_MEASURED & set(words)), bool(_MOTOR & set(words))
+    kept = tuple(word for word in words if word not in _MEASURED)
+    weak = field is None and bool(words) and set(kept) <= _WEAK and len(numbers) == 1
+    if field is None:
+        any_unit = unit_of(unit_text or text or "", QUANTITIES)
+        field = None if any_unit is None else _by_unit(any_unit)
+        unit = any_unit if field is not None else None
+        weak = weak and field is None
+    if weak:
+        field = "q"  # as positions are often logged; their range is held against the joints' limits
+    why = _unused(words, field)
+    return Said(None if why else field, unit, kept, numbers, measured, motor, weak, why)
+
+
+def _unused(words: tuple[str, ...], field: str | None) -> str:
+    if wanted := next((word for word in words if word in _NOT_MEASURED), None):
+        return f'"{wanted}": what was wanted, not what was measured'
+    if other := next((word for word in words if word in _ELSEWHERE), None):
+        return f'"{other}": of no joint and no meter'
+    return "" if field else "its name says no channel"
+
+
+def _split(name: str) -> tuple[str, str | None]:
+    """Return a name without the unit in brackets at its end, and that text; a number there is an index."""
+    found = _BRACKETS.search(name)
+    if found is None or found[1].isdigit():
+        return name, None
+    return name[: found.start()], found[1]
+
+
+def _unit(field: str, text: str | None) -> Unit | None:
+    channel = CHANNELS[field]
+    return unit_of(text, tuple(si for si in (channel.unit, channel.sliding) if si)) if text else None
+
+
+def _unit_within(name: str, field: str) -> tuple[str, Unit] | None:
+    """Return a name without the unit of its field that stands in it, as deg_s does, and that unit."""
+    parts = re.split(r"([_\s.\-]+)", name)  # texts at even places
+    spans = [(start, stop) for start in range(0, len(parts), 2) for stop in range(start + 1, len(parts) + 1, 2)]
+    for start, stop in sorted(spans, key=lambda span: span[0] - span[1]):
+        text, rest = "".join(parts[start:stop]), "".join(parts[:start] + parts[stop:])
+        at_end = stop == len(parts)
+        unit = _unit(field, text) if at_end or len(text) > 1 else None
+        if unit is not None and any(word in _FIELD for word in words_of(rest)):
+            return rest, unit
+    return None
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words and numbers of a name, in small letters."""
+    return [token.lower() for token in _TOKEN.findall(_CAMEL.sub(" ", name))]
+
+
+def _by_unit(unit: Unit) -> str | None:
+    fields = [field for field, each in CHANNELS.items() if unit.si in (each.unit, each.sliding)]
+    return fields[0] if fields else None

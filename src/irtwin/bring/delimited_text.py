@@ -1,0 +1,149 @@
+"""Logs as text: any delimiter, decimal points or commas, lines before the names, a line of units after them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.csv
+
+from irtwin.bring.head import LOOKED_AT, Head, head_of, numbers_in
+from irtwin.bring.recording import Recording, as_columns
+from irtwin.errors import InputError
+from irtwin.input_file import read_input
+from irtwin.signals.sources.source import first_line
+
+_LARGEST = 1_000_000_000  # bytes
+_DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
+_NULLS = ["", "nan", "NaN", "-nan", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-"]
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_BLANKS = re.compile(r"[ \t]+")
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a text is written: what stands between values, the decimal sign, and where its rows stand."""
+
+    delimiter: str
+    decimal: str
+    head: Head
+    rows: list[list[str]]
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"text, {_DELIMITERS[self.delimiter]}, decimal {'points' if self.decimal == '.' else 'commas'}"
+
+
+def read_text(path: Path) -> Recording:
+    """Read a text file. Raises InputError where no delimiter makes columns of it, or a line is of another length."""
+    text = _decoded(path, read_input(path, _LARGEST)).replace("\r\n", "\n").rstrip()
+    lines = text.split("\n", 2 * LOOKED_AT)[: 2 * LOOKED_AT]
+    kept = [number for number, line in enumerate(lines) if line.strip()][:LOOKED_AT]
+    form = _form(path, [lines[number] for number in kept])
+    before = kept[form.head.first]
+    _check_names(path, form)
+    names, units = form.head.names_in(form.rows), form.head.units_in(form.rows)
+    table = _table(path, text.split("\n", before)[-1], form, names, before)
+    columns, texts = as_columns(path, table, ("line", before + 1))
+    nameless = f"{path}: has no line of names; its columns are called column_1, column_2 and so on"
+    return Recording(
+        path,
+        str(form),
+        columns,
+        texts,
+        {name: unit for name, unit in zip(names, units, strict=False) if unit},
+        () if form.head.names is not None else (nameless,),
+        first=before + 1,
+        counted="line",
+    )
+
+
+def _form(path: Path, lines: Sequence[str]) -> Form:
+    """Return how the beginning of a text is written. Raises InputError where that cannot be told."""
+    found = []
+    for delimiter in _DELIMITERS:
+        rows = [_split(line, delimiter) for line in lines]
+        head = head_of(rows)
+        if head is not None:
+            found.append(Form(delimiter, _decimal(rows[head.first :], delimiter), head, rows))
+    if not found:
+        raise InputError(
+            f"{path}: no delimiter (comma, semicolon, tab, blank) makes even columns of numbers of it; export it as "
+            "CSV, one line of names and one line a sample, in semicolons where decimals have commas"
+        )
+    return max(found, key=_fit)
+
+
+def _check_names(path: Path, form: Form) -> None:
+    """Raise InputError where the line above the samples has many names, but not one for each value."""
+    above = form.rows[form.head.first - 1] if form.head.first and form.head.names is None else []
+    values = len(form.rows[form.head.first])
+    if values > len(above) > values / 3:
+        raise InputError(
+            f"{path}: samples have {values} values, the line above them {len(above)} names; where decimals have "
+            "commas, columns need another delimiter: export it with semicolons"
+        )
+
+
+def _fit(form: Form) -> tuple[bool, float, int]:
+    """Return how well a form fits: a delimiter that is none cuts numbers in two, and names elsewhere than samples."""
+    sample = form.rows[form.head.first]
+    return form.head.names is not None, numbers_in(sample) / len(sample), len(sample)
+
+
+def _decimal(samples: Sequence[Sequence[str]], delimiter: str) -> str:
+    commas = delimiter != "," and any(_COMMA.fullmatch(cell.strip()) for row in samples for cell in row)
+    return "," if commas else "."
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    return line.split() if delimiter == " " else next(csv.reader([line], delimiter=delimiter), [])
+
+
+def _decoded(path: Path, content: bytes) -> str:
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
+    if b"\0" in content[:4096]:
+        raise InputError(f"{path}: is no text; give a CSV, Parquet or Excel file or a ROS bag")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", errors="replace")  # what spreadsheet programs write under Windows
+    if not text.strip():
+        raise InputError(f"{path}: is empty; a log has one line of names and one line a sample")
+    return text
+
+
+def _table(path: Path, body: str, form: Form, names: list[str], before: int) -> pa.Table:
+    if form.delimiter == " ":
+        body = "\n".join(_BLANKS.sub(" ", line.strip()) for line in body.split("\n"))
+    wrong: list[tuple[int, int, int]] = []
+
+    def note(row: pa.csv.InvalidRow) -> str:
+        wrong.append((row.number or 0, row.actual_columns, row.expected_columns))
+        return "skip"
+
+    try:
+        table = pa.csv.read_csv(
+            io.BytesIO(body.encode()),
+            read_options=pa.csv.ReadOptions(use_threads=False, column_names=[str(k) for k in range(len(names))]),
+            parse_options=pa.csv.ParseOptions(
+                delimiter=form.delimiter, invalid_row_handler=note, ignore_empty_lines=len(names) > 1
+            ),
+            convert_options=pa.csv.ConvertOptions(
+                decimal_point=form.decimal, null_values=_NULLS, strings_can_be_null=True
+            ),
+        )
+    except pa.ArrowException as error:
+        raise InputError(f"{path}: not readable as {form} ({first_line(error)}); export it again") from error
+    if wrong:
+        line, has, expected = wrong[0]
+        raise InputError(
+            f"{path}, line {line + before}: {has} values instead of {expected}; correct it, or remove such lines"
+        )
+    return table.rename_columns(names)

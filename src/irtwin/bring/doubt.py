@@ -1,0 +1,35 @@
+"""What cannot be told from a log alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from irtwin.errors import InputError
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A way out: `label` says it in words, `options` on the command line, each (option, value)."""
+
+    label: str
+    options: tuple[tuple[str, str], ...]
+
+    @property
+    def text(self) -> str:
+        """The options as they are typed."""
+        return " ".join(f"{name} {_quoted(value)}" for name, value in self.options)
+
+
+class DoubtError(InputError):
+    """A question to the user. Where nobody can be asked it ends the command, and its message says what to give."""
+
+    def __init__(self, question: str, answers: Sequence[Answer], hint: str = "") -> None:
+        self.question, self.answers = question, tuple(answers)
+        ways = " or ".join(answer.text for answer in answers) or hint
+        super().__init__(f"{question}; give {ways}")
+
+
+def _quoted(value: str) -> str:
+    plain = all(sign.isalnum() or sign in "_-+=:./@%" for sign in value)
+    return value if plain else "'" + value.replace("'", "'\\''") + "'"

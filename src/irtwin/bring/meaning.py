@@ -1,0 +1,153 @@
+"""Which channel, and which joint's, a column of a log is by its own name, or as the user says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from irtwin.bring.column_name import said_by, words_of
+from irtwin.bring.recording import Recording
+from irtwin.bring.rtde_names import JOINTS, PAYLOAD, is_rtde, variable
+from irtwin.bring.told import Target
+from irtwin.bring.unit import Unit, unit_of
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS, Channel, by_column
+
+_GEARED = ("q", "dq", "ddq", "torque")  # fields that may be of the motor's side of the gear
+_METER = frozenset(
+    [
+        "robot",
+        "bus",
+        "supply",
+        "dc",
+        "main",
+        "mains",
+        "total",
+        "grid",
+        "netz",
+        "ac",
+        "system",
+        "sum",
+        "gesamt",
+        "meter",
+        "zwischenkreis",
+    ]
+)
+_GENERIC = frozenset(["joint", "axis", "link"])  # words that tell no joint from another
+_ALONE = "it names a joint and nothing else, as positions do"
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a column was taken for; `field` of Signals, None where it is not used; `joint`: its name.
+
+    `words` and `numbers` are those of its name; `weak`: it says a joint and no channel; `given`: the user said it.
+    """
+
+    column: str
+    field: str | None
+    joint: str | None = None
+    unit: Unit | None = None
+    unit_why: str = ""
+    motor: bool = False
+    why: str = ""
+    words: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
+    measured: bool = False
+    weak: bool = False
+    given: bool = False
+
+    def unused(self, why: str) -> Meaning:
+        """Return it as a column that is not used."""
+        return replace(self, field=None, joint=None, unit=None, why=why)
+
+
+def first_meaning(name: str, recording: Recording, robot: Robot, target: Target | None) -> Meaning:
+    """Return what a column's own name, or the user, says."""
+    meaning = _by_name(name, recording, robot)
+    if target is None:
+        return meaning
+    if target.field is None:
+        return meaning.unused("left out, as --map says")
+    same = target.field == meaning.field
+    return replace(
+        meaning,
+        field=target.field,
+        joint=target.joint or (meaning.joint if same else _joint_by_words(meaning, robot)),
+        unit=target.unit or (meaning.unit if same else None),
+        unit_why="as --map says" if target.unit else meaning.unit_why,
+        motor=target.motor if target.unit else meaning.motor and target.field in _GEARED,
+        why="as --map says",
+        weak=False,
+        given=True,
+    )
+
+
+def _by_name(name: str, recording: Recording, robot: Robot) -> Meaning:
+    if is_rtde(recording.columns):
+        said = variable(name)
+        if said is None:
+            return Meaning(name, None, why=_rtde_unused(name))
+        field, unit, index = said
+        if index is not None and len(robot.joints) != JOINTS:
+            raise InputError(f"{recording.path}: RTDE records {JOINTS} joints, {robot.name} has {len(robot.joints)}")
+        joint = None if index is None else robot.joint_names[index]
+        by_definition = unit_of(unit, (unit,))
+        return Meaning(name, field, joint, by_definition, "by RTDE's definition", why="RTDE's variable")
+    exact = by_column(robot.joint_names).get(name)
+    unit_text = recording.units.get(name)
+    said_name = said_by(name, unit_text)
+    if exact is not None:
+        return _exact(name, exact, recording, robot)
+    meaning = Meaning(
+        name,
+        said_name.field,
+        None,
+        said_name.unit,
+        ("as the line of units says" if unit_text else "by its name") if said_name.unit else "",
+        said_name.motor and said_name.field in _GEARED,
+        said_name.why or (_ALONE if said_name.weak else "by its name"),
+        said_name.words,
+        said_name.numbers,
+        said_name.measured,
+        said_name.weak,
+    )
+    return replace(meaning, joint=_joint_by_words(meaning, robot))
+
+
+def _rtde_unused(name: str) -> str:
+    if name in PAYLOAD:
+        return "but as the run's payload"
+    return "what the controller wanted" if name.startswith("target_") else "RTDE's, of no channel"
+
+
+def _exact(name: str, channel: Channel, recording: Recording, robot: Robot) -> Meaning:
+    """Return a column that the log format knows; ROS, and a line of units, say its unit, a name alone does not."""
+    field = next(field for field, each in CHANNELS.items() if each is channel)
+    joint = next((one for one in robot.joints if channel.per_joint and channel.column(one.name) == name), None)
+    si = channel.unit_of(joint.kind if joint else "")
+    named = recording.units.get(name)
+    text = si if recording.is_bag else named
+    unit = unit_of(text, (si,)) if text else None
+    why = "" if unit is None else "as ROS has it" if recording.is_bag else "as the line of units says"
+    return Meaning(name, field, joint.name if joint else None, unit, why, why="its name is the log format's")
+
+
+def _joint_by_words(meaning: Meaning, robot: Robot) -> str | None:
+    """Return the one joint whose name stands in the column's, a word and not a number alone."""
+    there = {*meaning.words, *map(str, meaning.numbers)}
+    sizes: dict[str, int] = {}
+    for joint in robot.joint_names:
+        words = set(words_of(joint)) - _GENERIC
+        if any(not word.isdigit() for word in words) and words <= there:
+            sizes[joint] = len(words)
+    best = [joint for joint, size in sizes.items() if size == max(sizes.values())]
+    return best[0] if len(best) == 1 else None
+
+
+def field_of(meaning: Meaning, robot: Robot) -> str | None:
+    """Return the field of a column: a current that is of no joint is the supply's."""
+    if meaning.field != "current" or meaning.given or meaning.joint is not None:
+        return meaning.field
+    whole = not meaning.numbers and (len(robot.joints) > 1 or bool(_METER & set(meaning.words)))
+    return "meter_current" if whole else "current"

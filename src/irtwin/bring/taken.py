@@ -1,0 +1,294 @@
+"""Columns of logs of one form as channels of the log format, in SI units, and what each was taken for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from irtwin.bring import evidence
+from irtwin.bring.aligned import Aligned
+from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.evidence import Evidence, Motion
+from irtwin.bring.meaning import Meaning
+from irtwin.bring.rtde_names import POWER_AT, is_rtde
+from irtwin.bring.told import LEFT_OUT, Told
+from irtwin.bring.unit import MOTOR, Unit, units
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS, Channel
+
+_EPOCH = (946_684_800.0, 4_102_444_800.0)  # s since 1970: of the years 2000 to 2099
+_CURRENT = (0.3, 100.0)  # A of a motor, at its greatest
+_VOLTAGE = (10.0, 1000.0)  # V of a supply
+_SUPPLY = (0.1, 200.0)  # A of a supply
+_WARM = (-30.0, 130.0)  # degC
+_MAINS = frozenset(["mains", "grid", "netz", "ac", "wall"])
+_BUS = frozenset(["bus", "dc", "dclink", "zwischenkreis"])
+_OF_POWER = ("power", "meter_voltage", "meter_current")
+Units = dict[str, tuple[Unit, str]]  # by column: its unit, and how that was told
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a column was taken for: `channel` is the log format's column, "" where it is not used."""
+
+    column: str
+    channel: str = ""
+    unit: str = ""
+    conversion: str = ""
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class TakenRun:
+    """A run in the log format's columns, SI units; `started`, where its times say it."""
+
+    columns: Mapping[str, np.ndarray]
+    started: datetime | None
+
+
+@dataclass(frozen=True)
+class TakenLogs:
+    """Logs of one form: their columns, runs, and where power was measured, None where it was not."""
+
+    columns: tuple[Taken, ...]
+    runs: tuple[TakenRun, ...]
+    power_at: str | None
+    power_at_why: str
+
+
+def take(logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: Told) -> TakenLogs:
+    """Return logs of the same columns as runs. Raises DoubtError where a unit, or a place, cannot be told."""
+    return _Taking(logs, meanings, robot, told).result()
+
+
+class _Taking:
+    def __init__(self, logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: Told) -> None:
+        self.logs, self.meanings, self.robot, self.told = logs, meanings, robot, told
+        self.where = ", ".join(str(log.recording.path) for log in logs[:3]) + (" ..." if len(logs) > 3 else "")
+        self.units: Units = {}
+        self.motions: list[Motion] = []
+
+    def result(self) -> TakenLogs:
+        self._resolve(
+            "q", lambda joints, _: evidence.position([self.robot.joints[j] for j in joints], self._raw("q", joints))
+        )
+        positions = self._si("q")
+        seconds, started = self._seconds(positions)
+        self.motions = [Motion(*pair) for pair in zip(seconds, positions, strict=True)]
+        self._resolve("dq", lambda joints, si: evidence.rate(self.motions, self._raw("dq", joints), joints, si))
+        self._resolve("ddq", lambda joints, si: evidence.rate(self.motions, self._raw("ddq", joints), joints, si, 2))
+        self._resolve(
+            "torque",
+            lambda joints, si: evidence.torque(self.robot, self.motions, self._raw("torque", joints), joints, si),
+        )
+        if self._of("torque"):
+            torques = self._si("torque")
+            self.motions = [
+                Motion(each.time, each.q, torque) for each, torque in zip(self.motions, torques, strict=True)
+            ]
+        self._resolve("current", lambda joints, si: evidence.by_size(si, self._raw("current", joints), _CURRENT))
+        self._resolve(
+            "temperature", lambda joints, si: _warm(evidence.by_size(si, self._raw("temperature", joints), _WARM))
+        )
+        self._resolve("meter_voltage", lambda _, si: evidence.by_size(si, self._raw("meter_voltage"), _VOLTAGE))
+        self._resolve("meter_current", self._supply_current)
+        self._resolve("power", lambda _, si: evidence.power(self.robot, self.motions, self._raw("power")))
+        power_at, why = self._power_at()
+        rows = tuple(self._row(each) for each in self.meanings)
+        runs = tuple(
+            TakenRun(self._columns(log, time), start)
+            for log, time, start in zip(self.logs, seconds, started, strict=True)
+        )
+        return TakenLogs(rows, runs, power_at, why)
+
+    def _of(self, field: str) -> list[Meaning]:
+        """Return the columns of a channel, base to flange."""
+        found = [each for each in self.meanings if each.field == field]
+        names = self.robot.joint_names
+        return sorted(found, key=lambda each: names.index(each.joint) if each.joint in names else 0)
+
+    def _values(self, log: Aligned, each: Meaning) -> np.ndarray:
+        """Return a column on the joint's side of the gear, in its own unit."""
+        values = log.columns[each.column]
+        if not each.motor:
+            return values
+        ratio = self._ratio(each)
+        return values * ratio if each.field == "torque" else values / ratio
+
+    def _ratio(self, each: Meaning) -> float:
+        ratio = self.told.gear_ratios.get(str(each.joint))
+        if ratio is None:
+            channel = CHANNELS[str(each.field)].column(str(each.joint))
+            unit = each.unit or units(self._si_unit(each))[0]
+            raise DoubtError(
+                f"{self.where}: column {each.column} is of the motor's side by its name; its gear's ratio is not known",
+                [
+                    Answer("of the motor: the gear's ratio", (("--gear-ratio", f"{each.joint}=RATIO"),)),
+                    Answer("of the joint's side", (("--map", f"{each.column}={channel}:{unit.name}"),)),
+                ],
+            )
+        return ratio
+
+    def _raw(self, field: str, joints: Sequence[int] | None = None) -> list[np.ndarray]:
+        """Return a channel of each log, in its own units: (N, joints), or (N,) of the whole robot's."""
+        columns = self._of(field)
+        if joints is None:
+            return [self._values(log, columns[0]) for log in self.logs]
+        return [np.column_stack([self._values(log, columns[joint]) for joint in joints]) for log in self.logs]
+
+    def _si(self, field: str) -> list[np.ndarray]:
+        columns = self._of(field)
+        return [
+            np.column_stack([self.units[each.column][0].to_si(self._values(log, each)) for each in columns])
+            for log in self.logs
+        ]
+
+    def _si_unit(self, each: Meaning) -> str:
+        kind = "" if each.joint is None else self.robot.joints[self.robot.index(each.joint)].kind
+        return CHANNELS[str(each.field)].unit_of(kind)
+
+    def _resolve(self, field: str, look: Callable[[list[int], str], Evidence]) -> None:
+        """Find the unit of each column of a channel; those of one quantity share it where they say none."""
+        columns = self._of(field)
+        for si in dict.fromkeys(self._si_unit(each) for each in columns):
+            places = [place for place, each in enumerate(columns) if self._si_unit(each) == si]
+            self._share([columns[place] for place in places], si, lambda places=places, si=si: look(places, si))  # type: ignore[misc]
+
+    def _share(self, columns: Sequence[Meaning], si: str, look: Callable[[], Evidence]) -> None:
+        said = sorted((each for each in columns if each.unit is not None), key=lambda each: not each.given)
+        seen = None if said and said[0].given else look()
+        for each in columns:
+            if each.unit is None and said:
+                self.units[each.column] = _known(said[0].unit), f"as {said[0].column}"
+            elif each.unit is None and seen is not None:
+                if seen.choice is None:
+                    raise self._doubt(
+                        each, f"could be in {_or(seen.allowed or units(si))}: {seen.why}", seen.allowed or units(si)
+                    )
+                self.units[each.column] = seen.choice, seen.why
+            else:
+                unit = _known(each.unit)
+                if seen is not None and unit not in seen.allowed:
+                    question = f"is in {unit.name} {each.unit_why}, and cannot be: {seen.why}"
+                    raise self._doubt(each, question, [*([seen.choice] if seen.choice else seen.allowed), unit])
+                self.units[each.column] = unit, each.unit_why
+
+    def _doubt(self, each: Meaning, question: str, choices: Sequence[Unit]) -> DoubtError:
+        channel = CHANNELS[str(each.field)].column(str(each.joint))
+        answers = [Answer(unit.name, (("--map", f"{each.column}={channel}:{unit.name}"),)) for unit in choices]
+        if each.field not in ("q", "time"):
+            answers.append(Answer("leave it out", (("--map", f"{each.column}={LEFT_OUT}"),)))
+        return DoubtError(f"{self.where}: column {each.column} ({CHANNELS[str(each.field)].label}) {question}", answers)
+
+    def _supply_current(self, _: list[int], si: str) -> Evidence:
+        amperes = self._raw("meter_current")
+        if not self._of("meter_voltage"):
+            return evidence.by_size(si, amperes, _SUPPLY)
+        column = self._of("meter_voltage")[0]
+        volts = [self.units[column.column][0].to_si(log.columns[column.column]) for log in self.logs]
+        return evidence.supply_current(self.robot, self.motions, volts, amperes)
+
+    def _seconds(self, positions: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[datetime | None]]:
+        """Return the times of each log, s, and when it started where its times say that."""
+        (column,) = self._of("time")
+        if self.logs[0].time.dtype.kind == "M":
+            self.units[column.column] = units("s")[0], "from the first date and time on"
+            return (
+                [(log.time - log.time[0]).astype("int64") / 1e9 for log in self.logs],
+                [_moment(int(log.time[0].astype("int64"))) for log in self.logs],
+            )
+        pairs = [(log.time.astype(float), q) for log, q in zip(self.logs, positions, strict=True)]
+        self._share([column], "s", lambda: evidence.time(self.robot, pairs))
+        unit = self.units[column.column][0]
+        found: list[tuple[np.ndarray, datetime | None]] = []
+        for log in self.logs:
+            first = float(log.time[0]) * unit.factor
+            if not _EPOCH[0] <= first < _EPOCH[1]:
+                found.append((unit.to_si(log.time.astype(float)), None))
+                continue
+            whole = int(log.time[0]) if log.time.dtype.kind in "iu" else None
+            nanoseconds = round(first * 1e9) if whole is None else whole * round(unit.factor * 1e9)
+            found.append((unit.to_si((log.time - log.time[0]).astype(float)), _moment(nanoseconds)))
+        if found[0][1] is not None:
+            self.units[column.column] = unit, f"{self.units[column.column][1]}; since 1970, s from the first"
+        return [time for time, _ in found], [started for _, started in found]
+
+    def _power_at(self) -> tuple[str | None, str]:
+        columns = [each for field in _OF_POWER for each in self._of(field)]
+        if not ({"power"} <= {each.field for each in columns} or len(columns) == 2):
+            return None, ""
+        if self.told.power_at is not None:
+            return self.told.power_at, "as --power-at says"
+        if is_rtde(self.logs[0].recording.columns):
+            return POWER_AT, "RTDE's voltage and current are those of the arm's 48 V"
+        words = {word for each in columns for word in each.words}
+        for place, there in (("mains", _MAINS), ("dc_bus", _BUS)):
+            if words & there and not words & ((_MAINS | _BUS) - there):
+                return place, f"by the name of {columns[0].column}"
+        raise DoubtError(
+            f"{self.where}: column {columns[0].column}: nothing says whether power was measured at the mains or "
+            "on the DC bus",
+            [Answer("at the mains", (("--power-at", "mains"),)), Answer("on the DC bus", (("--power-at", "dc_bus"),))],
+        )
+
+    def _columns(self, log: Aligned, time: np.ndarray) -> dict[str, np.ndarray]:
+        columns = {"time": time}
+        for field, channel in CHANNELS.items():
+            if field == "time":
+                continue
+            for each in self._of(field):
+                values = self._values(log, each)
+                columns[channel.column(str(each.joint))] = self.units[each.column][0].to_si(values)
+                _check_size(log, each.column, columns[channel.column(str(each.joint))], channel)
+        return columns
+
+    def _row(self, each: Meaning) -> Taken:
+        if each.field is None:
+            return Taken(each.column, why=each.why)
+        unit, unit_why = self.units[each.column]
+        steps = []
+        if each.motor:
+            sign = "x" if each.field == "torque" else "/"
+            steps.append(f"{sign} {self._ratio(each):g} (gear)")
+        if unit.factor != 1.0:
+            steps.append(f"x {unit.factor:.6g}")
+        if unit.offset:
+            steps.append(f"{'+' if unit.offset > 0 else '-'} {abs(unit.offset):.6g}")
+        name = f"{MOTOR}{unit.name}" if each.motor else unit.name
+        if self.logs[0].time.dtype.kind == "M" and each.field == "time":
+            name = "date and time"
+        why = each.why if unit_why in ("", each.why) else f"{each.why}; {unit.name} {unit_why}"
+        channel = CHANNELS[each.field].column(str(each.joint))
+        return Taken(each.column, channel, name, " ".join(steps) or "none", why)
+
+
+def _known(unit: Unit | None) -> Unit:
+    if unit is None:
+        raise TypeError("a unit that is said")
+    return unit
+
+
+def _or(choices: Sequence[Unit]) -> str:
+    return " or ".join(unit.name for unit in choices)
+
+
+def _warm(found: Evidence) -> Evidence:
+    """Temperatures that could be degC are: degF is taken by name alone."""
+    celsius = next((unit for unit in found.allowed if unit.name == "degC"), None)
+    return Evidence(celsius or found.choice, found.allowed, found.why)
+
+
+def _check_size(log: Aligned, column: str, values: np.ndarray, channel: Channel) -> None:
+    if (greatest := float(np.abs(values).max())) > channel.greatest:
+        raise InputError(
+            f"{log.recording.path}: column {column} reaches {greatest:.3g} {channel.unit}, which no robot does; "
+            f"correct it, or leave it out: --map '{column}={LEFT_OUT}'"
+        )
+
+
+def _moment(nanoseconds: int) -> datetime:
+    return datetime.fromtimestamp(0, UTC) + timedelta(microseconds=nanoseconds // 1000)

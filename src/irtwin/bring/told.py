@@ -1,0 +1,115 @@
+"""What the user says of a log on the command line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from irtwin.bring.unit import MOTOR, Unit, unit_of
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS, by_column
+
+LEFT_OUT = "-"
+_POWER_AT = ("mains", "dc_bus")
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a column was said to be: `field` of Signals, None to leave it out; `joint`, `unit` where they were said."""
+
+    field: str | None
+    joint: str | None = None
+    unit: Unit | None = None
+    motor: bool = False
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the user says: columns (`*` stands for any letters) with what they are; gear ratios by joint; power_at."""
+
+    columns: Mapping[str, Target] = field(default_factory=dict)
+    gear_ratios: Mapping[str, float] = field(default_factory=dict)
+    power_at: str | None = None
+
+    def of(self, column: str) -> Target | None:
+        """Return what was said of a column: of it alone before what is said of many."""
+        if column in self.columns:
+            return self.columns[column]
+        patterns = (pattern for pattern in self.columns if "*" in pattern and fits(pattern, column))
+        found = max(patterns, key=len, default=None)
+        return None if found is None else self.columns[found]
+
+    def check(self, columns: Iterable[str]) -> None:
+        """Raise InputError where something was said of a column that no file has."""
+        names = list(columns)
+        for said in self.columns:
+            if said not in names and not any("*" in said and fits(said, name) for name in names):
+                raise InputError(f"--map {said}=...: no file has such a column; there are {', '.join(names[:12])}")
+
+
+def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot: Robot) -> Told:
+    """Read what the options say. Raises InputError, naming the option and what may stand there."""
+    if power_at is not None and power_at not in _POWER_AT:
+        raise InputError(f"--power-at {power_at}: use {' or '.join(_POWER_AT)}")
+    gears: dict[str, float] = {
+        joint.name: joint.gear_ratio for joint in robot.joints if joint.gear_ratio is not None and joint.gear_ratio > 0
+    }
+    for text in ratios:
+        gears |= _ratios(text, robot)
+    return Told(dict(_target(text, robot) for text in maps), gears, power_at)
+
+
+def fits(pattern: str, name: str) -> bool:
+    """Whether a pattern, in which * stands for any letters, is of a name."""
+    return re.fullmatch(".*".join(map(re.escape, pattern.split("*"))), name, re.DOTALL) is not None
+
+
+def _ratios(text: str, robot: Robot) -> dict[str, float]:
+    joint, _, number = text.rpartition("=")
+    try:
+        ratio = float(number)
+    except ValueError:
+        ratio = 0.0
+    if not 0 < ratio < 1e6:
+        raise InputError(f"--gear-ratio {text}: give RATIO or JOINT=RATIO, motor turns for one of the joint, as 100")
+    if joint and joint not in robot.joint_names:
+        raise InputError(f'--gear-ratio {text}: the robot has no joint "{joint}" (it has {_names(robot)})')
+    return {name: ratio for name in robot.joint_names if joint in ("", name)}
+
+
+def _target(text: str, robot: Robot) -> tuple[str, Target]:
+    column, sign, said = text.rpartition("=")
+    if not sign or not column:
+        raise InputError(
+            f"--map {text}: give COLUMN=CHANNEL or COLUMN=CHANNEL:UNIT, as J1=q_{robot.joint_names[0]}:deg"
+        )
+    if said == LEFT_OUT:
+        return column, Target(None)
+    known = by_column(robot.joint_names)
+    channel, unit_text = said, ""
+    if said not in known and ":" in said:
+        channel, _, unit_text = said.rpartition(":")
+    fields = [name for name, each in CHANNELS.items() if channel in (each.prefix, *each.columns(robot.joint_names))]
+    if not fields:
+        prefixes = ", ".join(each.prefix for each in CHANNELS.values())
+        raise InputError(
+            f"--map {text}: {channel} is no channel; use {prefixes}, with _JOINT where it is of a joint "
+            f"({_names(robot)}), or - to leave the column out"
+        )
+    field_name = fields[0]
+    each = CHANNELS[field_name]
+    joint = next((name for name in robot.joint_names if each.per_joint and each.column(name) == channel), None)
+    quantities = tuple({each.unit_of(one.kind) for one in robot.joints if joint in (None, one.name)})
+    motor = unit_text.startswith(MOTOR)
+    unit = unit_of(unit_text.removeprefix(MOTOR), quantities) if unit_text else None
+    if unit_text and unit is None:
+        raise InputError(
+            f"--map {text}: {unit_text} is no unit of {each.label}; its SI unit is {' or '.join(quantities)}"
+        )
+    return column, Target(field_name, joint, unit, motor)
+
+
+def _names(robot: Robot) -> str:
+    return ", ".join(robot.joint_names)

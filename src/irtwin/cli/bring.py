@@ -1,0 +1,138 @@
+"""Commands that begin a data set: `import` from logs of others, `init` an empty one."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from irtwin.cli.options import Number, payload_com_option, printable, say
+
+if TYPE_CHECKING:
+    from irtwin.bring.bring import Brought
+    from irtwin.bring.doubt import Answer, DoubtError
+    from irtwin.bring.taken import Taken
+
+_robot_help = "URDF file, data set or its dataset.toml, or the name of a robot that is known, as kuka_kr6_r700."
+_WIDE = 160  # characters of a table that goes into a file
+_name_option = click.option("--name", metavar="NAME", help="Robot's name in the data set. Default: its description's.")
+
+
+@click.command(name="import")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="New folder for the data set.")
+@click.option("--robot", required=True, metavar="ROBOT", help=_robot_help)
+@_name_option
+@click.option(
+    "--map", "maps", metavar="COLUMN=CHANNEL[:UNIT]", multiple=True,
+    help="What a column is, as J1=q_joint_1:deg, or COLUMN=- to leave it out. * stands for any letters.",
+)  # fmt: skip
+@click.option(
+    "--gear-ratio", "gear_ratios", metavar="[JOINT=]RATIO", multiple=True,
+    help="Motor turns for one of the joint; makes joint angles of motor angles.",
+)  # fmt: skip
+@click.option("--power-at", type=click.Choice(["mains", "dc_bus"]), help="Where electrical power was measured.")
+@click.option("--topic", "topics", metavar="COLUMN=TOPIC", multiple=True, help="Which topic of a bag to take.")
+@click.option(
+    "--fixed", metavar="JOINT", multiple=True, help="Joint that stood still and is not logged, as a gripper's."
+)
+@click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
+@payload_com_option
+@click.option("--repair", is_flag=True, help="Drop samples whose time does not rise, and say how many.")
+def import_(
+    files: tuple[Path, ...],
+    out: Path,
+    robot: str,
+    name: str | None,
+    maps: tuple[str, ...],
+    gear_ratios: tuple[str, ...],
+    power_at: str | None,
+    topics: tuple[str, ...],
+    fixed: tuple[str, ...],
+    payload_mass: float | None,
+    payload_com: tuple[float, float, float],
+    repair: bool,
+) -> None:
+    """Make a data set of logs in other formats, a run a file.
+
+    FILE is a ROS bag (1, 2, MCAP), a recording of RTDE by Universal Robots, a CSV file of PlotJuggler or of anybody, a
+    Parquet or an Excel file. Units are told by names and by checks against other columns, and shown. What cannot be
+    told is asked on a terminal; elsewhere the command stops and says what to give.
+    """
+    from irtwin.bring.bring import Options, bring, found_in
+
+    options = Options(
+        name=name, maps=maps, gear_ratios=gear_ratios, topics=topics, fixed=fixed, power_at=power_at,
+        payload_mass=payload_mass, payload_com=payload_com, repair=repair,
+    )  # fmt: skip
+    ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
+    brought = bring(files, out, robot, options, ask)
+    _show(brought)
+    for line in (*brought.said, *found_in(out)):
+        say(f"irtwin: {line}")
+    say(f"Written: {out}. Read its dataset.toml; then: irtwin run {out}")
+
+
+@click.command()
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option("--robot", metavar="ROBOT", help=_robot_help)
+@_name_option
+def init(dataset: Path, robot: str | None, name: str | None) -> None:
+    """Write an empty data set to fill in: a folder whose dataset.toml explains each key.
+
+    DATASET is a new folder. Put logs into its folder runs/ and list them in dataset.toml; `irtwin import` does both for
+    logs in other formats.
+    """
+    from irtwin.bring.bring import init as write_empty
+
+    write_empty(dataset, robot, name)
+    if robot is None:
+        say(f"Put the robot's URDF into {dataset} as robot.urdf.")
+    say(f"Put runs into {dataset / 'runs'}, list them in {dataset / 'dataset.toml'}; then: irtwin check {dataset}")
+    click.echo(dataset)
+
+
+def _ask(doubt: DoubtError) -> Answer:
+    """Ask a person which answer is right."""
+    say(doubt.question)
+    for number, answer in enumerate(doubt.answers, start=1):
+        say(f"  {number}  {answer.label}   ({answer.text})")
+    chosen = doubt.answers[click.prompt("Which", type=click.IntRange(1, len(doubt.answers)), err=True) - 1]
+    options = []
+    for option, value in chosen.options:
+        if value.endswith("RATIO"):
+            value = value.removesuffix("RATIO") + str(click.prompt("Ratio", type=float, err=True))
+        options.append((option, value))
+    return replace(chosen, options=tuple(options))
+
+
+def _show(brought: Brought) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console()
+    wide = Console(width=None if console.is_terminal else _WIDE)
+    for form in brought.forms:
+        files = ", ".join(file.name for file in form.files[:4]) + (" ..." if len(form.files) > 4 else "")
+        title = Text(printable(f"{files}: {form.form}"))
+        table = Table("column", "channel", "unit", "conversion", "why", title=title)
+        table.title_justify = "left"
+        rows: dict[tuple[str, ...], list[Taken]] = {}
+        for each in form.columns:
+            rows.setdefault((each.unit, each.conversion, each.why) if each.channel else ("", "", each.why), []).append(
+                each
+            )
+        for said, columns in rows.items():
+            if columns[0].channel:
+                names = "\n".join(printable(each.column) for each in columns)
+                channels = "\n".join(printable(each.channel) for each in columns)
+                table.add_row(*map(Text, (names, channels, *map(printable, said))))
+        wide.print(table)
+        for said, columns in rows.items():
+            if not columns[0].channel:
+                names = ", ".join(each.column for each in columns)
+                wide.print(Text(printable(f"not used, {said[-1]}: {names}")))

@@ -1,0 +1,425 @@
+"""Logs of others become data sets: the same numbers in SI units; what cannot be told is asked."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.bring.dialects import NAME, good, per_joint, robot, signals, write_text
+from tests.data_sets import irtwin
+from tests.live.controller import Controller
+
+from irtwin.bring.bring import Options, bring, init
+from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.robot_library import robot_of, robots
+from irtwin.check.check import check
+from irtwin.errors import InputError
+from irtwin.ros.bags import write_bag
+from irtwin.signals.channels import columns_of
+from irtwin.signals.log import (
+    DATA_SET_KEYS,
+    ROBOT_KEYS,
+    RUN_KEYS,
+    SHEET_KEYS,
+    TWIN_KEYS,
+    DataSet,
+    read_data_set,
+)
+
+MEASURED = Path(__file__).parents[3] / "shared/data"
+STARTED = datetime(2026, 3, 2, 8, 0, 0, 250_000, tzinfo=UTC)
+MAINS = Options(power_at="mains")
+
+
+def brought(file: Path, options: Options = MAINS, robot_name: str = NAME) -> DataSet:
+    out = file.parent / "set"
+    bring([file], out, robot_name, options)
+    return read_data_set(out)
+
+
+def assert_same(data_set: DataSet, fields: str = "time q torque power", tolerance: float = 1e-12) -> None:
+    found, true = data_set.runs[0].signals, signals(good())
+    for field in fields.split():
+        np.testing.assert_allclose(
+            getattr(found, field), getattr(true, field), rtol=tolerance, atol=tolerance, err_msg=field
+        )
+
+
+def german(folder: Path) -> Path:
+    columns = {"Zeit [ms]": 1000 * good()["time"]}
+    columns |= per_joint("q", "A{} Istposition [Grad]", factor=180 / np.pi)
+    columns |= per_joint("tau", "Drehmoment A{} [Nm]") | {"Wirkleistung Netz [kW]": good()["power"] / 1000}
+    return write_text(folder / "trace.csv", columns, ";", ",", head=["Trace;of;monday"])
+
+
+def nameless_units(folder: Path) -> Path:
+    columns = {"t": 1e6 * good()["time"]} | per_joint("tau", "torque_{}", 0, factor=1000)
+    columns |= per_joint("q", "pos_{}", 0, factor=180 / np.pi) | per_joint("dq", "vel_{}", 0, factor=30 / np.pi)
+    return write_text(folder / "run.csv", columns | {"power": good()["power"] / 1000})
+
+
+def row_of_units(folder: Path) -> Path:
+    columns = {"time": good()["time"]} | per_joint("q", "joint {}", factor=180 / np.pi)
+    columns |= per_joint("tau", "effort {}") | {"p_el power": good()["power"]}
+    units = ["s", *["deg"] * 6, *["Nm"] * 6, "W"]
+    return write_text(folder / "run.txt", columns, "\t", units=units)
+
+
+def iso_times(folder: Path) -> Path:
+    moments = np.datetime64(STARTED.replace(tzinfo=None), "us") + np.round(good()["time"] * 1e6).astype(
+        "timedelta64[us]"
+    )
+    columns: dict[str, np.ndarray | list[str]] = {"datetime": [f"{moment}Z" for moment in moments]}
+    columns |= per_joint("q", "J{} (rad)") | per_joint("tau", "J{} [Nm]") | {"P [W]": good()["power"]}
+    return write_text(folder / "run.csv", columns)
+
+
+def epoch_times(folder: Path) -> Path:
+    first = int(STARTED.timestamp()) * 10**9 + STARTED.microsecond * 1000
+    stamps = [str(first + round(time * 1e9)) for time in good()["time"].tolist()]
+    columns = {"timestamp": stamps} | per_joint("q", "act_pos_A{}") | per_joint("tau", "act_trq_A{}")
+    return write_text(folder / "run.csv", columns | {"power": good()["power"]}, " ")
+
+
+def plot_juggler(folder: Path) -> Path:
+    """Topics of two rates, on one axis of time: what did not come at a time is blank."""
+    time = good()["time"]
+    power = good()["power"].copy()
+    power[1:-1:2] = np.nan
+    columns = {"__time": 1_772_438_400.0 + time}
+    for k, joint in enumerate(robot().joint_names, start=1):
+        columns[f"/joint_states/joint_a{k}/position"] = good()[f"q_{joint}"]
+        columns[f"/joint_states/joint_a{k}/velocity"] = good()[f"dq_{joint}"]
+        columns[f"/joint_states/joint_a{k}/effort"] = good()[f"tau_{joint}"]
+    columns |= {"/joint_states/header/stamp": time, "/meter/mains/power": power}
+    return write_text(folder / "plot.csv", columns)
+
+
+def motor_side(folder: Path) -> Path:
+    columns = {"time_s": good()["time"]} | per_joint("q", "motor_pos_{}_deg", factor=100 * 180 / np.pi)
+    columns |= per_joint("tau", "motor_torque_{}_Nm", factor=0.01)
+    return write_text(folder / "run.csv", columns)
+
+
+def parquet(folder: Path) -> Path:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    columns = {"time": (1e9 * good()["time"]).round().astype("datetime64[ns]")} | per_joint("q", "q{}")
+    pyarrow.parquet.write_table(pa.table(columns | per_joint("tau", "tau{}")), folder / "run.parquet")
+    return folder / "run.parquet"
+
+
+def excel(folder: Path) -> Path:
+    import openpyxl
+
+    columns = {"Time (s)": good()["time"]} | per_joint("q", "Joint {} position (deg)", factor=180 / np.pi)
+    columns |= per_joint("tau", "Joint {} torque (Nm)") | {"Mains power (kW)": good()["power"] / 1000}
+    book = openpyxl.Workbook(write_only=True)
+    book.create_sheet("Notes").append(["who measured", "nobody"])
+    sheet = book.create_sheet("Log")
+    sheet.append(["Log of monday"])
+    sheet.append(list(columns))
+    for row in np.column_stack(list(columns.values())).tolist():
+        sheet.append(row)
+    book.save(folder / "log.xlsx")
+    return folder / "log.xlsx"
+
+
+@pytest.mark.parametrize(
+    ("form", "options", "fields"),
+    [
+        (german, Options(), "time q torque power"),
+        (nameless_units, MAINS, "time q dq torque power"),
+        (row_of_units, MAINS, "time q torque power"),
+        (iso_times, MAINS, "q torque power"),
+        (epoch_times, MAINS, "q torque power"),
+        (plot_juggler, Options(), "q dq torque"),
+        (motor_side, Options(gear_ratios=("100",)), "time q torque"),
+        (parquet, Options(), "time q torque"),
+        (excel, Options(), "time q torque power"),
+    ],
+)
+def test_a_log_in_a_dialect_comes_back_in_si_units(
+    tmp_path: Path, form: Callable[[Path], Path], options: Options, fields: str
+) -> None:
+    assert_same(brought(form(tmp_path), options), fields)
+
+
+@pytest.mark.parametrize("form", ["run.bag", "run.mcap", "run"])
+def test_a_bag_comes_back_to_the_last_bit(tmp_path: Path, form: str) -> None:
+    write_bag(tmp_path / form, robot(), signals(good()), STARTED)
+    said = irtwin("import", tmp_path / form, "--robot", NAME, "--power-at", "mains", "--out", tmp_path / "set")
+    assert said.status == 0
+    assert_same(read_data_set(tmp_path / "set"), "q dq torque power temperature", tolerance=0)
+
+
+def recording_of_rtde(folder: Path, delimiter: str = " ") -> Path:
+    """A recording as UR's record.py writes it, by the csv module: the variables of a recipe, vectors numbered."""
+    columns = (
+        {"timestamp": 7321.5 + good()["time"]} | per_joint("q", "target_q_{}", 0) | per_joint("q", "actual_q_{}", 0)
+    )
+    columns |= per_joint("dq", "actual_qd_{}", 0) | per_joint("tau", "actual_current_{}", 0, factor=0.1)
+    columns |= per_joint("tau", "target_moment_{}", 0) | per_joint("temp", "joint_temperatures_{}", 0)
+    columns |= {
+        "actual_robot_voltage": np.full(len(good()["time"]), 48.0),
+        "actual_robot_current": good()["power"] / 48,
+    }
+    columns |= {"payload": np.full(len(good()["time"]), 2.5), "speed_scaling": np.ones(len(good()["time"]))}
+    columns |= {f"payload_cog_{axis}": np.full(len(good()["time"]), 0.01 * axis) for axis in range(3)}
+    with (folder / "robot_data.csv").open("w", newline="") as file:
+        writer = csv.writer(file, delimiter=delimiter)
+        writer.writerow(columns)
+        writer.writerows(np.column_stack(list(columns.values())).tolist())
+    return folder / "robot_data.csv"
+
+
+@pytest.mark.parametrize("delimiter", [" ", ","])  # UR's writer, and that of ur_rtde
+def test_a_recording_of_rtde_needs_no_word(tmp_path: Path, delimiter: str) -> None:
+    said = irtwin("import", recording_of_rtde(tmp_path, delimiter), "--robot", NAME, "--out", tmp_path / "set")
+    assert said.status == 0
+    assert re.search(r"not used, what the controller wanted.*: target_q_0,", said.out)
+    data_set = read_data_set(tmp_path / "set")
+    assert_same(data_set, "q dq power temperature")
+    (run,) = data_set.runs
+    np.testing.assert_allclose(run.signals.current, 0.1 * signals(good()).torque)
+    assert run.signals.torque is None  # target_moment is no measurement
+    assert (run.payload_mass, run.payload_com, data_set.power_at) == (2.5, (0.0, 0.01, 0.02), "dc_bus")
+    assert check(data_set).sound
+
+
+@pytest.mark.system
+def test_a_measured_recording_comes_back_to_the_last_bit(tmp_path: Path) -> None:
+    if not MEASURED.is_dir():
+        pytest.skip("the measured logs are not here")
+    true = read_data_set(MEASURED / "ur3_power")
+    (run,) = true.runs
+    columns = {"timestamp": run.signals.time, "actual_robot_voltage": np.full(len(run.signals.time), 48.0)}
+    for prefix, name in (
+        ("q", "actual_q"),
+        ("dq", "actual_qd"),
+        ("i", "actual_current"),
+        ("temp", "joint_temperatures"),
+    ):
+        for joint, of in enumerate(true.robot.joint_names):
+            columns[f"{name}_{joint}"] = columns_of(run.signals, true.robot.joint_names)[f"{prefix}_{of}"]
+    assert run.signals.power is not None
+    log = write_text(tmp_path / "run.csv", columns | {"actual_robot_current": run.signals.power / 48.0}, " ")
+    bring([log], tmp_path / "set", str(MEASURED / "ur3_power"), Options())
+    (found,) = read_data_set(tmp_path / "set").runs
+    for field in ("time", "q", "dq", "current", "temperature"):
+        np.testing.assert_array_equal(getattr(found.signals, field), getattr(run.signals, field))
+    assert found.signals.power == pytest.approx(run.signals.power)
+
+
+def test_a_recording_that_ur_rtde_made(tmp_path: Path) -> None:
+    """Made by RTDEReceiveInterface.startFileRecording of ur_rtde 1.6.5, connected to tests/live/controller.py."""
+    log, controller = Path(__file__).parent / "data" / "ur_rtde.csv", Controller()
+    said = bring([log], tmp_path / "set", NAME, Options(maps=("actual_qd_*=dq:rad/s",))).said  # they are no derivatives
+    assert said == (f"{log}: 3 rows left out, the first line 7: they repeat the row before, time and all",)
+    data_set = read_data_set(tmp_path / "set")
+    (run,) = data_set.runs
+    rows = np.round((run.signals.time - 1000.0) / controller.step).astype(int).tolist()
+    for field, variable in (("q", "actual_q"), ("dq", "actual_qd"), ("current", "actual_current")):
+        true = [controller.value(variable, row) for row in rows]
+        np.testing.assert_allclose(getattr(run.signals, field), true, atol=1e-6, err_msg=field)
+    assert run.signals.power == pytest.approx([48 * controller.value("actual_robot_current", row)[0] for row in rows])
+    assert (run.payload_mass, data_set.power_at) == (1.5, "dc_bus")
+
+
+def test_a_payload_that_changes_is_no_runs_payload(tmp_path: Path) -> None:
+    log = recording_of_rtde(tmp_path)
+    head, *lines = log.read_text().splitlines()
+    place = head.split().index("payload")
+    later = [" ".join([*(cells := line.split())[:place], "4.0", *cells[place + 1 :]]) for line in lines[200:]]
+    log.write_text("\n".join([head, *lines[:200], *later]))
+    with pytest.raises(InputError, match=r"line 202, column payload: the payload changes; cut the log there into two"):
+        bring([log], tmp_path / "set", NAME, Options())
+
+
+def plain(folder: Path, **changes: np.ndarray) -> Path:
+    columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "trq{}")
+    return write_text(folder / "run.csv", columns | changes)
+
+
+@pytest.mark.parametrize(
+    ("columns", "options", "question", "gives"),
+    [
+        ({"power": "power"}, Options(), "column power: nothing says whether power was measured", "--power-at mains or"),
+        (
+            {f"speed{k}": "time" for k in range(1, 7)}, Options(), r"speed1 \(speed\) could be in rad/s or deg/s",
+            "--map speed1=dq_joint_a1:rad/s or",
+        ),
+        (
+            {f"position_filtered{k}": f"q_joint_a{k}" for k in range(1, 7)}, Options(),
+            "columns pos1 to pos6 and position_filtered1 to position_filtered6 could each be position",
+            "--map 'position_filtered*=-' or --map pos1=-",
+        ),
+        (
+            {f"motor_torque{k}": f"tau_joint_a{k}" for k in range(1, 7)}, Options(maps=("trq*=-",)),
+            "column motor_torque1 is of the motor's side by its name", "--gear-ratio joint_a1=RATIO or --map",
+        ),
+        (
+            {"power_W": "time"}, MAINS, r"column power_W \(electrical power\) is in W by its name, and cannot be",
+            "--map power_W=power:W or --map power_W=-",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_told_stops_with_what_to_give(
+    tmp_path: Path, columns: dict[str, str], options: Options, question: str, gives: str
+) -> None:
+    log = plain(tmp_path, **{name: good()[of] * (1e-3 if name == "power_W" else 1) for name, of in columns.items()})
+    with pytest.raises(DoubtError, match=question) as doubt:
+        bring([log], tmp_path / "set", NAME, options)
+    assert gives in str(doubt.value)
+    assert sorted(tmp_path.iterdir()) == [log]
+
+
+def test_numbers_of_a_message_of_ros_say_no_joint(tmp_path: Path) -> None:
+    columns = {"time": good()["time"]} | per_joint("q", "/joint_states/position[{}]", 0)
+    log = write_text(tmp_path / "run.csv", columns | per_joint("tau", "/joint_states/effort[{}]", 0))
+    with pytest.raises(DoubtError, match="joints come in any order") as doubt:
+        bring([log], tmp_path / "set", NAME, Options())
+    (answer,) = doubt.value.answers
+    assert answer.text == "--map '/joint_states/position[*]=q'"
+    bring([log], tmp_path / "set", NAME, Options(), lambda doubt: doubt.answers[0])
+    assert_same(read_data_set(tmp_path / "set"), "q torque")
+
+
+def test_an_answer_is_taken_as_if_it_had_been_typed(tmp_path: Path) -> None:
+    log = plain(tmp_path, power=good()["power"], **{f"load{k}": good()[f"tau_joint_a{k}"] for k in range(1, 7)})
+    asked: list[str] = []
+
+    def ask(doubt: DoubtError) -> Answer:
+        asked.append(doubt.question)
+        return doubt.answers[-1]
+
+    bring([log], tmp_path / "set", NAME, Options(maps=("load*=tau", "trq*=-")), ask)
+    assert len(asked) == 1
+    assert read_data_set(tmp_path / "set").power_at == "dc_bus"
+    assert_same(read_data_set(tmp_path / "set"))
+
+
+def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None:
+    columns = {"time": good()["time"]} | per_joint("q", "c{}", factor=1000.0) | per_joint("tau", "trq{}")
+    maps = [f"c{k}=q_joint_a{k}{':mrad' if k == 1 else ''}" for k in range(1, 7)]
+    log = write_text(tmp_path / "run.csv", columns)
+    said = irtwin(
+        "import", log, "--robot", NAME, "--out", tmp_path / "set", *(x for one in maps for x in ("--map", one))
+    )
+    assert said.status == 0
+    assert "mrad as c1" in said.out
+    assert_same(read_data_set(tmp_path / "set"), "q torque")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (Options(maps=("nothing=q",)), "--map nothing=...: no file has such a column; there are time, pos1"),
+        (Options(maps=("pos1=angle",)), "angle is no channel; use time, q, dq"),
+        (Options(maps=("pos1=q:Nm",)), "Nm is no unit of position; its SI unit is rad"),
+        (Options(maps=("pos1",)), "give COLUMN=CHANNEL or COLUMN=CHANNEL:UNIT"),
+        (Options(maps=("pos1=-",)), "no column was taken for the position of joint_a1; say which it is: --map COLUMN="),
+        (Options(gear_ratios=("joint_x=3",)), 'the robot has no joint "joint_x"'),
+        (Options(gear_ratios=("a lot",)), "give RATIO or JOINT=RATIO"),
+        (Options(topics=("power",)), "--topic power: give COLUMN=TOPIC"),
+    ],
+)
+def test_a_word_that_says_nothing_is_refused(tmp_path: Path, options: Options, says: str) -> None:
+    with pytest.raises(InputError, match=re.escape(says)):
+        bring([plain(tmp_path)], tmp_path / "set", NAME, options)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("", "is empty"),
+        ("just a line of words", "no delimiter"),
+        ("\0\0\0", "is no text"),
+        ("time,a,b\n" + "0,1,2\n" * 30 + "1,2\n", "line 32: 2 values instead of 3"),
+        (
+            "t,a,b,c\n" + "0,1,2,5,1,2,3,4\n" * 30,
+            "have 8 values, the line above them 4 names; where decimals",
+        ),
+        ("time,a,b\n" + "10:30:00,1,2\n" * 30, "column time holds neither numbers nor dates and times of ISO 8601"),
+        ("time,a,a\n" + "0,1,2\n" * 30, "column a occurs twice"),
+        ("time,a,b\n" + "0,1,2\n" * 60 + "0,x,2\n", "line 62, column a: 'x' is no number"),
+    ],
+)
+def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, content: str, says: str) -> None:
+    (tmp_path / "run.csv").write_text(content)
+    with pytest.raises(InputError, match=re.escape(says)):
+        bring([tmp_path / "run.csv"], tmp_path / "set", NAME, Options())
+
+
+def test_several_logs_are_several_runs_and_a_taken_folder_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    logs = [plain(tmp_path), plain(tmp_path / "other")]
+    assert len(bring(logs, tmp_path / "set", NAME, Options(name="Mine")).forms) == 1
+    data_set = read_data_set(tmp_path / "set")
+    assert ([run.name for run in data_set.runs], data_set.robot.name) == (["run", "run_2"], "Mine")
+    before = (tmp_path / "set" / "dataset.toml").read_bytes()
+    with pytest.raises(InputError, match="is not empty; name a new folder"):
+        bring(logs, tmp_path / "set", NAME, Options())
+    assert (tmp_path / "set" / "dataset.toml").read_bytes() == before
+
+
+def test_a_robot_is_known_by_name_where_its_package_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InputError, match=r"no robot of that name; there is kuka_kr6_r700"):
+        robot_of("KUKA KR6 R70")
+    described = tmp_path / "share" / "arm6_robot.urdf"
+    described.parent.mkdir()
+    described.write_text(robot().urdf)
+    info = tmp_path / "example_robot_data-6.0.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: example-robot-data\nVersion: 6.0.0\n")
+    (info / "RECORD").write_text("share/arm6_robot.urdf,,\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    robots.cache_clear()
+    found, origin = robot_of("Arm-6")
+    robots.cache_clear()
+    assert found.joint_names == robot().joint_names
+    assert origin == "arm6 of example-robot-data"
+
+
+def test_a_joint_that_is_not_logged_can_be_fixed(tmp_path: Path) -> None:
+    columns = {"time": good()["time"]} | {f"q_joint_a{k}": good()[f"q_joint_a{k}"] for k in range(1, 6)}
+    log = write_text(
+        tmp_path / "run.csv", columns | {f"tau_joint_a{k}": good()[f"tau_joint_a{k}"] for k in range(1, 6)}
+    )
+    with pytest.raises(InputError, match="--map COLUMN=q_joint_a6, or, where the joint stood still, --fixed joint_a6"):
+        bring([log], tmp_path / "set", NAME, Options())
+    bring([log], tmp_path / "set", NAME, Options(fixed=("joint_a6",)))
+    data_set = read_data_set(tmp_path / "set")
+    assert data_set.robot.joint_names == robot().joint_names[:5]
+    np.testing.assert_array_equal(data_set.runs[0].signals.q, signals(good()).q[:, :5])
+    with pytest.raises(InputError, match=r"--fixed joint_7: the robot has no joint .joint_7. .it has"):
+        bring([log], tmp_path / "other", NAME, Options(fixed=("joint_7",)))
+
+
+def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:
+    assert irtwin("init", tmp_path / "set", "--robot", NAME).status == 0
+    text = (tmp_path / "set" / "dataset.toml").read_text()
+    for key in (*ROBOT_KEYS, *RUN_KEYS, *SHEET_KEYS, *TWIN_KEYS, *DATA_SET_KEYS):
+        assert key in text or key == "dh"
+    (tmp_path / "set" / "runs" / "NAME.csv").write_bytes(plain_of_the_format(tmp_path).read_bytes())
+    filled = re.sub(
+        r"(?m)^# (\[\[run\]\]|file|role|payload_\w+|started|gear_ratio|weight|\[twin\]|effects)", r"\1", text
+    )
+    (tmp_path / "set" / "dataset.toml").write_text(filled)
+    data_set = read_data_set(tmp_path / "set")
+    assert [joint.gear_ratio for joint in data_set.robot.joints] == [100.0] * 6
+    assert irtwin("init", tmp_path / "set").status == 2
+    init(tmp_path / "bare", None, None)
+    assert "# [robot.joint.NAME]" in (tmp_path / "bare" / "dataset.toml").read_text()
+
+
+def plain_of_the_format(folder: Path) -> Path:
+    return write_text(folder / "log.csv", good())
