@@ -39,6 +39,7 @@ def imported(file: Path) -> frozenset[str]:
     """Return the modules of irtwin that a file imports anywhere, those of helpers too, and what a command runs."""
     text = file.read_text(encoding="utf-8")
     found = {"cli.__init__", "__main__"} if '"-m", "irtwin"' in text else set()
+    found |= {"fleet.__main__"} if '"-m", "irtwin.fleet"' in text else set()
     for part in ast.walk(ast.parse(text)):
         names = []
         if isinstance(part, ast.ImportFrom) and part.module:

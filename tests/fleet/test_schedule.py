@@ -1,38 +1,24 @@
 """Batches by processes that die, and by a cluster that loses a worker."""
 
 import os
-import time
+import sys
 from pathlib import Path
-from unittest import mock
 
 import pytest
 
-from irtwin import workflow
 from irtwin.errors import InputError
 from irtwin.fleet import schedule
 from irtwin.fleet.batch import Batch
 
 pytestmark = pytest.mark.slow
-
-
-def _dies_of_large(data_set: Path, json_file: Path, twin_file: Path) -> None:
-    if data_set.name == "large":
-        os._exit(9)
-
-
-def _slow(data_set: Path, json_file: Path, twin_file: Path) -> None:
-    (data_set.parent / f"worker_of_{data_set.name}").write_text(str(os.getpid()))
-    time.sleep(0.5)
-
-
-def work_and_die(folder: str) -> None:
-    with mock.patch.object(workflow, "diagnose", _dies_of_large):
-        Batch(Path(folder)).work()
-
-
-def work_slowly(folder: str) -> None:
-    with mock.patch.object(workflow, "diagnose", _slow):
-        Batch(Path(folder)).work()
+DIES = (sys.executable, "-m", "tests.fleet.worker_that_dies")
+# one that says which Dask worker it is a child of, and takes its time
+SLOW = (
+    sys.executable,
+    "-c",
+    "import os, sys, time, pathlib; place = pathlib.Path(sys.argv[1]);"
+    "(place / 'worker').write_text(str(os.getppid())); time.sleep(1); (place / 'ended').write_text('')",
+)
 
 
 def _batches(folder: Path, *members: tuple[str, ...]) -> list[Batch]:
@@ -45,41 +31,34 @@ def _batches(folder: Path, *members: tuple[str, ...]) -> list[Batch]:
     ]
 
 
-def _states(batches: list[Batch]) -> list[str]:
-    return [record.state if record else "" for batch in batches for record in batch.records()]
-
-
-def test_a_process_that_dies_costs_the_data_set_that_it_died_of(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(schedule, "_work", work_and_die)
-    batches = _batches(tmp_path, ("a", "large", "b"))
-    schedule.work_here(batches, 2, lambda batch: None)
-    assert _states(batches) == ["done", "failed", "done"]
+def test_a_process_that_dies_costs_the_data_set_that_it_died_of(tmp_path: Path) -> None:
+    (batch,) = _batches(tmp_path, ("a", "large", "b"))
+    schedule.work_here([batch], 2, lambda batch: None, DIES)
+    assert [record.state if record else "" for record in batch.records()] == ["done", "failed", "done"]
 
 
 def test_a_process_that_never_begins_is_not_tried_for_ever(tmp_path: Path) -> None:
-    (batch,) = _batches(tmp_path, ("a",))
-    with pytest.raises(InputError, match="its process ended before it began"):
-        schedule._again(batch, died=True)
+    with pytest.raises(InputError, match="its process ended with status 7 and left no record"):
+        schedule.work_here(
+            _batches(tmp_path, ("a",)), 1, lambda batch: None, (sys.executable, "-c", "raise SystemExit(7)")
+        )
 
 
-def test_a_cluster_goes_on_where_a_worker_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cluster_goes_on_where_a_worker_is_killed(tmp_path: Path) -> None:
     from distributed import LocalCluster
 
-    monkeypatch.setattr(schedule, "_work", work_slowly)
-    batches = _batches(tmp_path, ("a", "b"), ("c", "d"), ("e",))
+    batches = _batches(tmp_path, ("a",), ("b",), ("c",), ("d",))
     killed = []
 
     def kill_once(batch: Batch) -> None:
         if not killed:
-            running = [int(file.read_text()) for file in tmp_path.glob("worker_of_*")]
-            killed.append(running[-1])
-            os.kill(running[-1], 9)
+            at_work = [one for one in batches if (one.folder / "worker").exists() and one is not batch]
+            killed.append(int((at_work[-1].folder / "worker").read_text()))
+            os.kill(killed[0], 9)
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        schedule.work_on_cluster(batches, cluster.scheduler_address, kill_once)
-    assert killed and _states(batches) == ["done"] * 5
+        schedule.work_on_cluster(batches, cluster.scheduler_address, kill_once, SLOW)
+    assert killed and all((batch.folder / "ended").exists() for batch in batches)
 
 
 def test_an_address_where_no_scheduler_answers_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,81 +2,60 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections import deque
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
-from multiprocessing.connection import wait
-from multiprocessing.context import SpawnProcess
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.fleet.batch import Batch
 
 Tell = Callable[[Batch], None]
+WORKER = (sys.executable, "-m", "irtwin.fleet")
 _CONNECT = 10.0  # s until a scheduler has answered
 
 
-def work_here(batches: Sequence[Batch], workers: int, tell: Tell) -> None:
-    """Work on batches by processes of this machine, `workers` at once; `tell` is called as each batch ends.
-
-    A batch whose process died is begun again, as its records say what it died of.
-    """
-    context = multiprocessing.get_context("spawn")  # a fork would share the store's threads
-    waiting, running = deque(batches), list[tuple[SpawnProcess, Batch]]()
-    try:
-        while waiting or running:
-            while waiting and len(running) < workers:
-                process = context.Process(target=_work, args=(str(waiting[0].folder),), daemon=True)
-                process.start()
-                running.append((process, waiting.popleft()))
-            wait([process.sentinel for process, _ in running])
-            for process, batch in [one for one in running if one[0].exitcode is not None]:
-                running.remove((process, batch))
-                waiting.extend(_again(batch, process.exitcode != 0))
-                tell(batch)
-    finally:
-        for process, _ in running:
-            process.kill()
+def work_here(batches: Sequence[Batch], workers: int, tell: Tell, command: Sequence[str] = WORKER) -> None:
+    """Work on batches on this machine, `workers` at once; `tell` is called as each ends. `command`: as `in_process`."""
+    with ThreadPoolExecutor(workers) as pool:  # each thread waits for a process
+        own = {pool.submit(in_process, str(batch.folder), command): batch for batch in batches}
+        for future in as_completed(own):
+            future.result()
+            tell(own[future])
 
 
-def work_on_cluster(batches: Sequence[Batch], scheduler: str, tell: Tell) -> None:
+def work_on_cluster(batches: Sequence[Batch], scheduler: str, tell: Tell, command: Sequence[str] = WORKER) -> None:
     """Work on batches by a Dask cluster, whose workers see the batches' folders; `scheduler` is its address.
 
-    Nothing but a batch's path goes to a worker, and nothing comes back.
+    Nothing but a batch's path goes to a worker, and nothing comes back. Dask gives a lost worker's batch to another.
     """
     try:
-        from distributed import Client, KilledWorker, as_completed
+        import distributed
     except ModuleNotFoundError:
         raise InputError('a Dask cluster needs distributed; pip install "irtwin[fleet]"') from None
     try:
-        client = Client(scheduler, timeout=_CONNECT)
+        client = distributed.Client(scheduler, timeout=_CONNECT)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"{scheduler}: no Dask scheduler answers ({error}); give its address, tcp://host:8786"
+            f"{scheduler}: no Dask scheduler answers ({error}); give one such as tcp://host:8786"
         ) from None
     with client:
-        own = {client.submit(_work, str(batch.folder), pure=False): batch for batch in batches}
-        ending = as_completed(list(own))
-        for future in ending:
-            batch = own.pop(future)
-            failure = future.exception()
-            if failure is not None and not isinstance(failure, KilledWorker):
-                raise failure
-            for again in _again(batch, failure is not None):
-                new = client.submit(_work, str(again.folder), pure=False)
-                own[new] = again
-                ending.add(new)
-            tell(batch)
+        own = {client.submit(in_process, str(batch.folder), command, pure=False): batch for batch in batches}
+        for future in distributed.as_completed(list(own)):
+            future.result()
+            tell(own[future])
 
 
-def _again(batch: Batch, died: bool) -> list[Batch]:
-    """Return the batch if a process died on it; each death counts against the data set that it died of."""
-    if not died:
-        return []
-    if not any(record is not None for record in batch.records()):
-        raise InputError(f"{batch.folder}: its process ended before it began; see what it wrote above")
-    return [batch]
+def in_process(folder: str, command: Sequence[str] = WORKER) -> None:
+    """Work through a batch in a process of its own, begun again where it dies; a store is bound to one thread.
 
-
-def _work(folder: str) -> None:
-    Batch(Path(folder)).work()
+    Each death counts against the data set that it died of. Raises InputError where a process dies without a record.
+    """
+    batch = Batch(Path(folder))
+    before = list(batch.records())
+    while (status := subprocess.run([*command, folder], check=False).returncode) != 0:
+        after = list(batch.records())
+        if after == before:
+            raise InputError(f"{folder}: its process ended with status {status} and left no record; see what it wrote")
+        before = after
