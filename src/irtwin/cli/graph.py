@@ -33,7 +33,7 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
     from irtwin.knowledge.store.no_network import leave_network
 
     if question is None:
-        answer = asking.questions()
+        answer = asking.questions(workspace)
     else:
         if graph_url is None:
             leave_network()

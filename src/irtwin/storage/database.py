@@ -12,6 +12,7 @@ from sqlalchemy import URL, exists, func, inspect, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
+from irtwin.resources import Resources, resources_of
 from irtwin.storage import engine, files
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
@@ -62,9 +63,13 @@ class Workspace:
     them are committed last, and files that no row names are removed afterwards.
     """
 
-    def __init__(self, folder: Path, url: str | None = None) -> None:
-        """Open a workspace, or make one. Raises InputError where the database cannot be opened."""
+    def __init__(self, folder: Path, url: str | None = None, resources: Resources | None = None) -> None:
+        """Open a workspace, or make one. Raises InputError where the database cannot be opened.
+
+        `resources` are those that hold for it; its own and those of installed packages if None.
+        """
         self.folder = folder
+        self.resources = resources or resources_of(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
