@@ -137,7 +137,7 @@ def repair(
                 populate_others(place, graph, announce)
                 conclude(graph, announce)
             _swap(place, folder / "graph", keep=not readable)
-        lost = _lost(place)
+        lost = lost_files(place)
     for line in lost:
         announce(f"  {line}")
     if lost:
@@ -196,7 +196,8 @@ def _swap(place: Workspace, new: Path, keep: bool) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _lost(place: Workspace) -> list[str]:
+def lost_files(place: Workspace) -> list[str]:
+    """Return, in words, which files that the database names are missing or altered."""
     with place.reading() as session:
         named = named_files(session.connection())
     found = []
