@@ -49,7 +49,7 @@ def export(owl: Path, workspace: Path | str = WORKSPACE, *, graph_url: str | Non
 
 def questions(workspace: Path | str = WORKSPACE) -> Table:
     """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
-    known = queries.named_questions(_checked(Path(workspace))).values()
+    known = queries.named_questions(checked(Path(workspace))).values()
     rows = (
         {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
     )
@@ -62,7 +62,7 @@ def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
 
     Raises InputError where there is none, or for a fault in what extends the workspace.
     """
-    _checked(workspace)
+    checked(workspace)
     if url is not None:
         with KnowledgeGraph(url, workspace) as graph:
             yield graph
@@ -78,7 +78,11 @@ def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
         yield snapshot.graph
 
 
-def _checked(workspace: Path) -> Resources:
+def checked(workspace: Path) -> Resources:
+    """Return the ontology, rules, questions and so on that hold for a workspace.
+
+    Raises InputError for a fault in what extends it.
+    """
     resources = resources_of(workspace)
     if resources.extensions:
         from irtwin.knowledge.extensions import check  # takes a while to import

@@ -168,10 +168,13 @@ def reason_again(
 ) -> None:
     """Draw the conclusions in a workspace's graph by an engine, in place of those that are there.
 
+    Ontology and mappings are read again first, as those of the workspace may have changed.
     They stay until the graph changes, or the native engine is asked again. Raises InputError where the engine cannot
     run, Contradiction where the graph contradicts itself.
     """
     with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        graph.load_ontology()
+        map_rows(place, graph)
         conclude(graph, _clocked(announce), engine)
 
 

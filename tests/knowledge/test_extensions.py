@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.data_sets import irtwin
 
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check, check_mappings
@@ -132,3 +133,13 @@ def test_what_is_sound_holds_beside_what_ships(tmp_path: Path) -> None:
         assert "long_runs" in named_questions(place.resources)
         assert "long_runs" not in named_questions()
         assert not of_all_rules(place.resources).unknown
+
+
+@pytest.mark.parametrize("command", [["query"], ["query", "robots"], ["explain", "?"], ["export", "--owl", "x.owl"]])
+def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    put(tmp_path / "irtwin-workspace", "rules/my_rules.ttl", RULE.replace("BODY", "$this a"))
+    done = irtwin(*command)
+    assert done.status == 2
+    assert done.err.startswith("irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL")
+    assert done.err.count("\n") == 1

@@ -89,7 +89,8 @@ def reason(
 ) -> None:
     """Draw all conclusions from the graph, or from an RDF file.
 
-    Without SOURCE, the conclusions in the workspace's graph are drawn again. With SOURCE, OUT gets what SOURCE says
+    Without SOURCE, the conclusions in the workspace's graph are drawn again, by the ontology, mappings and rules that
+    are there now. With SOURCE, OUT gets what SOURCE says
     and all that follows; the file suffixes decide the formats. If it contradicts itself, nothing is written and the
     exit status is 3.
 
