@@ -54,7 +54,7 @@ def done(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     shipped = (EXAMPLE / "src/irtwin_co2/ontology/co2.ttl").read_text(encoding="utf-8")
     own = place / "workspace" / "ontology" / "co2.ttl"  # the workspace's own limit, in place of the package's
     own.parent.mkdir(parents=True)
-    own.write_text(shipped.replace('"1.0"', f'"{LIMIT}"'), encoding="utf-8")
+    own.write_text(shipped.replace('"0.6"', f'"{LIMIT}"'), encoding="utf-8")
     path = os.pathsep.join([str(installed), *filter(None, sys.path)])
     said = subprocess.run(
         [sys.executable, "-c", WORK, place / "workspace", data],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -48,6 +49,7 @@ from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
 
 Announce = Callable[[str], None]
+LONGEST_SQL = 600.0  # s for the SQL of a mapping, where some do not ship
 
 
 def run(
@@ -241,7 +243,9 @@ def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
-    refresh(graph, place.engine, graph.resources.paths("mappings"), place.mapped_rows)
+    files = graph.resources.of("mappings")
+    seconds = LONGEST_SQL if any(file.is_extension for file in files) else math.inf
+    refresh(graph, place.engine, [file.path for file in files], place.mapped_rows, seconds)
 
 
 def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda line: None) -> str:

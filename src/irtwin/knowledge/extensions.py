@@ -31,6 +31,7 @@ from irtwin.resources import Files, Resource, Resources
 _SWRL = "http://www.w3.org/2003/11/swrl#"
 _SWRL_BUILT_IN = "http://www.w3.org/2003/11/swrlb#"
 _TEXTS = (SH.select, SH.ask, SH.construct)
+_LONGEST = 60.0  # s that a look at the columns of a mapping's SQL may take
 _AT = re.compile(r"error at (\d+):(\d+): (.*)", re.DOTALL)
 
 
@@ -238,7 +239,7 @@ def _check_mapping(file: Resource, engine: Engine) -> None:
     try:
         for triples_map in read_document(file.path).triples_maps.values():
             _check_graphs(file, triples_map)
-        with planned(engine, [file.path]):
+        with planned(engine, [file.path], seconds=_LONGEST):
             pass
     except InputError as error:
         raise InputError(_with_line(file, str(error))) from error
