@@ -143,3 +143,15 @@ def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatc
     assert done.status == 2
     assert done.err.startswith("irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL")
     assert done.err.count("\n") == 1
+
+
+def test_status_lists_what_extends_and_what_is_wrong(tmp_path: Path) -> None:
+    Workspace(tmp_path).close()
+    file = put(tmp_path, "rules/my_rules.ttl", RULE.replace("BODY", "$this a"))
+    put(tmp_path, "shapes/shapes.ttl", SHAPE.replace("WHAT", "sh:minCount 1"))
+    done = irtwin("status", "--workspace", tmp_path)
+    assert done.status == 2
+    lines = done.out.splitlines()
+    assert any(line.split() == ["robots", "none"] for line in lines)
+    assert any("shapes/shapes.ttl of workspace, in place of what ships" in line for line in lines)
+    assert any(line.startswith("damage") and f"{file}, line 10: the rule 'long run'" in line for line in lines)
