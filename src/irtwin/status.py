@@ -21,6 +21,7 @@ from irtwin.report.extensions import check
 from irtwin.resources import Resource
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import shown
+from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.schema import Base, Robot, Run, Twin
 from irtwin.upkeep import lost_files
@@ -71,7 +72,8 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
 
 def _tables() -> list[str]:
     of_packages = {table.name for table in package_tables()}
-    return [f"{len(Base.metadata.tables) - len(of_packages)} of irtwin {version('irtwin')}"] + [
+    own = len(Base.metadata.tables) - len(of_packages)
+    return [f"{own} of irtwin {version('irtwin')}, revision {newest()}"] + [
         f"{name}, of a package" for name in sorted(of_packages)
     ]
 

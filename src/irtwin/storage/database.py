@@ -18,6 +18,7 @@ from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.files import inside
+from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.rows import (
     drop_activities,
@@ -300,6 +301,8 @@ class Workspace:
                 _check_that_nothing_is_lost(self.folder, "its database holds no tables")
             with self._writing() as session:
                 Base.metadata.create_all(session.connection())
+                stamp(session.connection())
+        migrate(self.engine)
         inspector = inspect(self.engine)
         for table in tables:
             if not inspector.has_table(table.name):
