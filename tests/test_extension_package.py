@@ -95,6 +95,7 @@ def test_report_and_export_hold_what_it_adds(done) -> None:
     page = (place / "reports" / "Emitting.html").read_text(encoding="utf-8")
     assert "<h3>Heavy run</h3>" in page
     assert "What CO2 does each run stand for?" in page
+    assert '<th scope="row">CO2</th>' in page  # among the providers that computed its numbers
     assert status[0] == 0, status[2]
     assert "rules/co2_rules.ttl of irtwin-co2 0.1.0" in status[1]
     assert "ontology/co2.ttl of workspace, in place of " in status[1]
