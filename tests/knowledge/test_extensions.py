@@ -12,7 +12,7 @@ from irtwin.knowledge.extensions import check, check_mappings
 from irtwin.knowledge.locality import of_all_rules
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.shacl.rules import all_rules
-from irtwin.resources import resources_of
+from irtwin.resources import Resources, resources_of
 from irtwin.storage.database import Workspace
 
 PREFIXES = """@prefix irt: <https://w3id.org/irtwin#> .
@@ -132,7 +132,7 @@ def test_what_is_sound_holds_beside_what_ships(tmp_path: Path) -> None:
         assert "long run" in {rule.label for rule in all_rules(place.resources)}
         assert "long_runs" in named_questions(place.resources)
         assert "long_runs" not in named_questions()
-        assert not of_all_rules(place.resources).unknown
+        assert not of_all_rules(Resources(place.resources.extensions)).unknown
 
 
 @pytest.mark.parametrize("command", [["query"], ["query", "robots"], ["explain", "?"], ["export", "--owl", "x.owl"]])
