@@ -22,10 +22,10 @@ from typing import Any
 from pyoxigraph import DefaultGraph, Quad, Store
 
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.shacl.rules import shipped_rules
+from irtwin.knowledge.shacl.rules import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, PREFIXES
-from irtwin.resources import folder
+from irtwin.resources import folder, shipped
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base
 
@@ -294,7 +294,7 @@ def make_graph(place: Path) -> int:
         documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
         store.bulk_extend(Quad(*quad.triple) for quad in map_database(workspace.engine, documents))
     store.optimize()
-    for rule in sorted(shipped_rules(), key=lambda rule: rule.order):
+    for rule in sorted(all_rules(shipped()), key=lambda rule: rule.order):
         found: Any = store.query(rule.construct, prefixes=PREFIXES)
         store.bulk_extend([Quad(*triple) for triple in found])
     return sum(1 for _ in store.quads_for_pattern(None, None, None, DefaultGraph()))

@@ -12,6 +12,7 @@ from irtwin.knowledge.questions import queries
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.store.table import Table
+from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
     from irtwin.knowledge.explain.explanation import Explanation
@@ -46,9 +47,9 @@ def export(owl: Path, workspace: Path | str = WORKSPACE, *, graph_url: str | Non
         export_owl(graph, owl)
 
 
-def questions() -> Table:
+def questions(workspace: Path | str = WORKSPACE) -> Table:
     """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
-    known = queries.named_questions().values()
+    known = queries.named_questions(checked(Path(workspace))).values()
     rows = (
         {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
     )
@@ -57,7 +58,11 @@ def questions() -> Table:
 
 @contextmanager
 def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
-    """Give a workspace's graph, or a server's, as it stands. Raises InputError where there is none."""
+    """Give a workspace's graph, or a server's, as it stands.
+
+    Raises InputError where there is none, or for a fault in what extends the workspace.
+    """
+    checked(workspace)
     if url is not None:
         with KnowledgeGraph(url, workspace) as graph:
             yield graph
@@ -71,3 +76,16 @@ def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
         raise InputError(f"{workspace}: no graph here; run `irtwin run DATASET --workspace {workspace}` first")
     with Snapshot(folder) as snapshot:
         yield snapshot.graph
+
+
+def checked(workspace: Path) -> Resources:
+    """Return the ontology, rules, questions and so on that hold for a workspace.
+
+    Raises InputError for a fault in what extends it.
+    """
+    resources = resources_of(workspace)
+    if resources.extensions:
+        from irtwin.knowledge.extensions import check  # takes a while to import
+
+        check(resources)
+    return resources

@@ -130,14 +130,14 @@ def repair(
         with files.working_folder(place.folder, ".repair-") as folder:
             place.mapped_rows.unlink(missing_ok=True)
             announce("Rebuilding the graph from the database")
-            with KnowledgeGraph(folder / "graph", place.folder) as graph:
+            with KnowledgeGraph(folder / "graph", place.folder, place.resources) as graph:
                 graph.load_ontology()
                 map_rows(place, graph)
                 readable = _carry_over(place.graph_folder, graph, announce)
                 populate_others(place, graph, announce)
                 conclude(graph, announce)
             _swap(place, folder / "graph", keep=not readable)
-        lost = _lost(place)
+        lost = lost_files(place)
     for line in lost:
         announce(f"  {line}")
     if lost:
@@ -196,7 +196,8 @@ def _swap(place: Workspace, new: Path, keep: bool) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _lost(place: Workspace) -> list[str]:
+def lost_files(place: Workspace) -> list[str]:
+    """Return, in words, which files that the database names are missing or altered."""
     with place.reading() as session:
         named = named_files(session.connection())
     found = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -19,6 +20,7 @@ from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import explain_one
+from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
@@ -37,6 +39,7 @@ from irtwin.providers.records import check_name, check_plans, find_robot, identi
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
+from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
@@ -46,6 +49,7 @@ from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
 
 Announce = Callable[[str], None]
+LONGEST_SQL = 600.0  # s for the SQL of a mapping, where some do not ship
 
 
 def run(
@@ -107,6 +111,8 @@ def diagnose(
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
+    kept_in = None if workspace is None else Path(workspace)
+    check_extensions(resources.resources_of(kept_in))
     for file in filter(None, (json_file, report, twin_file, motion_file)):
         check_place(file)
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
@@ -121,12 +127,12 @@ def diagnose(
         announce(f"  {save_motion(found, motion_file)}")
     if report is not None:
         announce("Writing the report")
-        render_alone(data_set, found.document, found.curves, report)
-    if workspace is not None:
+        render_alone(data_set, found.document, found.curves, report, resources.resources_of(kept_in))
+    if kept_in is not None:
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
         closed = None if found.twin is None else to_json(found.twin)
-        with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        with Workspace(kept_in, database) as place, rewriting(place, graph_url) as graph:
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
@@ -164,10 +170,13 @@ def reason_again(
 ) -> None:
     """Draw the conclusions in a workspace's graph by an engine, in place of those that are there.
 
+    Ontology and mappings are read again first, as those of the workspace may have changed.
     They stay until the graph changes, or the native engine is asked again. Raises InputError where the engine cannot
     run, Contradiction where the graph contradicts itself.
     """
     with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+        graph.load_ontology()
+        map_rows(place, graph)
         conclude(graph, _clocked(announce), engine)
 
 
@@ -221,8 +230,11 @@ def _check_effects(data_set: DataSet) -> None:
 def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
     """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server.
 
-    Who reads the folder meanwhile sees what was there before, if anything was.
+    Who reads the folder meanwhile sees what was there before, if anything was. Raises InputError for a fault in what
+    extends the workspace, before anything is written.
     """
+    check_extensions(place.resources)
+    check_mappings(place.resources, place.engine)
     with KnowledgeGraph.of_workspace(place, url) as graph, ExitStack() as held:
         if url is None and graph.graphs():
             held.enter_context(kept(place.graph_folder))
@@ -231,8 +243,9 @@ def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
-    documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-    refresh(graph, place.engine, documents, place.mapped_rows)
+    files = graph.resources.of("mappings")
+    seconds = LONGEST_SQL if any(file.is_extension for file in files) else math.inf
+    refresh(graph, place.engine, [file.path for file in files], place.mapped_rows, seconds)
 
 
 def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda line: None) -> str:
@@ -254,7 +267,7 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
 
 def populate_apart(apart: Workspace, announce: Announce) -> None:
     """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
-    with KnowledgeGraph(workspace=apart.folder) as graph:
+    with KnowledgeGraph(workspace=apart.folder, resources=apart.resources) as graph:
         graph.load_ontology()
         check_effects(graph)
         map_rows(apart, graph)
@@ -295,7 +308,7 @@ def write_report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path
     robot = robot_iri(robot_id)
     out = place.report_path(robot_id)
     scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
-    render(graph, robot, place.read_file, out, scene, partial(explain_one, graph))
+    render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), graph.resources)
     return out
 
 

@@ -294,3 +294,14 @@ def test_an_incomplete_archive_of_an_earlier_version_is_told(archive: Path, fill
     refuse(
         altered(archive, lambda contents: contents.update({"graph.nq": b""})), "incomplete: its graph knows no robot"
     )
+
+
+def test_what_extends_a_workspace_goes_with_it(tmp_path: Path) -> None:
+    names = ["rules/my_rules.ttl", "questions/mine.rq", "reports/energy/mine.rq"]
+    for name in names:
+        (tmp_path / "before" / name).parent.mkdir(parents=True)
+        (tmp_path / "before" / name).write_text(f"# {name}")
+    with Workspace(tmp_path / "before") as place, KnowledgeGraph(place.graph_folder) as graph:
+        backup(place, graph, tmp_path / "all.zip")
+    restore(tmp_path / "all.zip", tmp_path / "after")
+    assert [(tmp_path / "after" / name).read_text() for name in names] == [f"# {name}" for name in names]

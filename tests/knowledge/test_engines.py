@@ -15,6 +15,7 @@ from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.reasoning import asserted, engine_of, reason
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_OWL_RL, GRAPH_SOURCE, OWL, RDF, RDFS, XSD
+from irtwin.resources import shipped
 
 TYPE, SUBCLASS = NamedNode(RDF + "type"), NamedNode(RDFS + "subClassOf")
 # That ex:x belongs to ex:E needs an unnamed individual, of which OWL 2 RL knows nothing.
@@ -34,7 +35,7 @@ def no_java(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def no_swrl(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts: set())  # Pellet takes seconds to start
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts, files: set())  # Pellet takes seconds to start
 
 
 @pytest.mark.slow
@@ -136,9 +137,9 @@ def test_without_java_hermit_is_refused_and_what_was_concluded_stays(graph: Know
         reason(graph, HERMIT)
     assert graph.triples(GRAPH_INFERRED) == before
     with pytest.raises(java.NoJava, match="Pellet"):
-        owl_dl.swrl_conclusions(
-            {Triple(NamedNode("https://example.org/r"), next(iter(owl_dl._terms_of_rules())), Literal(1))}
-        )
+        files = shipped().of("rules", ".swrl.ttl")
+        fact = Triple(NamedNode("https://example.org/r"), next(iter(owl_dl._terms_of_rules(files))), Literal(1))
+        owl_dl.swrl_conclusions({fact}, files)
 
 
 @pytest.mark.slow

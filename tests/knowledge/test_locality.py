@@ -5,6 +5,7 @@ import pytest
 from irtwin.knowledge import locality
 from irtwin.knowledge.locality import Reach
 from irtwin.knowledge.vocabulary import term
+from irtwin.resources import shipped
 
 EX = "https://example.org/"
 
@@ -14,7 +15,7 @@ def reach(body: str, head: str = "SELECT $this") -> Reach:
 
 
 def test_shipped_rules_look_backward_and_anywhere_by_few_predicates() -> None:
-    found = locality.of_shipped_rules()
+    found = locality.of_all_rules(shipped())
     assert found.backward == {term(name) for name in ("has_Joint", "of_Run", "remedies_Effect")}
     limits = (
         *("Closed_Fraction_To_Adopt", "Energy_Error_Limit", "Gap_Alarm_Ratio"),

@@ -28,7 +28,7 @@ from irtwin.knowledge.vocabulary import (
     XSD,
     term,
 )
-from irtwin.resources import folder
+from irtwin.resources import Files, folder
 from irtwin.storage.database import Workspace
 
 SOURCE = GRAPH_SOURCE + "drawn"
@@ -41,7 +41,7 @@ def pellet(monkeypatch: pytest.MonkeyPatch) -> list[set[Triple]]:
     """Pellet takes seconds to start; one rule in its stead keeps what it is asked."""
     calls: list[set[Triple]] = []
 
-    def conclude(facts: set[Triple]) -> set[Triple]:
+    def conclude(facts: set[Triple], files: Files) -> set[Triple]:
         calls.append(facts)
         by_predicate: dict[str, dict] = {}
         for one in facts:

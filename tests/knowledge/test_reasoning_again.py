@@ -32,7 +32,7 @@ def without_java(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Pellet takes seconds to start; one rule in its stead counts how often it was asked."""
     calls: list[int] = []
 
-    def conclude(facts):
+    def conclude(facts, files):
         calls.append(len(facts))
         idle = (one for one in facts if one.predicate.value == term("Idle_Share") and float(one.object.value) > 0.5)
         return {Triple(one.subject, NamedNode(TYPE), NamedNode(term("Idle_Heavy_Run"))) for one in idle}

@@ -110,7 +110,7 @@ def checked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
         return shacl(data, **options)
 
     monkeypatch.setattr(pyshacl, "validate", spy)
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts: set())
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts, files: set())
     return calls
 
 

@@ -262,7 +262,7 @@ def answers(graph: KnowledgeGraph, factory: Factory, twin: bool = True) -> Answe
     bindings = {"robot": factory.iri}
     if twin:
         bindings["twin"] = f"{ID}twin/{factory.robot_id}.1a2b"
-    return ask(graph, read_questions(resources.folder("reports") / "energy"), bindings)
+    return ask(graph, read_questions((resources.folder("reports") / "energy").glob("*.rq")), bindings)
 
 
 def _checksum(name: str) -> str:

@@ -9,8 +9,8 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.questions import Question, ask, read_questions
 
 FOLDER = resources.folder("reports") / "energy"
-QUESTIONS = read_questions(FOLDER)
-OF_GAPS = read_questions(FOLDER.parent / "gap")
+QUESTIONS = read_questions(FOLDER.glob("*.rq"))
+OF_GAPS = read_questions((FOLDER.parent / "gap").glob("*.rq"))
 EVERY = [*QUESTIONS.values(), *OF_GAPS.values()]
 TWIN = "https://w3id.org/irtwin/id/twin/{}.1a2b"
 
@@ -56,6 +56,6 @@ def test_a_value_of_two_graphs_is_counted_once(graph: KnowledgeGraph):
 
 def test_the_header_is_not_part_of_the_text(tmp_path: Path):
     (tmp_path / "q.rq").write_text("# title: Why?\n# bind: robot, twin\nSELECT ?robot WHERE { ?robot ?p ?o }\n")
-    question = read_questions(tmp_path)["q"]
+    question = read_questions([tmp_path / "q.rq"])["q"]
     assert (question.title, question.bind) == ("Why?", ("robot", "twin"))
     assert question.text.startswith("SELECT")

@@ -58,7 +58,7 @@ for command in (
     *(motion.plan, motion.predict, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
     *(service.serve, service.live),
-    *(upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
+    *(upkeep.status, upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
     robot.robot,
     fleet.fleet,
 ):

@@ -33,7 +33,7 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
     from irtwin.knowledge.store.no_network import leave_network
 
     if question is None:
-        answer = asking.questions()
+        answer = asking.questions(workspace)
     else:
         if graph_url is None:
             leave_network()
@@ -89,7 +89,8 @@ def reason(
 ) -> None:
     """Draw all conclusions from the graph, or from an RDF file.
 
-    Without SOURCE, the conclusions in the workspace's graph are drawn again. With SOURCE, OUT gets what SOURCE says
+    Without SOURCE, the conclusions in the workspace's graph are drawn again, by the ontology, mappings and rules that
+    are there now. With SOURCE, OUT gets what SOURCE says
     and all that follows; the file suffixes decide the formats. If it contradicts itself, nothing is written and the
     exit status is 3.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -42,6 +43,25 @@ def repair(workspace: Path, database: str | None) -> None:
 
     upkeep.repair(workspace, database=database, announce=say)
     click.echo(workspace)
+
+
+@click.command()
+@workspace_option
+@database_option
+@graph_option
+def status(workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Show how a workspace stands.
+
+    Lists robots and runs, tables, the graph's size, the files that extend what ships, and damage; where there is any,
+    the exit status is 2.
+    """
+    from irtwin import status as of_workspace
+
+    found = of_workspace.status(workspace, database=database, graph_url=graph_url)
+    for line in found.lines():
+        click.echo(line)
+    if found.faults:
+        sys.exit(2)
 
 
 @click.command()

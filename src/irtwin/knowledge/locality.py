@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import rdflib
@@ -20,10 +20,10 @@ from rdflib.plugins.sparql import prepareQuery
 from rdflib.plugins.sparql.algebra import traverse
 from rdflib.plugins.sparql.parserutils import CompValue
 
-from irtwin.knowledge.shacl.rules import shipped_rules
+from irtwin.knowledge.shacl.rules import all_rules
 from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.vocabulary import PREFIXES, RDF, SH
-from irtwin.resources import folder
+from irtwin.resources import Files, Resources
 
 _SWRL = "http://www.w3.org/2003/11/swrl#"
 _TYPE = rdflib.RDF.type
@@ -56,15 +56,21 @@ class Reach:
         )
 
 
-@cache
-def of_shipped_rules() -> Reach:
-    """Return how far the SHACL rules, the SWRL rules and the constraints of `rules/` look."""
+def of_all_rules(resources: Resources) -> Reach:
+    """Return how far the SHACL rules, the SWRL rules and the constraints look."""
+    return _of_files(resources.of("rules"), resources.of("shapes"))
+
+
+@lru_cache(maxsize=16)
+def _of_files(rules: Files, shapes: Files) -> Reach:
     reach = Reach()
-    for rule in shipped_rules():
+    for rule in all_rules(Resources(rules)):
         reach |= of_query(rule.construct)
-    for file in sorted(folder("rules").glob("*.swrl.ttl")):
-        reach |= of_swrl(read_turtle(file))
-    return reach | of_shapes(read_turtle(folder("rules") / "shapes.ttl"))
+    for file in Resources(rules).of("rules", ".swrl.ttl"):
+        reach |= of_swrl(read_turtle(file.path))
+    for file in shapes:
+        reach |= of_shapes(read_turtle(file.path))
+    return reach
 
 
 def of_query(text: str) -> Reach:

@@ -7,7 +7,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterable
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import owlready2
@@ -20,7 +20,7 @@ from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS
-from irtwin.resources import folder
+from irtwin.resources import Files
 
 _SWRL = "http://www.w3.org/2003/11/swrl#"
 _TYPE = NamedNode(RDF + "type")
@@ -76,23 +76,23 @@ def _clash(world: owlready2.World) -> str:
     return f"These statements cannot all be true: {' '.join(statements.replace('1)', '', 1).split())}"
 
 
-def facts_of_rules(triples: Iterable[Triple]) -> set[Triple]:
-    """Return those triples that the SWRL rules of `rules/*.swrl.ttl` speak of."""
-    terms = _terms_of_rules()
+def facts_of_rules(triples: Iterable[Triple], files: Files) -> set[Triple]:
+    """Return those triples that the SWRL rules of the files, `rules/*.swrl.ttl`, speak of."""
+    terms = _terms_of_rules(files)
     return {triple for triple in triples if _speaks_of(triple, terms) or _declares(triple, terms)}
 
 
-def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
-    """Return what the SWRL rules of `rules/*.swrl.ttl` conclude from `facts_of_rules`, by Pellet.
+def swrl_conclusions(facts: set[Triple], files: Files) -> set[Triple]:
+    """Return what the SWRL rules of the files conclude from `facts_of_rules`, by Pellet.
 
     Pellet is given only what the rules speak of: with whole individuals it would take minutes. NoJava where there is
     none.
     """
-    terms = _terms_of_rules()
+    terms = _terms_of_rules(files)
     if not any(_speaks_of(fact, terms) for fact in facts):
         return set()
     owlready2.JAVA_EXE = _java("Pellet")
-    world = _world([*_swrl_rules(), *facts])
+    world = _world([*_swrl_rules(files), *facts])
     try:
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
@@ -101,10 +101,10 @@ def swrl_conclusions(facts: set[Triple]) -> set[Triple]:
     return {triple for triple in inferred - facts if _speaks_of(triple, terms)}
 
 
-def rules() -> tuple[str, ...]:
-    """Return the names of the SWRL rules."""
+def rules(files: Files) -> tuple[str, ...]:
+    """Return the names of the SWRL rules of the files."""
     return tuple(
-        sorted(str(rule.object.value) for rule in _swrl_rules() if rule.predicate == _LABEL)  # type: ignore[union-attr]
+        sorted(str(rule.object.value) for rule in _swrl_rules(files) if rule.predicate == _LABEL)  # type: ignore[union-attr]
     )
 
 
@@ -115,14 +115,14 @@ def _java(reasoner: str) -> str:
     return program
 
 
-@cache
-def _swrl_rules() -> tuple[Triple, ...]:
-    return tuple(triple for file in sorted(folder("rules").glob("*.swrl.ttl")) for triple in read_turtle(file))
+@lru_cache(maxsize=16)
+def _swrl_rules(files: Files) -> tuple[Triple, ...]:
+    return tuple(triple for file in files for triple in read_turtle(file.path))
 
 
-@cache
-def _terms_of_rules() -> frozenset[Any]:
-    return frozenset(rule.object for rule in _swrl_rules() if rule.predicate in _NAMES_A_TERM)
+@lru_cache(maxsize=16)
+def _terms_of_rules(files: Files) -> frozenset[Any]:
+    return frozenset(rule.object for rule in _swrl_rules(files) if rule.predicate in _NAMES_A_TERM)
 
 
 def _speaks_of(triple: Triple, terms: frozenset[Any]) -> bool:

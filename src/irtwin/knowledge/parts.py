@@ -42,9 +42,10 @@ class Ontology:
     """What all parts have in common."""
 
     def __init__(self, graph: KnowledgeGraph):
+        self.resources = graph.resources
         self.triples = graph.triples(GRAPH_ONTOLOGY)
         self.terms: set[object] = {term for triple in self.triples for term in triple}
-        self.terms.update(map(NamedNode, locality.of_shipped_rules().terms))
+        self.terms.update(map(NamedNode, locality.of_all_rules(graph.resources).terms))
 
     def nodes(self, triple: Triple) -> list[Name]:
         """Return the nodes of parts that a triple speaks of."""
@@ -122,7 +123,7 @@ def join(ontology: Ontology, closure: Closure, count: int) -> str | None:
 
     closure: of the ontology, `count` statements, and then of some parts.
     """
-    reach = locality.of_shipped_rules()
+    reach = locality.of_all_rules(ontology.resources)
     if reach.unknown:
         return min(reach.unknown)
     if any(predicate == _HAS_KEY for _, predicate, _ in closure.since(0)):

@@ -12,7 +12,7 @@ import base64
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import lru_cache
 
 from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
@@ -37,7 +37,7 @@ from irtwin.knowledge.vocabulary import (
     REASONER,
     term,
 )
-from irtwin.resources import folder
+from irtwin.resources import Files, Resources, folder
 
 _COUNT = f"""
 SELECT ?owl_rl ?swrl ?shacl
@@ -121,7 +121,7 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     if engine != NATIVE:
         return _reason_over_all(graph, ontology, changed, engine)
     try:
-        if changed is not None and made_of(graph) == content_name(ontology.triples):
+        if changed is not None and made_of(graph) == content_name(ontology.triples, ontology.resources):
             done = _reason_again(graph, ontology, changed)
             if done is not None:
                 return done
@@ -173,7 +173,7 @@ def _reason_over_all(
     graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | None, engine: str = NATIVE
 ) -> Inferences:
     premises = asserted(graph)
-    everything = content_name(premises, engine)
+    everything = content_name(premises, ontology.resources, engine)
     if made_of(graph) == everything:
         return _count(graph, ())
     engines.check(engine, len(premises))
@@ -185,8 +185,8 @@ def _reason_over_all(
     else:
         found = _infer_by(engine, ontology, premises, old)
     in_parts = engine == NATIVE and changed is not None and not found.joined_by
-    found.made_of[_OWL_RL] = content_name(ontology.triples) if in_parts else everything
-    found.made_by |= _made_by(engine)
+    found.made_of[_OWL_RL] = content_name(ontology.triples, ontology.resources) if in_parts else everything
+    found.made_by |= _made_by(engine, ontology.resources)
     new = found.quads()
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
@@ -196,16 +196,16 @@ def _reason_over_all(
     return _count(graph, new ^ old, found.joined_by)
 
 
-def _made_by(engine: str) -> set[Triple]:
+def _made_by(engine: str, resources: Resources) -> set[Triple]:
     """Say which engine drew the conclusions, and which rules could not run."""
-    left_out = {Triple(_PELLET, _RULE_NOT_RUN, Literal(name)) for name in _not_run()}
+    left_out = {Triple(_PELLET, _RULE_NOT_RUN, Literal(name)) for name in _not_run(resources)}
     return {Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)), *left_out}
 
 
-def _not_run() -> tuple[str, ...]:
+def _not_run(resources: Resources) -> tuple[str, ...]:
     from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
 
-    return () if java() else owl_dl.rules()
+    return () if java() else owl_dl.rules(resources.of("rules", ".swrl.ttl"))
 
 
 def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_by: str | None = None) -> _Conclusions:
@@ -266,16 +266,17 @@ def _by_rules(ontology: Ontology, known: set[Triple], before: set[Quad], joined:
     """Return what the SWRL and SHACL rules conclude."""
     facts = _facts_of_swrl(ontology, known, joined)
     swrl = _by_swrl(ontology, facts, before)
-    made = shacl_rules.conclusions(known | swrl, shacl_rules.shipped_rules())
+    made = shacl_rules.conclusions(known | swrl, shacl_rules.all_rules(ontology.resources))
     shacl = {shacl_rules.graph_of(name): triples for name, triples in made.items()}
-    return _Conclusions({GRAPH_SWRL: swrl, **shacl}, {node: content_name(some) for node, some in facts.items()})
+    made_of: dict[object, NamedNode] = {node: content_name(some, ontology.resources) for node, some in facts.items()}
+    return _Conclusions({GRAPH_SWRL: swrl, **shacl}, made_of)
 
 
 def _facts_of_swrl(ontology: Ontology, known: set[Triple], joined: bool) -> dict[parts.Name, set[Triple]]:
     """Return what the SWRL rules speak of, part by part, each by the first node that it speaks of."""
     from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
 
-    facts = owl_dl.facts_of_rules(known)
+    facts = owl_dl.facts_of_rules(known, ontology.resources.of("rules", ".swrl.ttl"))
     if joined:
         return {NamedNode(GRAPH_SWRL): facts}
     part_of = parts.parted(ontology, known)
@@ -298,12 +299,13 @@ def _by_swrl(ontology: Ontology, facts: Mapping[parts.Name, set[Triple]], before
 
     old = {quad.triple for quad in before if _graph(quad) == GRAPH_SWRL}
     noted = {(quad.subject, quad.object) for quad in before if _graph(quad) == GRAPH_REASONED}
-    changed = {node for node, some in facts.items() if (node, content_name(some)) not in noted}
+    changed = {node for node, some in facts.items() if (node, content_name(some, ontology.resources)) not in noted}
     if not changed and NamedNode(GRAPH_SWRL) in facts:
         return old
     new = set[Triple]()
     if changed:
-        new = owl_dl.swrl_conclusions(set().union(*(facts[node] for node in changed)))
+        files = ontology.resources.of("rules", ".swrl.ttl")
+        new = owl_dl.swrl_conclusions(set().union(*(facts[node] for node in changed)), files)
     spoken_of = {node for some in facts.keys() - changed for fact in facts[some] for node in ontology.nodes(fact)}
     return new | {triple for triple in old if spoken_of.intersection(ontology.nodes(triple))}
 
@@ -325,17 +327,21 @@ def engine_of(graph: KnowledgeGraph) -> str:
     return next((it for it in engines.ENGINES if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(it)) in said), NATIVE)
 
 
-def content_name(triples: Iterable[Triple], engine: str = NATIVE) -> NamedNode:
+def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:
     """Return the name that triples, the rules and those who run them have by their content."""
-    digest = hashlib.sha256(_rules() + engine.encode() + (b"" if java() else b" without Java"))
+    digest = hashlib.sha256(
+        _rules(resources.of("rules") + resources.of("shapes")) + engine.encode() + (b"" if java() else b" without Java")
+    )
     for line in sorted(map(str, triples)):
         digest.update(line.encode())
     return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
 
 
-@cache
-def _rules() -> bytes:
-    return b"".join(file.read_bytes() for file in sorted(folder("rules").glob("*.*")))
+@lru_cache(maxsize=16)
+def _rules(files: Files) -> bytes:
+    """Return rules and shapes as they are written, and those of OWL 2 RL."""
+    paths = [*sorted(folder("rules").glob("owl2_rl*")), *(file.path for file in files)]
+    return b"".join(path.read_bytes() for path in paths)
 
 
 def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
@@ -343,5 +349,11 @@ def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None
     names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
     return Inferences(
-        counts["owl_rl"], counts["swrl"], counts["shacl"], tuple(sorted(names)), _not_run(), joined_by, tuple(aside)
+        counts["owl_rl"],
+        counts["swrl"],
+        counts["shacl"],
+        tuple(sorted(names)),
+        _not_run(graph.resources),
+        joined_by,
+        tuple(aside),
     )

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import cast
 
 from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
 
-from irtwin import resources
 from irtwin.knowledge.mapping import RowMapper, refresh
 from irtwin.knowledge.shacl.rules import conclusions, graph_of, read_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -27,9 +25,9 @@ class ShownRuns:
 
     def __init__(self, place: Workspace, graph: KnowledgeGraph) -> None:
         self._place, self._graph = place, graph
-        self._documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
+        self._documents = graph.resources.paths("mappings")
         self.mapper = RowMapper(place.engine, self._documents)
-        self._rules = read_rules(Path(resources.folder("rules")) / "live_rules.ttl")
+        self._rules = read_rules(graph.resources.path("rules", "live_rules.ttl"))
         self._beside: set[Triple] | None = None
         self._changed = False  # since the last flush
 

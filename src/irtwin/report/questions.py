@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
+
+from irtwin.resources import Resources
 
 Row = Mapping[str, Any]  # a variable's Python value, None where it is unbound
 
@@ -46,9 +48,20 @@ class Answer:
 Answers = Mapping[str, Answer]
 
 
-def read_questions(folder: Path) -> dict[str, Question]:
-    """Read every `*.rq` of a report's folder, by file stem."""
-    return {file.stem: _parse(file) for file in sorted(folder.glob("*.rq"))}
+def questions_of(resources: Resources, report: str) -> dict[str, Question]:
+    """Return the questions of a report, by file stem."""
+    return read_questions(file.path for file in resources.of("reports", ".rq") if file.name.startswith(f"{report}/"))
+
+
+def added_to(resources: Resources, report: str) -> list[str]:
+    """Return the names of a report's questions that do not ship, so that its page has no place of theirs."""
+    files = [file for file in resources.of("reports", ".rq") if file.name.startswith(f"{report}/")]
+    return [file.path.stem for file in files if file.is_extension and not file.replaces]
+
+
+def read_questions(files: Iterable[Path]) -> dict[str, Question]:
+    """Read questions, by file stem."""
+    return {file.stem: _parse(file) for file in files}
 
 
 def ask(graph: Graph, questions: Mapping[str, Question], bindings: Mapping[str, str]) -> dict[str, Answer]:

@@ -50,6 +50,22 @@ def quantity(value: float | None, unit: str, digits: int = 3) -> str:
     return NONE if value is None else f"{number(value, digits)}{_SPACE}{unit}"
 
 
+def shown(value: Any) -> str:
+    """Write an answer of whatever kind: a number, a yes or no, a time, the end of an IRI or text."""
+    if value is None:
+        return NONE
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return decimals(value)
+    if isinstance(value, float):
+        return number(value, 4)
+    if isinstance(value, datetime):
+        return moment(value)
+    text = str(value)
+    return local_name(text) if text.startswith(("http://", "https://")) else text
+
+
 def percent(value: float | None, digits: int = 2) -> str:
     """Write a value that is already in per cent."""
     return quantity(value, "%", digits)

@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import PREFIXES
+from irtwin.resources import Resources
 from irtwin.serve.protocol import Refusal
 from irtwin.virtual.robot_data import asset as scene_asset
 from irtwin.virtual.robot_data import viewer_script
@@ -57,9 +58,9 @@ def asset(request: Request) -> Response:
     return Response(content, media_type=_TYPES[name], headers=headers)
 
 
-def questions(request: Request) -> Response:
+def questions(resources: Resources, request: Request) -> Response:
     """Return the named questions and the prefixes that they use."""
-    known = [{"title": q.title, "question": q.question, "text": q.text} for q in named_questions().values()]
+    known = [{"title": q.title, "question": q.question, "text": q.text} for q in named_questions(resources).values()]
     return Response(json.dumps({"prefixes": PREFIXES, "questions": known}), media_type="application/json")
 
 

@@ -10,6 +10,7 @@ import signal
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -20,6 +21,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from irtwin.asking import checked
 from irtwin.errors import InputError
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.serve import ontology, page
@@ -119,6 +121,7 @@ def application(
     pool = Pool(graph, 1 + max(2, os.cpu_count() or 2), limits)
     updates = Updates(graph, token, limits)
     live = LivePages(graph)
+    resources = checked(graph.parent)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -134,7 +137,7 @@ def application(
         routes=[
             Route("/", lambda request: page.response(), methods=["GET"]),
             Route("/sparql", Endpoint(pool, updates, limits)),
-            Route("/questions.json", page.questions, methods=["GET"]),
+            Route("/questions.json", partial(page.questions, resources), methods=["GET"]),
             *live.routes(),
             Route("/assets/{name}", page.asset, methods=["GET"]),
             Route("/irtwin{rest:path}", ontology.module, methods=["GET"]),

@@ -62,7 +62,7 @@ def unpack(archive: Path, folder: Path, names: re.Pattern[str]) -> Iterator[tupl
             raise InputError(f"{archive}: needs more than the {room >> 20} MB that are free; free some space")
         for name, (checksum, _) in listed.items():
             file = folder / name
-            file.parent.mkdir(exist_ok=True)
+            file.parent.mkdir(parents=True, exist_ok=True)
             with source.open(name) as content, file.open("xb") as sink:
                 if _copy(content, sink)[0] != checksum:
                     raise InputError(f"{archive}: {name} is damaged, its checksum differs; use another backup")

@@ -8,15 +8,18 @@ from pathlib import Path
 from typing import Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, exists, func, inspect, select, update
+from sqlalchemy import URL, Inspector, Table, exists, func, inspect, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
+from irtwin.resources import Resources, resources_of
 from irtwin.storage import engine, files
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.files import inside
+from irtwin.storage.migration import migrate, stamp
+from irtwin.storage.package_tables import package_tables
 from irtwin.storage.rows import (
     drop_activities,
     drop_data_set,
@@ -62,9 +65,13 @@ class Workspace:
     them are committed last, and files that no row names are removed afterwards.
     """
 
-    def __init__(self, folder: Path, url: str | None = None) -> None:
-        """Open a workspace, or make one. Raises InputError where the database cannot be opened."""
+    def __init__(self, folder: Path, url: str | None = None, resources: Resources | None = None) -> None:
+        """Open a workspace, or make one. Raises InputError where the database cannot be opened.
+
+        `resources` are those that hold for it; its own and those of installed packages if None.
+        """
         self.folder = folder
+        self.resources = resources or resources_of(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -286,13 +293,16 @@ class Workspace:
         return whole and stored == {facts(row) for row in rows}
 
     def _make_tables(self) -> None:
-        tables = Base.metadata.sorted_tables
+        of_packages = package_tables()
+        tables = [table for table in Base.metadata.sorted_tables if table not in of_packages]
         there = inspect(self.engine).get_table_names()
         if not any(table.name in there for table in tables):  # readers need not wait for the lock
             if self.engine.dialect.name == "sqlite":
                 _check_that_nothing_is_lost(self.folder, "its database holds no tables")
             with self._writing() as session:
                 Base.metadata.create_all(session.connection())
+                stamp(session.connection())
+        migrate(self.engine)
         inspector = inspect(self.engine)
         for table in tables:
             if not inspector.has_table(table.name):
@@ -300,17 +310,30 @@ class Workspace:
                     f"{engine.shown(self.engine.url)}: table {table.name} is missing, damaged or of another irtwin "
                     f"version; {_FROM_A_BACKUP}"
                 )
-            known = inspector.get_columns(table.name)
-            if {column["name"] for column in known} != set(table.columns.keys()):
+            if not _is_of_now(inspector, table):
                 raise InputError(
                     f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
                     "choose a new workspace and ingest again"
                 )
+        self._make_tables_of_packages(of_packages)
+
+    def _make_tables_of_packages(self, tables: Sequence[Table]) -> None:
+        """Make the tables that are not there, and anew those of another version: providers can fill them again."""
+        inspector = inspect(self.engine)
+        other = [table for table in tables if inspector.has_table(table.name) and not _is_of_now(inspector, table)]
+        if other or not all(inspector.has_table(table.name) for table in tables):
+            with self._writing() as session:
+                Base.metadata.drop_all(session.connection(), other)
+                Base.metadata.create_all(session.connection(), list(tables))
 
 
 def _told(run: Run) -> str:
     """Return the kind of the samples that a run comes with."""
     return PLANNED if run.kind == PLANNED_RUN else MEASURED
+
+
+def _is_of_now(inspector: Inspector, table: Table) -> bool:
+    return {column["name"] for column in inspector.get_columns(table.name)} == set(table.columns.keys())
 
 
 def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missing") -> None:

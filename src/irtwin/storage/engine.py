@@ -57,12 +57,13 @@ def shown(url: URL) -> str:
 
 
 @contextmanager
-def writing(engine: Engine) -> Iterator[Session]:
+def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
     """Give a session that is the only writer, in one transaction, committed at the end.
 
+    `restructuring`: SQLite changes a table by making another in its place; what refers to it is looked at afterwards.
     Raises InputError where another writer holds the database for longer than BUSY_TIMEOUT.
     """
-    with engine.connect().execution_options(writes=True) as connection:
+    with engine.connect().execution_options(writes=True) as connection, _free_keys(connection, restructuring):
         try:
             transaction = connection.begin()
         except OperationalError as error:
@@ -77,6 +78,24 @@ def writing(engine: Engine) -> Iterator[Session]:
             with Session(connection) as session:
                 yield session
                 session.flush()
+            if restructuring and engine.dialect.name == "sqlite":
+                broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+                if broken is not None:
+                    raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
+
+
+@contextmanager
+def _free_keys(connection: Connection, restructuring: bool) -> Iterator[None]:
+    """Let SQLite drop a table that others refer to; outside a transaction alone it can be told so."""
+    driver = connection.connection.driver_connection
+    if not (restructuring and isinstance(driver, sqlite3.Connection)):
+        yield
+        return
+    driver.execute("PRAGMA foreign_keys = OFF")
+    try:
+        yield
+    finally:
+        driver.execute("PRAGMA foreign_keys = ON")
 
 
 def use_write_ahead_log(engine: Engine) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import lru_cache
 from typing import TypeGuard, cast
 
 from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Triple
@@ -17,7 +17,7 @@ from irtwin.knowledge.explain.mapping import mapping_of
 from irtwin.knowledge.explain.rules import premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
-from irtwin.knowledge.shacl.rules import ShaclRule, graph_of, shipped_rules
+from irtwin.knowledge.shacl.rules import ShaclRule, all_rules, graph_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
@@ -30,7 +30,7 @@ from irtwin.knowledge.vocabulary import (
     PREFIXES,
     shorten,
 )
-from irtwin.resources import folder
+from irtwin.resources import Files
 
 MOST_TRIPLES = 100
 HOPS = 2  # from a statement's terms, before all of the graph is searched for its premises
@@ -80,7 +80,7 @@ class Explainer:
         stated = [name for name in graphs if not name.startswith(GRAPH_INFERRED)]
         if stated:
             return self._stated(triple, stated[0])
-        for rule in shipped_rules():
+        for rule in all_rules(self._graph.resources):
             found = premises(self._graph, rule, triple) if graph_of(rule.name) in graphs else None
             if found is not None:
                 return self._by_rule(triple, rule, found, swrl=GRAPH_SWRL in graphs)
@@ -122,9 +122,11 @@ class Explainer:
             return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
         if name.startswith(GRAPH_SOURCE):
             file, checksum = self._file_near(triple)
-            return Explanation(what, mapping_of(triple), file=file, checksum=checksum)
+            return Explanation(
+                what, mapping_of(triple, self._graph.resources.of("mappings")), file=file, checksum=checksum
+            )
         if name == GRAPH_ONTOLOGY:
-            return Explanation(what, "the ontology", file=_module(triple))
+            return Explanation(what, "the ontology", file=_module(triple, self._graph.resources.of("ontology")))
         return Explanation(what, f"what was written into {shorten(name)}")
 
     def _by_rule(self, triple: Triple, rule: ShaclRule, found: Iterable[Triple], *, swrl: bool) -> Explanation:
@@ -233,19 +235,19 @@ def _maker(maker: dict[str, object]) -> str:
     return f"{shorten(str(maker.get('provider') or maker['activity']))}{software}{when}"
 
 
-def _module(triple: Triple) -> str | None:
+def _module(triple: Triple, files: Files) -> str | None:
     """Return the module of the ontology that says a triple; None for a part without a name."""
     if isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode):
         return None
-    return next((name for name, module in _modules() if next(in_graph([triple])) in module), None)
+    return next((name for name, module in _modules(files) if next(in_graph([triple])) in module), None)
 
 
-@cache
-def _modules() -> tuple[tuple[str, Store], ...]:
+@lru_cache(maxsize=16)
+def _modules(files: Files) -> tuple[tuple[str, Store], ...]:
     """Return the modules of the ontology, their literals in the form that the graph gives back."""
     modules = []
-    for file in sorted(folder("ontology").glob("*.ttl")):
+    for file in files:
         module = Store()
-        module.extend(in_graph(read_turtle(file)))
-        modules.append((f"ontology/{file.name}", module))
+        module.extend(in_graph(read_turtle(file.path)))
+        modules.append((str(file), module))
     return tuple(modules)

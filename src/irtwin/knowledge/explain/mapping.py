@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import re
-from functools import cache
+from functools import lru_cache
 
 from pyoxigraph import NamedNode, Triple
 
 from irtwin.knowledge.mapping.document import LogicalTable, TriplesMap
 from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.vocabulary import RDF
-from irtwin.resources import folder
+from irtwin.resources import Files
 
 _TYPE = NamedNode(RDF + "type")
 
 
-def mapping_of(triple: Triple) -> str:
-    """Return, in words, the first triples map of the shipped mappings that may have made a triple."""
-    for where, triples_map in _triples_maps():
+def mapping_of(triple: Triple, files: Files) -> str:
+    """Return, in words, the first triples map of the mappings that may have made a triple."""
+    for where, triples_map in _triples_maps(files):
         if _says(triples_map, triple):
             return f"mapping {where}, {_table(triples_map.table)}"
     return "a mapping"
 
 
-@cache
-def _triples_maps() -> tuple[tuple[str, TriplesMap], ...]:
-    """Return the triples maps of `mappings/`, each with its name beside that of its file."""
+@lru_cache(maxsize=16)
+def _triples_maps(files: Files) -> tuple[tuple[str, TriplesMap], ...]:
+    """Return the triples maps of mappings, each with its name beside that of its file."""
     return tuple(
-        (f"mappings/{file.name} #{re.split('[#/]', getattr(node, 'value', ''))[-1]}", triples_map)
-        for file in sorted(folder("mappings").glob("*.r2rml.ttl"))
-        for node, triples_map in read_document(file).triples_maps.items()
+        (f"{file} #{re.split('[#/]', getattr(node, 'value', ''))[-1]}", triples_map)
+        for file in files
+        for node, triples_map in read_document(file.path).triples_maps.items()
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import marshal
+import math
 import sqlite3
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
@@ -35,24 +36,27 @@ _VERSION_GRAPH = f"{GRAPH_SOURCE}version"
 _ASK_VERSION = f"SELECT ?version {{ GRAPH <{_VERSION_GRAPH}> {{ ?graphs owl:versionInfo ?version }} }}"
 
 
-def refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path) -> None:
+def refresh(
+    graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path, seconds: float = math.inf
+) -> None:
     """Bring the graphs of sources and activities up to date with a database.
 
-    file: where the rows are remembered. The graph names the state that they are of, so that a graph or a file that
-    was put back, or a crash between the two, leads to a full run, as another document, table or software does.
+    file: where the rows are remembered; seconds: how long a triples map's SQL may take. The graph names the state that
+    they are of, so that a graph or a file that was put back, or a crash between the two, leads to a full run, as
+    another document, table or software does.
     Raises InputError as `map_database`; graph and file then stay as they were.
     """
     try:
-        _refresh(graph, engine, documents, file)
+        _refresh(graph, engine, documents, file, seconds)
     except (DamagedRows, sqlite3.DatabaseError) as error:
         if isinstance(error, sqlite3.OperationalError) and "no such" not in str(error):
             raise InputError(f"{file}: cannot be written: {error}") from error
         file.unlink()  # what it remembers can be had from the database
-        _refresh(graph, engine, documents, file)
+        _refresh(graph, engine, documents, file, seconds)
 
 
-def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path) -> None:
-    with planned(engine, documents) as (connection, statements), RememberedRows(file) as remembered:
+def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path, seconds: float) -> None:
+    with planned(engine, documents, seconds=seconds) as (connection, statements), RememberedRows(file) as remembered:
         run = _Run(connection, statements, remembered)
         made_by = _digest(
             metadata.version("irtwin"),

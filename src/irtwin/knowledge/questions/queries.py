@@ -11,15 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Table
+from irtwin.resources import Files, Resources, shipped
 
-_FOLDER = Path(__file__).parent
 _HEADER = re.compile(r"^# (title|question|theme|of): (.+)$", re.MULTILINE)
 THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
 _QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|delete)\b", re.IGNORECASE)
@@ -40,10 +40,14 @@ class Question:
     text: str
 
 
-@cache
-def named_questions() -> Mapping[str, Question]:
-    """Return the questions that have a name, in the order of their themes and names."""
-    questions = [_read(file) for file in _FOLDER.glob("*.rq")]
+def named_questions(resources: Resources | None = None) -> Mapping[str, Question]:
+    """Return the questions that have a name, in the order of their themes and names; those that ship if None."""
+    return _questions((resources or shipped()).of("questions"))
+
+
+@lru_cache(maxsize=16)
+def _questions(files: Files) -> Mapping[str, Question]:
+    questions = [read_question(file.path) for file in files]
     questions.sort(key=lambda question: (THEMES.index(question.theme), question.name))
     return {question.name: question for question in questions}
 
@@ -54,8 +58,8 @@ def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table
     InputError where the question or the robot is unknown, or the question is not one of a single robot.
     """
     if robot is None:
-        return graph.query(_text(question))
-    named = named_questions().get(question)
+        return graph.query(_text(question, graph.resources))
+    named = named_questions(graph.resources).get(question)
     if named is None or not named.of_robot:
         raise InputError(f"{question!r} does not ask about one robot; leave --robot out")
     return graph.query(named.text, {"arm": robot_named(graph, robot)})
@@ -104,14 +108,23 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _read(file: Path) -> Question:
-    text = file.read_text(encoding="utf-8")
+def read_question(file: Path) -> Question:
+    """Read a named question. Raises InputError where its header lacks something."""
+    try:
+        text = file.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file}: is no UTF-8 ({error.reason} at byte {error.start}); save it as such") from None
     header = dict(_HEADER.findall(text))
+    lacking = [name for name in ("title", "question", "theme") if name not in header]
+    if lacking:
+        raise InputError(f"{file}, line 1: a question begins with `# {lacking[0]}: ...`; add that line")
+    if header["theme"] not in THEMES:
+        raise InputError(f"{file}: its theme is {header['theme']!r}; take one of {', '.join(THEMES)}")
     return Question(file.stem, header["title"], header["question"], header["theme"], header.get("of") == "robot", text)
 
 
-def _text(question: str) -> str:
-    known = named_questions()
+def _text(question: str, resources: Resources) -> str:
+    known = named_questions(resources)
     if question in known:
         return known[question].text
     if _QUERY_FORM.search(question):

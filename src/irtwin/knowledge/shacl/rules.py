@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
-from functools import cache
+from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 from typing import cast
@@ -23,7 +23,7 @@ from irtwin.knowledge.shacl.shapes import Node, Shapes
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.store.sparql_text import masked
 from irtwin.knowledge.vocabulary import GRAPH_SHACL, OWL, PREFIXES, RDF, RDFS, shorten
-from irtwin.resources import folder
+from irtwin.resources import Files, Resources
 
 MOST_ROUNDS = 100
 
@@ -53,7 +53,7 @@ def infer(graph: KnowledgeGraph) -> int:
     What each rule concludes is a named graph of its own.
     """
     graph.replace([], GRAPH_SHACL)
-    made = conclusions(graph.triples(), shipped_rules())
+    made = conclusions(graph.triples(), all_rules(graph.resources))
     graph.replace((quad for name, found in made.items() for quad in in_graph(found, graph_of(name))), GRAPH_SHACL)
     return len(set().union(*made.values()))
 
@@ -93,10 +93,14 @@ def conclusions(triples: Iterable[Triple], rules: Iterable[ShaclRule]) -> dict[s
     )
 
 
-@cache
-def shipped_rules() -> tuple[ShaclRule, ...]:
+def all_rules(resources: Resources) -> tuple[ShaclRule, ...]:
     """Return the rules of the files `rules/*rules.ttl`."""
-    return tuple(rule for file in sorted(folder("rules").glob("*rules.ttl")) for rule in read_rules(file))
+    return _rules(resources.of("rules", "rules.ttl"))
+
+
+@lru_cache(maxsize=16)
+def _rules(files: Files) -> tuple[ShaclRule, ...]:
+    return tuple(rule for file in files for rule in read_rules(file.path))
 
 
 def read_rules(file: Path) -> tuple[ShaclRule, ...]:

@@ -1,10 +1,10 @@
-"""Does the graph keep the SHACL constraints of `rules/shapes.ttl`?"""
+"""Does the graph keep the SHACL constraints of `rules/shapes.ttl`, and of files that extend them?"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import pyshacl
 import rdflib
@@ -16,7 +16,7 @@ from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import content_name
 from irtwin.knowledge.reasoning import made_of as reasoned_from
 from irtwin.knowledge.store.changes import DERIVED_FROM, nodes_of
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_CHANGED,
     GRAPH_INFERRED,
@@ -25,7 +25,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_VALIDATION,
     shorten,
 )
-from irtwin.resources import folder
+from irtwin.resources import Files
 
 _OF_ONTOLOGY = f"""
 CONSTRUCT {{ ?s ?p ?o }}
@@ -57,7 +57,7 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     Only parts of the graph that changed since are checked again, if it was reasoned over in parts: see `parts`.
     """
     ontology = Ontology(graph)
-    made_of = content_name(ontology.triples)
+    made_of = content_name(ontology.triples, graph.resources)
     changed = graph.changed(GRAPH_VALIDATION)
     in_parts = changed is not None and made_of == reasoned_from(graph) and not graph.changed(GRAPH_INFERRED)
     validated = Triple(NamedNode(GRAPH_VALIDATION), DERIVED_FROM, made_of)
@@ -66,7 +66,7 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
         names = [
             name for name in graph.graphs() if not name.startswith((GRAPH_VALIDATION, GRAPH_REASONED, GRAPH_CHANGED))
         ]
-        report = _report(graph.triples(*names) if names else ())
+        report = _report(graph.triples(*names) if names else (), graph.resources.of("shapes"))
     text = report.serialize(format="nt", encoding="utf-8")
     graph.replace(
         in_graph((quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)), GRAPH_VALIDATION), GRAPH_VALIDATION
@@ -88,7 +88,7 @@ def _again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> rdf
         report.remove((None, SH.result, result))
     if region.asserted:
         known = ontology.triples | graph.construct(_OF_ONTOLOGY) | region.asserted
-        found = _report(known | {quad.triple for quad in region.concluded})
+        found = _report(known | {quad.triple for quad in region.concluded}, graph.resources.of("shapes"))
         for result in [one for one in found.objects(None, SH.result) if found.value(one, SH.focusNode) in nodes]:
             report += found.cbd(result)
             report.add((head, SH.result, result))
@@ -96,9 +96,9 @@ def _again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> rdf
     return report
 
 
-def _report(triples: Iterable[Triple]) -> rdflib.Graph:
+def _report(triples: Iterable[Triple], shapes: Files) -> rdflib.Graph:
     report: rdflib.Graph
-    _, report, _ = pyshacl.validate(_as_rdflib(triples), shacl_graph=_shapes())
+    _, report, _ = pyshacl.validate(_as_rdflib(triples), shacl_graph=_shapes(shapes))
     return report
 
 
@@ -106,9 +106,9 @@ def _as_rdflib(triples: Iterable[Triple]) -> rdflib.Graph:
     return rdflib.Graph().parse(data=serialize(triples, format=RdfFormat.N_TRIPLES), format="nt")
 
 
-@cache
-def _shapes() -> rdflib.Graph:
-    return rdflib.Graph().parse(folder("rules") / "shapes.ttl")
+@lru_cache(maxsize=16)
+def _shapes(files: Files) -> rdflib.Graph:
+    return _as_rdflib({triple for file in files for triple in read_turtle(file.path)})
 
 
 def _violation(report: rdflib.Graph, result: rdflib.term.Node) -> Violation:

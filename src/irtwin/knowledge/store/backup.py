@@ -24,16 +24,20 @@ from irtwin.knowledge.mapping.source import snapshot_options
 from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE
+from irtwin.resources import KINDS
 from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
 from irtwin.storage.database import DIAGNOSES, MESHES, TWINS, Workspace
+from irtwin.storage.package_tables import package_tables
 from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
 from irtwin.storage.series import FOLDER
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
-_NAMES = re.compile(rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join(_FOLDERS)})/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*")
+_NAMES = re.compile(
+    rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join((*_FOLDERS, *KINDS))}|reports/[a-z_]+)/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*"
+)
 _AT_ONCE = 5000  # rows
 
 
@@ -51,6 +55,7 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
                 with engine.writing(place.engine):
                     connection.execute(select(func.count()).select_from(Base.metadata.sorted_tables[0]))
                     contents = dict(_linked(place.folder, held))
+                    contents |= {f"{it.kind}/{it.name}": it.path for it in place.resources.files if it.is_of_workspace}
                 contents |= _dump_rows(connection, held)
                 named = named_files(connection)
         lost = [file for file in named if file.path not in contents]
@@ -85,6 +90,12 @@ def restore(archive: Path, folder: Path, database: str | None = None, graph_url:
                 with engine.writing(place.engine) as session:
                     for table in Base.metadata.sorted_tables:
                         _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")
+                    strange = {file.stem for file in (held / "rows").glob("*")} - Base.metadata.tables.keys()
+                    if strange:
+                        raise InputError(
+                            f"{archive}: table {min(strange)} is of a package that is not installed, or of another "
+                            "irtwin version; install that"
+                        )
                     lost = [file for file in named_files(session.connection()) if sums.get(file.path) != file.sha256]
                     if lost:
                         raise InputError(_incomplete(archive, lost, "missing or altered", "use another backup"))
@@ -114,7 +125,7 @@ def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
     """Link a workspace's files into a folder; those that still grow are copied."""
     for name in _FOLDERS:
         (held / name).mkdir()
-        for file in sorted((folder / name).glob("[!.]*")):
+        for file in filter(Path.is_file, sorted((folder / name).glob("[!.]*"))):
             target = held / name / file.name
             try:
                 shutil.copyfile(file, target) if name == LIVE else os.link(file, target)
@@ -138,6 +149,8 @@ def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> 
     if connection.execute(select(func.count()).select_from(table)).scalar_one():
         raise InputError(f"table {table.name} of the database holds rows already; give an empty database")
     if not file.is_file():
+        if table in package_tables():
+            return  # made before the package was installed; its providers fill it
         raise InputError(
             f"{archive}: has no table {table.name}: made by another irtwin version; restore it with that one"
         )

@@ -34,7 +34,7 @@ from irtwin.knowledge.store.table import Table, to_python
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, check, keeping_union
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_UPDATE, ID, PREFIXES
-from irtwin.resources import folder
+from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
@@ -52,10 +52,13 @@ class KnowledgeGraph:
     in `workspace`, which a folder's parent is if none is given.
     """
 
-    def __init__(self, place: Path | str | None = None, workspace: Path | None = None):
+    def __init__(
+        self, place: Path | str | None = None, workspace: Path | None = None, resources: Resources | None = None
+    ):
         self._store: Store | SparqlServer
         self._read_only = False
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
+        self._resources = resources
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
             self._store = Store() if place is None else SparqlServer(str(place))
@@ -71,7 +74,7 @@ class KnowledgeGraph:
         """Open a workspace's graph: in its folder, or on a SPARQL server. InputError where it is damaged or lost."""
         if url is None:
             place.check_graph()
-        return cls(url or place.graph_folder, place.folder)
+        return cls(url or place.graph_folder, place.folder, place.resources)
 
     @classmethod
     def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
@@ -82,7 +85,7 @@ class KnowledgeGraph:
         graph = cls.__new__(cls)
         graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
-        graph._workspace = workspace or path.parent
+        graph._workspace, graph._resources = workspace or path.parent, None
         return graph
 
     def __enter__(self) -> Self:
@@ -100,9 +103,16 @@ class KnowledgeGraph:
                 store_files.note_sums(self.folder)
         self._store = Store()
 
+    @property
+    def resources(self) -> Resources:
+        """The ontology, rules, shapes, mappings, questions and reports that hold for it: its workspace's too."""
+        if self._resources is None:
+            self._resources = resources_of(self._workspace)
+        return self._resources
+
     def load_ontology(self) -> None:
         """Put the modules of `ontology/` into the ontology's graph."""
-        modules = sorted(folder("ontology").glob("*.ttl"))
+        modules = self.resources.paths("ontology")
         self.replace(
             in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
         )

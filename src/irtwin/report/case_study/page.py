@@ -10,13 +10,13 @@ from typing import Any
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.report.case_study.figures import figures
-from irtwin.report.energy.page import DrawScene, content_policy, environment
+from irtwin.report.energy.page import DrawScene, content_policy, style, written
 from irtwin.report.explorer import Columns, ReadSeries
-from irtwin.report.questions import Answers, Graph, ask, read_questions
+from irtwin.report.questions import Answers, Graph, ask, questions_of
+from irtwin.resources import folder, shipped
 from irtwin.storage.files import write
 
 # Yan 2018, equations (13) to (15)
@@ -29,7 +29,7 @@ def render(graph: Graph, robot_iri: str, read_series: ReadSeries, out: Path, dra
     Every number of ours comes from the questions in `reports/case_study`; samples come from the series that they name.
     Raises InputError where the graph knows of no plan that was carried out.
     """
-    questions = read_questions(resources.folder("reports") / "case_study")
+    questions = questions_of(shipped(), "case_study")
     case = ask(graph, {"case": questions["case"]}, {"robot": robot_iri})["case"].first
     if case is None:
         raise InputError(f"{robot_iri}: the graph has no plan that was carried out; run `irtwin case-study`")
@@ -44,17 +44,17 @@ def render(graph: Graph, robot_iri: str, read_series: ReadSeries, out: Path, dra
 
 
 def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment) -> str:
-    folder = resources.folder("reports")
     drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
     scripts = packed_scripts(
         [
             get_plotlyjs(),
-            (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
-            (folder / "case_study" / "configurations.js").read_text(encoding="utf-8"),
+            (folder("reports") / "layout" / "figures.js").read_text(encoding="utf-8"),
+            (folder("reports") / "case_study" / "configurations.js").read_text(encoding="utf-8"),
         ]
     )
-    styles = [folder / "layout" / "style.css", folder / "case_study" / "style.css"]
-    return environment(folder).get_template("case_study/page.html.jinja").render(
+    return written(
+        shipped(),
+        "case_study/page.html.jinja",
         answers=answers,
         bindings=bindings,
         case=answers["case"].first,
@@ -66,7 +66,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
         seed_error=SEED_ERROR,
         scene=scene.html,
         data=embedded_json({"figures": drawn, "explorer": None}),
-        style=Markup("\n".join(style.read_text(encoding="utf-8") for style in styles)),
+        style=Markup("\n").join([style(shipped()), style(shipped(), "case_study/style.css")]),
         scripts=scripts.html,
         policy=content_policy([*scripts.scripts, *scene.scripts]),
     )  # fmt: skip

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.packing import Fragment, embedded_json, packed_scripts
@@ -21,7 +21,8 @@ from irtwin.report import wording
 from irtwin.report.energy import tables, verdict
 from irtwin.report.energy.figures import figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
-from irtwin.report.questions import Answers, Graph, Question, ask, read_questions
+from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
+from irtwin.resources import Resources, folder, shipped
 from irtwin.storage.files import write
 
 DrawScene = Callable[[Sequence[tuple[str, Columns]], int], Fragment]  # runs with their modelled series, the first shown
@@ -34,15 +35,20 @@ def render(
     out: Path,
     draw_scene: DrawScene | None = None,
     explain: tables.Explain | None = None,
+    resources: Resources | None = None,
 ) -> None:
     """Write the energy report of a robot to `out`.
 
     Every number comes from the questions in `reports/energy`; samples come from the series that they name.
     `draw_scene` gets the name and modelled series of every run, and the place of that which the page opens on; it
-    returns their 3-D scene. `explain` says how a conclusion is known.
+    returns their 3-D scene. `explain` says how a conclusion is known. `resources` are the questions and templates to
+    take, those that ship if None; questions that were added are answered in tables of their own.
     """
-    bindings = _bindings(graph, robot_iri)
-    answers = ask(graph, _questions(), bindings)
+    resources = resources or shipped()
+    questions = questions_of(resources, "energy")
+    twin = ask(graph, {"twin": questions["twin"]}, {"robot": robot_iri})["twin"].first  # the latest
+    bindings = {"robot": robot_iri} | ({"twin": twin["twin"]} if twin else {})
+    answers = ask(graph, questions, bindings)
     if answers["robot"].first is None:
         raise InputError(f"{robot_iri}: this robot is not in the graph; ingest its data set first")
     read = cache(read_series)
@@ -52,32 +58,25 @@ def render(
         rows = answers["modelled_series"].rows
         runs = [(row["run_name"], Columns.of(read(row["file"], row["checksum"]))) for row in rows]
         scene = draw_scene(runs, curves["opens"])
-    page = _page(answers, bindings, curves, scene, explain)
+    page = _page(resources, answers, bindings, curves, scene, explain)
     write(out, page.encode())
 
 
-def _questions() -> dict[str, Question]:
-    return read_questions(resources.folder("reports") / "energy")
-
-
-def _bindings(graph: Graph, robot_iri: str) -> dict[str, str]:
-    """Return what the questions are about: the robot, and its latest twin where it has one."""
-    answer = ask(graph, {"twin": _questions()["twin"]}, {"robot": robot_iri})["twin"]
-    return {"robot": robot_iri} | ({"twin": answer.first["twin"]} if answer.first else {})
-
-
 def _page(
+    resources: Resources,
     answers: Answers,
     bindings: Mapping[str, str],
     curves: Mapping[str, Any] | None,
     scene: Fragment | None,
     explain: tables.Explain | None,
 ) -> str:
-    folder = resources.folder("reports")
     drawn = figures(answers)
     scripts = figure_scripts()
-    return environment(folder).get_template("energy/page.html.jinja").render(
+    return written(
+        resources,
+        "energy/page.html.jinja",
         answers=answers,
+        added=added_to(resources, "energy"),
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
         verdict=verdict.sentence(answers),
@@ -93,7 +92,7 @@ def _page(
         curves=curves,
         data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),
         scene=None if scene is None else scene.html,
-        style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
+        style=style(resources),
         scripts=scripts.html,
         policy=content_policy([*scripts.scripts, *(scene.scripts if scene else ())]),
     )  # fmt: skip
@@ -101,7 +100,7 @@ def _page(
 
 def figure_scripts() -> Fragment:
     """Return the scripts that draw a page's figures."""
-    drawing = resources.folder("reports") / "layout" / "figures.js"
+    drawing = folder("reports") / "layout" / "figures.js"
     return packed_scripts([get_plotlyjs(), drawing.read_text(encoding="utf-8")])
 
 
@@ -120,10 +119,35 @@ def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(normal.encode("utf-8")).digest()).decode("ascii")
 
 
-def environment(folder: Path) -> jinja2.Environment:
-    """Return the templates of a reports folder, with the filters that pages use."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
+def style(resources: Resources, name: str = "layout/style.css") -> Markup:
+    """Return a style sheet of the reports."""
+    return Markup(resources.path("reports", name).read_text(encoding="utf-8"))
+
+
+def written(resources: Resources, template: str, **values: Any) -> str:
+    """Return the page that a template makes of values. InputError where an extension is why it cannot be made."""
+    try:
+        return environment(resources).get_template(template).render(**values)
+    except jinja2.TemplateError as error:
+        if not any(file.is_extension for file in resources.of("reports")):
+            raise
+        raise InputError(
+            f"{resources.path('reports', template)}: {error}; see the files that extend reports/"
+        ) from error
+
+
+def environment(resources: Resources) -> jinja2.Environment:
+    """Return the templates of reports, with the filters that pages use.
+
+    They run in a sandbox, as a workspace from elsewhere may bring some.
+    """
+
+    def source(name: str) -> tuple[str, str, Callable[[], bool]] | None:
+        known = {file.name: file.path for file in resources.of("reports", ".html.jinja")}
+        return (known[name].read_text(encoding="utf-8"), str(known[name]), lambda: True) if name in known else None
+
+    environment = SandboxedEnvironment(
+        loader=jinja2.FunctionLoader(source),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -133,6 +157,7 @@ def environment(folder: Path) -> jinja2.Environment:
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
         wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
         wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
+        wording.shown,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment

@@ -102,7 +102,7 @@ def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> tuple[Co
                 about=tuple(dict.fromkeys(_about(row) for row in found)),
                 by=tuple(dict.fromkeys(_reasoner(row["concluded_by"]) for row in found)),
                 known=None
-                if explain is None
+                if explain is None or found[0]["object"] is None
                 else explain(*(found[0][name] for name in ("about", "property", "object"))),
             )
         )

@@ -9,9 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
-from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
@@ -23,13 +20,14 @@ from irtwin.packing import embedded_json
 from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
 from irtwin.report import wording
-from irtwin.report.energy.page import content_policy, environment, figure_scripts
+from irtwin.report.energy.page import content_policy, figure_scripts, style, written
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import counted
 from irtwin.report.gap.verdict import effect_name
-from irtwin.report.questions import Answers, Graph, Question, Row, ask, read_questions
+from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
+from irtwin.resources import Resources, shipped
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import write
@@ -39,47 +37,52 @@ ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 _FEW = 3  # of many rivals the foremost are shown; the graph has them all
 
 
-def render_gap(graph: Graph, robot: str, read_document: ReadDocument, out: Path) -> None:
+def render_gap(
+    graph: Graph, robot: str, read_document: ReadDocument, out: Path, resources: Resources | None = None
+) -> None:
     """Write the gap report of a robot (its IRI) to `out`.
 
     Numbers and sentences come from the questions in `reports/gap`, curves from the evidence file that the graph names.
+    `resources` are the questions and templates to take, those that ship if None.
     Raises InputError where the graph has no diagnosis of the robot.
     """
-    found = ask(graph, {"diagnosis": _questions()["diagnosis"]}, {"robot": robot})["diagnosis"].first
+    resources = resources or shipped()
+    questions = questions_of(resources, "gap")
+    found = ask(graph, {"diagnosis": questions["diagnosis"]}, {"robot": robot})["diagnosis"].first
     if found is None:
         raise InputError(f"{robot}: no diagnosis in the graph; run `irtwin diagnose` with this workspace first")
     bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
-    answers = ask(graph, _questions(), bindings)
+    answers = ask(graph, questions, bindings)
     curves = Curves.from_json(json.loads(read_document(found["evidence_file"], found["evidence_checksum"])))
-    write(out, _page(answers, bindings, curves).encode())
+    write(out, _page(resources, answers, bindings, curves).encode())
 
 
-def render_alone(data_set: DataSet, diagnosis: Document, curves: Curves, out: Path) -> None:
-    """Write the gap report of a diagnosis that no workspace keeps."""
+def render_alone(
+    data_set: DataSet, diagnosis: Document, curves: Curves, out: Path, resources: Resources | None = None
+) -> None:
+    """Write the gap report of a diagnosis by a graph of its own; `resources` as `render_gap` has them."""
     robot_id = identifier(data_set.robot.name)
     with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as workspace:
         ingest(workspace, data_set)
         record(workspace, robot_id, diagnosis, curves)
-        graph = KnowledgeGraph()
+        graph = KnowledgeGraph(resources=resources)
         graph.load_ontology()
-        mappings = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-        graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        mapped = map_database(workspace.engine, graph.resources.paths("mappings"))
+        graph.replace(mapped, GRAPH_SOURCE, GRAPH_ACTIVITY)
         shacl_rules.infer(graph)
-        render_gap(graph, robot_iri(robot_id), workspace.read_document, out)
+        render_gap(graph, robot_iri(robot_id), workspace.read_document, out, graph.resources)
 
 
-def _questions() -> dict[str, Question]:
-    return read_questions(resources.folder("reports") / "gap")
-
-
-def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
-    folder = resources.folder("reports")
+def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
     follows = gap_figures.foremost_curves(curves.follows, answers)
     drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
     found = gap_verdict.told(answers)
     scripts = figure_scripts()
-    return environment(folder).get_template("gap/page.html.jinja").render(
+    return written(
+        resources,
+        "gap/page.html.jinja",
         answers=answers,
+        added=added_to(resources, "gap"),
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
         verdict=gap_verdict.sentence(answers),
@@ -93,7 +96,7 @@ def _page(answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
         experiment=experiment(answers),
         drawn=drawn,
         data=embedded_json({"figures": drawn, "explorer": None}),
-        style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
+        style=style(resources),
         scripts=scripts.html,
         policy=content_policy(scripts.scripts),
     )  # fmt: skip

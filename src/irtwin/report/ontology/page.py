@@ -14,7 +14,7 @@ from pyoxigraph import NamedNode, RdfFormat, Store
 from irtwin import resources
 from irtwin.knowledge.store.table import to_python
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS, shorten
-from irtwin.report.energy.page import content_policy, environment
+from irtwin.report.energy.page import content_policy, environment, style
 from irtwin.report.ontology.class_tree import Node, class_tree
 from irtwin.storage.files import check_place, write
 
@@ -106,8 +106,7 @@ def read_modules(folder: Path) -> list[Module]:
 def page(modules: list[Module]) -> str:
     """Return the page."""
     known = {term.iri: term for module in modules for group in module.terms.values() for term in group}
-    folder = resources.folder("reports")
-    templates = environment(folder)
+    templates = environment(resources.shipped())
     templates.filters["link"] = lambda iri: _link(iri, known)
     templates.filters["short"] = short
     return templates.get_template("ontology/page.html.jinja").render(
@@ -116,8 +115,8 @@ def page(modules: list[Module]) -> str:
         tree=Markup(class_tree(_forests(modules, known))),
         count=sum(term.own for term in known.values()),
         policy=content_policy([]),
-        style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
-        page_style=Markup((folder / "ontology" / "style.css").read_text(encoding="utf-8")),
+        style=style(resources.shipped()),
+        page_style=style(resources.shipped(), "ontology/style.css"),
     )
 
 

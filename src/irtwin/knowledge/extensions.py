@@ -1,0 +1,322 @@
+"""What extends a workspace is looked through before it is used: each fault is one line with file and line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from typing import Any
+
+import rdflib
+from pyoxigraph import NamedNode, QuerySolutions, Store, Triple
+from pyshacl.entrypoints import meta_validate
+from rdflib.namespace import SH
+from rdflib.plugins.sparql.algebra import translateQuery
+from rdflib.plugins.sparql.parser import parseQuery
+from sqlalchemy import Engine
+
+from irtwin.errors import InputError
+from irtwin.knowledge.mapping.document import TermMap, TriplesMap
+from irtwin.knowledge.mapping.processor import planned
+from irtwin.knowledge.mapping.reader import read_document
+from irtwin.knowledge.questions.queries import read_question
+from irtwin.knowledge.shacl.rules import ShaclRule, graph_of, read_rules
+from irtwin.knowledge.store.graph import read_turtle
+from irtwin.knowledge.store.keywords import refuse_service
+from irtwin.knowledge.store.syntax_error import in_words
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL, PREFIXES, RDF, shorten
+from irtwin.knowledge.vocabulary import SH as SHACL
+from irtwin.resources import Files, Resource, Resources
+
+_SWRL = "http://www.w3.org/2003/11/swrl#"
+_SWRL_BUILT_IN = "http://www.w3.org/2003/11/swrlb#"
+_TEXTS = (SH.select, SH.ask, SH.construct)
+_LONGEST = 60.0  # s that a look at the columns of a mapping's SQL may take
+_AT = re.compile(r"error at (\d+):(\d+): (.*)", re.DOTALL)
+
+
+def check(resources: Resources) -> None:
+    """Raise InputError for the first fault of a file that does not ship; mappings are held to tables elsewhere."""
+    _check(resources.files)
+
+
+@lru_cache(maxsize=16)
+def _check(files: Files) -> None:
+    resources = Resources(files)
+    for file in resources.extensions:
+        if file.kind in _CHECKS:
+            _CHECKS[file.kind](file)
+    if any(file.is_extension for file in resources.of("rules")):
+        _check_names(resources.of("rules", "rules.ttl"))
+        _check_terms(resources)
+
+
+def check_mappings(resources: Resources, engine: Engine) -> None:
+    """Raise InputError for a mapping that does not ship and is no R2RML, or does not fit the tables."""
+    for file in resources.of("mappings"):
+        if file.is_extension:
+            _check_mapping(file, engine)
+
+
+def sparql_fault(text: str) -> tuple[int, str] | None:
+    """Return line and words of what is wrong with a query, which may read this graph alone; None where nothing is."""
+    try:
+        Store().query(text, base_iri=ID, prefixes=PREFIXES)
+    except SyntaxError as error:
+        said = _AT.fullmatch(in_words(error, text))
+        return (int(said[1]), f"column {said[2]}: {said[3]}") if said else (1, str(error))
+    except RuntimeError:
+        pass  # a function that only the workspace's store has
+    try:
+        refuse_service(text, ID)
+    except InputError:
+        lines = enumerate(text.splitlines(), 1)
+        found = ((line, said) for line, one in lines if (said := re.search("service", one, re.IGNORECASE)))
+        line, said = next(found)
+        return line, f"column {said.start() + 1}: SERVICE asks another server, which is not allowed here"
+    return None
+
+
+def columns(text: str) -> tuple[str, ...]:
+    """Return what a query selects."""
+    answer = Store().query(text, base_iri=ID, prefixes=PREFIXES)
+    return tuple(it.value for it in answer.variables) if isinstance(answer, QuerySolutions) else ()
+
+
+def _check_ontology(file: Resource) -> None:
+    for _ in read_turtle(file.path):
+        pass
+
+
+def _check_rules(file: Resource) -> None:
+    if file.name.endswith(".swrl.ttl"):
+        _check_swrl(file)
+        return
+    try:
+        rules = read_rules(file.path)
+    except InputError as error:
+        raise InputError(_with_line(file, str(error))) from error
+    if not rules:
+        raise InputError(f"{file.path}: has no sh:rule; constraints belong into shapes/")
+    for rule in rules:
+        _check_rule(file, rule)
+
+
+def _check_rule(file: Resource, rule: ShaclRule) -> None:
+    if not rule.name.startswith(("http:", "https:", "urn:")):
+        raise InputError(f"{file.path}: a rule has no IRI; give its shape one, for conclusions to name it")
+    line = _line_of(file, _end(rule.name))
+    fault = sparql_fault(rule.construct)
+    if fault is not None:
+        raise InputError(
+            f"{file.path}, line {line}: the rule {rule.label!r} is no SPARQL: {fault[1].partition(': ')[2]}"
+        )
+    query = translateQuery(parseQuery(rule.construct), initNs=PREFIXES).algebra
+    made = {term for pattern in query.template for term in pattern}
+    if any(isinstance(term, rdflib.BNode) for term in made):
+        raise InputError(
+            f"{file.path}, line {line}: the rule {rule.label!r} concludes blank nodes, anew each time: use IRIs"
+        )
+    free = sorted(str(term) for term in made if isinstance(term, rdflib.Variable) and term not in query.p["_vars"])
+    if free:
+        raise InputError(
+            f"{file.path}, line {line}: the rule {rule.label!r} concludes ?{free[0]}, which its WHERE does not bind"
+        )
+
+
+def _check_names(files: Files) -> None:
+    """What a rule concludes is kept in a graph that has the end of its name."""
+    known: dict[str, tuple[Resource, str]] = {}
+    for file in files:
+        for rule in read_rules(file.path):
+            other, name = known.setdefault(graph_of(rule.name), (file, rule.name))
+            if (other, name) != (file, rule.name):
+                extension = file if file.is_extension else other
+                raise InputError(
+                    f"{extension.path}, line {_line_of(extension, _end(name))}: {other} and {file} both have a rule "
+                    f"called {_end(name)}; call it otherwise"
+                )
+
+
+def _check_swrl(file: Resource) -> None:
+    said = _by_subject(read_turtle(file.path))
+    rules = [node for node, of in said.items() if of.get(RDF + "type") == NamedNode(_SWRL + "Imp")]
+    if not rules:
+        raise InputError(f"{file.path}: has no swrl:Imp; a rule is one")
+    for rule in rules:
+        label = getattr(said[rule].get("http://www.w3.org/2000/01/rdf-schema#label"), "value", "")
+        if not label:
+            raise InputError(f"{file.path}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
+        where = f"{file.path}, line {_line_of(file, label)}: the rule {label!r}"
+        body, head = (_atoms(said, said[rule].get(_SWRL + part), where, part) for part in ("body", "head"))
+        for atom in (*body, *head):
+            built_in = atom.get(_SWRL + "builtin")
+            if built_in is not None and not built_in.value.startswith(_SWRL_BUILT_IN):
+                raise InputError(f"{where} uses {shorten(built_in.value)}, which is no built-in of SWRL")
+        bound = {name for atom in body for name in _arguments(said, atom)}
+        free = sorted(name for atom in head for name in _arguments(said, atom) if name not in bound)
+        if free:
+            raise InputError(f"{where} concludes ?{_end(free[0])}, which its body does not bind")
+
+
+def _atoms(said: Mapping[Any, Mapping[str, Any]], cell: Any, where: str, part: str) -> list[Mapping[str, Any]]:
+    atoms, seen = [], set()
+    while cell in said and cell not in seen:
+        seen.add(cell)
+        atom = said.get(said[cell].get(RDF + "first"))
+        if atom is None:
+            break
+        atoms.append(atom)
+        cell = said[cell].get(RDF + "rest")
+    if not atoms or cell != NamedNode(RDF + "nil"):
+        raise InputError(f"{where} has no list of atoms for its swrl:{part}")
+    return atoms
+
+
+def _arguments(said: Mapping[Any, Mapping[str, Any]], atom: Mapping[str, Any]) -> set[str]:
+    """Return the variables of an atom."""
+    terms = [atom.get(_SWRL + "argument1"), atom.get(_SWRL + "argument2")]
+    cell, seen = atom.get(_SWRL + "arguments"), set[Any]()
+    while cell in said and cell not in seen:
+        seen.add(cell)
+        terms.append(said[cell].get(RDF + "first"))
+        cell = said[cell].get(RDF + "rest")
+    kind = NamedNode(_SWRL + "Variable")
+    return {term.value for term in terms if term is not None and said.get(term, {}).get(RDF + "type") == kind}
+
+
+def _check_terms(resources: Resources) -> None:
+    """Pellet takes no class or property that no module declares."""
+    declared: set[Any] = set()
+    kinds = {NamedNode(OWL + kind) for kind in ("Class", "ObjectProperty", "DatatypeProperty")}
+    for module in resources.of("ontology"):
+        declared |= {it.subject for it in read_turtle(module.path) if it.object in kinds}
+    for file in resources.of("rules", ".swrl.ttl"):
+        for triple in read_turtle(file.path) if file.is_extension else ():
+            names = triple.predicate.value in (_SWRL + "classPredicate", _SWRL + "propertyPredicate")
+            if names and triple.object not in declared:
+                iri = str(getattr(triple.object, "value", triple.object))
+                line = _line_of(file, _end(iri))
+                raise InputError(f"{file.path}, line {line}: no module of the ontology declares {shorten(iri)}")
+
+
+def _check_shapes(file: Resource) -> None:
+    for _ in read_turtle(file.path):  # says the line, where rdflib does not
+        pass
+    shapes = rdflib.Graph().parse(file.path)
+    if not {SH.NodeShape, SH.PropertyShape} & set(shapes.objects(None, rdflib.RDF.type)):
+        raise InputError(f"{file.path}: has no sh:NodeShape; a constraint is one")
+    for term in sorted(map(str, {*shapes.predicates(), *shapes.objects(None, rdflib.RDF.type)})):
+        if term.startswith(SHACL) and _end(term) not in SH:
+            line = _line_of(file, f"sh:{_end(term)}")
+            raise InputError(f"{file.path}, line {line}: sh:{_end(term)} is no term of SHACL; correct it")
+    for kind in _TEXTS:
+        for text in map(str, shapes.objects(None, kind)):
+            fault = sparql_fault(_prefixed(shapes, text).replace("$PATH", "rdf:type"))
+            if fault is not None:
+                raise InputError(f"{file.path}, line {_line_of(file, text)}: its SPARQL is none: {fault[1]}")
+    conforms, report, _ = meta_validate(shapes)
+    if not conforms:
+        raise InputError(f"{file.path}, {_shape_fault(file, shapes, report)}")
+
+
+def _shape_fault(file: Resource, shapes: rdflib.Graph, report: rdflib.Graph) -> str:
+    """Say which rule of SHACL's own a shape breaks, and on which line."""
+    found = [
+        tuple(report.value(result, SH[name]) for name in ("resultPath", "value", "resultMessage", "focusNode"))
+        for result in report.objects(None, SH.result)
+    ]
+    path, value, message, node = min(found, key=lambda one: (one[0] is None, str(one)))
+    while isinstance(node, rdflib.BNode) and (above := next(shapes.subjects(None, node), None)) is not None:
+        node = above
+    written = f"sh:{_end(str(path))}" if isinstance(value, rdflib.Literal) else _end(str(node))
+    line = _line_of(file, written)
+    words = str(message).split("[")[0].strip() if path is not None else "is no node shape and no property shape"
+    return f"line {line}: not well-formed SHACL: {f'sh:{_end(str(path))}: ' if path else ''}{words}"
+
+
+def _check_mapping(file: Resource, engine: Engine) -> None:
+    try:
+        for triples_map in read_document(file.path).triples_maps.values():
+            _check_graphs(file, triples_map)
+        with planned(engine, [file.path], seconds=_LONGEST):
+            pass
+    except InputError as error:
+        raise InputError(_with_line(file, str(error))) from error
+
+
+def _check_graphs(file: Resource, triples_map: TriplesMap) -> None:
+    """Only graphs of sources and of activities are the mapping's: others would be written over."""
+    inside = [own.graphs for own in triples_map.properties if own.graphs]
+    for graph in (*triples_map.graphs, *(graph for graphs in inside for graph in graphs)):
+        if not _start(graph).startswith((GRAPH_SOURCE, GRAPH_ACTIVITY)):
+            raise InputError(
+                f"{triples_map.where}: its graph is none of a mapping; begin its IRI with {GRAPH_SOURCE} "
+                f"or {GRAPH_ACTIVITY}"
+            )
+    if not triples_map.graphs:
+        raise InputError(
+            f"{triples_map.where}: has no rr:graphMap; name {GRAPH_SOURCE}{file.path.name.partition('.')[0]}, "
+            f"or {GRAPH_ACTIVITY}{{activity_id}} for rows that a provider made"
+        )
+
+
+def _start(graph: TermMap) -> str:
+    if graph.constant is not None:
+        return graph.constant.value
+    first = graph.template[0] if graph.template else ""
+    return first if isinstance(first, str) else ""
+
+
+def _check_question(file: Resource) -> None:
+    question = read_question(file.path)
+    fault = sparql_fault(question.text)
+    if fault is not None:
+        raise InputError(f"{file.path}, line {fault[0]}, {fault[1]}")
+    if question.of_robot and not re.search(r"[?$]arm\b", question.text):
+        raise InputError(f"{file.path}: says `# of: robot`, and has no variable ?arm for the robot")
+
+
+_CHECKS: dict[str, Callable[[Resource], None]] = {
+    "ontology": _check_ontology,
+    "rules": _check_rules,
+    "shapes": _check_shapes,
+    "questions": _check_question,
+}
+
+
+def _by_subject(triples: Iterable[Triple]) -> dict[Any, dict[str, Any]]:
+    said: dict[Any, dict[str, Any]] = {}
+    for triple in triples:
+        said.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
+    return said
+
+
+def _prefixed(shapes: rdflib.Graph, text: str) -> str:
+    found = [
+        (shapes.value(one, SH.prefix), shapes.value(one, SH.namespace)) for one in shapes.objects(None, SH.declare)
+    ]
+    return "".join(f"PREFIX {prefix}: <{space}>\n" for prefix, space in found) + text
+
+
+def _with_line(file: Resource, message: str) -> str:
+    """Put a line beside the file that a message begins with: that where the node it names first stands."""
+    rest = message.removeprefix(str(file.path))
+    if not rest.startswith((":", " ")) or re.match(r", line ", rest):
+        return message if message.startswith(str(file.path)) else f"{file.path}: {message}"
+    named = re.search(r"[#/:<]([\w-]+)>?(?=[:, ])", rest)
+    line = _line_of(file, named[1]) if named else 1
+    return f"{file.path}, line {line}{rest}"
+
+
+def _line_of(file: Resource, text: str) -> int:
+    """Return the line on which a text first stands, by its own first line; 1 where it does not."""
+    wanted = next((line.strip() for line in text.splitlines() if line.strip()), "")
+    lines = list(enumerate(file.path.read_text(encoding="utf-8").splitlines(), 1))
+    as_name = re.compile(rf"[:#/]{re.escape(wanted)}\b") if re.fullmatch(r"[\w-]+", wanted) else re.compile("$^")
+    found = [number for number, line in lines if as_name.search(line)] or [n for n, line in lines if wanted in line]
+    return found[0] if wanted and found else 1
+
+
+def _end(iri: str) -> str:
+    return re.split("[/#]", iri.strip("<>"))[-1]

@@ -1,0 +1,115 @@
+"""How a workspace stands: its robots and runs, tables and graph, what extends it, and what is wrong with it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+
+from sqlalchemy import select
+
+from irtwin.asking import WORKSPACE
+from irtwin.errors import InputError
+from irtwin.knowledge.extensions import check_mappings
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED
+from irtwin.report.extensions import check
+from irtwin.resources import Resource
+from irtwin.storage.database import Workspace
+from irtwin.storage.engine import shown
+from irtwin.storage.migration import newest
+from irtwin.storage.package_tables import package_tables
+from irtwin.storage.schema import Base, Robot, Run, Twin
+from irtwin.upkeep import lost_files
+
+_KINDS = {"Measured_Run": "measured", "Planned_Run": "planned", "Live_Run": "live"}
+
+
+@dataclass(frozen=True)
+class Status:
+    """Lines by heading; `faults` is what is wrong, and empty where nothing is."""
+
+    parts: dict[str, list[str]] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def lines(self) -> Iterator[str]:
+        """Yield all of it, the heading before its first line."""
+        width = max(map(len, (*self.parts, "damage"))) + 2
+        for heading, said in {**self.parts, "damage": self.faults or ["none"]}.items():
+            for place, line in enumerate(said):
+                yield f"{heading if place == 0 else '':{width}}{line}"
+
+    @contextmanager
+    def noting(self) -> Iterator[None]:
+        """Note what a user can mend, and go on."""
+        try:
+            yield
+        except InputError as error:
+            self.faults.append(str(error))
+
+
+def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None) -> Status:
+    """Look a workspace through. Raises InputError where there is none, or its database cannot be read."""
+    found = Status()
+    with Workspace.existing(Path(workspace), database) as place:
+        found.parts["workspace"] = [f"{place.folder}, database {shown(place.engine.url)}"]
+        found.parts["tables"] = _tables()
+        found.parts["robots"] = _robots(place) or ["none"]
+        with found.noting():
+            found.parts["graph"] = [_graph(place, graph_url)]
+        extensions = place.resources.extensions
+        found.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
+        with found.noting():
+            check(place.resources)
+            check_mappings(place.resources, place.engine)
+        found.faults.extend(lost_files(place))
+    return found
+
+
+def _tables() -> list[str]:
+    of_packages = {table.name for table in package_tables()}
+    own = len(Base.metadata.tables) - len(of_packages)
+    return [f"{own} of irtwin {version('irtwin')}, revision {newest()}"] + [
+        f"{name}, of a package" for name in sorted(of_packages)
+    ]
+
+
+def _robots(place: Workspace) -> list[str]:
+    with place.reading() as session:
+        robots = session.scalars(select(Robot).order_by(Robot.name)).all()
+        runs = Counter(tuple(row) for row in session.execute(select(Run.robot_id, Run.kind)))
+        twins = set(session.scalars(select(Twin.robot_id)))
+    lines = []
+    for robot in robots:
+        counts = [f"{runs[robot.robot_id, kind]} {word}" for kind, word in _KINDS.items() if runs[robot.robot_id, kind]]
+        report = place.report_path(robot.robot_id)
+        lines.append(
+            f"{robot.name}: runs: {', '.join(counts) or 'none'}; {'a twin' if robot.robot_id in twins else 'no twin'}; "
+            + (f"report {report}" if report.is_file() else "no report")
+        )
+    return lines
+
+
+def _graph(place: Workspace, url: str | None) -> str:
+    if url is not None:
+        with KnowledgeGraph(url, place.folder, place.resources) as graph:
+            return _size(graph)
+    place.check_graph()
+    if not (place.graph_folder / "CURRENT").is_file():
+        return "none yet"
+    with Snapshot(place.graph_folder) as snapshot:
+        return _size(snapshot.graph)
+
+
+def _size(graph: KnowledgeGraph) -> str:
+    concluded = len(graph.triples(GRAPH_INFERRED))
+    count = graph.query("SELECT (COUNT(*) AS ?count) { ?s ?p ?o }").rows[0]["count"]
+    return f"{count:,} triples in {len(graph.graphs())} named graphs; rules and reasoning conclude {concluded:,}"
+
+
+def _extension(file: Resource) -> str:
+    return f"{file}{', in place of what ships' if file.replaces else ''}"

@@ -1,0 +1,97 @@
+"""The tables of an older workspace are brought up to date when it is opened, by Alembic, in one transaction.
+
+A database says its revision in the table `alembic_version`. One that says none is of the first revision.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from sqlalchemy import Connection, Engine, inspect, text
+
+from irtwin.errors import InputError
+from irtwin.storage import engine as engines
+
+REVISIONS = Path(__file__).parent / "revisions"
+_TABLE = "alembic_version"
+_FILE = re.compile(r"r(\d{4})_\w+\.py")
+
+
+def newest() -> str:
+    """Return the revision that the tables of this irtwin have."""
+    return max(known())
+
+
+def known() -> set[str]:
+    """Return all revisions that this irtwin knows."""
+    return {found[1] for file in (REVISIONS / "versions").iterdir() if (found := _FILE.fullmatch(file.name))}
+
+
+def revision(connection: Connection) -> str | None:
+    """Return the revision that a database says, None where it says none."""
+    if not inspect(connection).has_table(_TABLE):
+        return None
+    said = connection.execute(text(f"SELECT version_num FROM {_TABLE}")).scalar()
+    return None if said is None else str(said)
+
+
+def stamp(connection: Connection) -> None:
+    """Say in a database whose tables were just made that they are of the newest revision."""
+    if revision(connection) is not None:
+        return  # another process made them at the same time
+    connection.execute(text(f"CREATE TABLE {_TABLE} (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
+    connection.execute(text(f"INSERT INTO {_TABLE} VALUES (:revision)"), {"revision": newest()})
+
+
+def migrate(engine: Engine) -> None:
+    """Bring the tables of a database to the newest revision: all of it, or nothing where it fails or is killed.
+
+    A copy of an SQLite file is kept beside it first. Raises InputError where a newer irtwin made the tables.
+    """
+    with engine.connect() as connection:
+        current = revision(connection)
+    if current == newest():
+        return
+    if current is not None and current not in known():
+        raise InputError(
+            f"{engines.shown(engine.url)}: its tables are of revision {current}, this irtwin knows none after "
+            f"{newest()}; install the irtwin that made them, or a newer one"
+        )
+    if newest() != (current or min(known())):
+        _keep_copy(engine, current or min(known()))
+    with engines.writing(engine, restructuring=True) as session:
+        connection = session.connection()
+        if revision(connection) == current:  # else another process has done it meanwhile
+            _run(connection)
+
+
+def _keep_copy(engine: Engine, current: str) -> None:
+    """Copy an SQLite file. A server's database has its own backups, and undoes the transaction too."""
+    if engine.dialect.name != "sqlite" or not engine.url.database:
+        return
+    copy = Path(f"{engine.url.database}.{current}")
+    if not copy.exists():  # else a migration was cut off, and what it began with is kept already
+        part = copy.with_name(f"{copy.name}.part")
+        part.unlink(missing_ok=True)
+        with engine.connect() as connection:
+            driver = connection.connection.driver_connection
+            assert driver is not None
+            driver.execute("VACUUM INTO ?", (str(part),))
+        part.replace(copy)
+
+
+def _run(connection: Connection) -> None:
+    from alembic.config import Config  # only where there is something to do
+    from alembic.runtime.environment import EnvironmentContext
+    from alembic.script import ScriptDirectory
+
+    config = Config()
+    config.set_main_option("script_location", str(REVISIONS))
+    script = ScriptDirectory.from_config(config)
+    steps = EnvironmentContext(
+        config, script, fn=lambda current, context: script._upgrade_revs("head", current), as_sql=False
+    )
+    with steps:
+        steps.configure(connection=connection, render_as_batch=True)
+        steps.run_migrations()

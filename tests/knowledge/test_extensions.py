@@ -1,0 +1,157 @@
+"""What extends a workspace: each fault is one line with file and line, before anything is used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.data_sets import irtwin
+
+from irtwin.errors import InputError
+from irtwin.knowledge.extensions import check, check_mappings
+from irtwin.knowledge.locality import of_all_rules
+from irtwin.knowledge.questions.queries import named_questions
+from irtwin.knowledge.shacl.rules import all_rules
+from irtwin.resources import Resources, resources_of
+from irtwin.storage.database import Workspace
+
+PREFIXES = """@prefix irt: <https://w3id.org/irtwin#> .
+@prefix my: <https://example.org/my#> .
+@prefix sh: <http://www.w3.org/ns/shacl#> .
+@prefix swrl: <http://www.w3.org/2003/11/swrl#> .
+@prefix swrlb: <http://www.w3.org/2003/11/swrlb#> .
+@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rr: <http://www.w3.org/ns/r2rml#> .
+"""  # nine lines
+RULE = """my:long_run a sh:NodeShape ;
+    rdfs:label "long run" ;
+    sh:targetClass irt:IR_RunProcess ;
+    sh:rule [ a sh:SPARQLRule ; sh:construct \"\"\"
+        PREFIX my: <https://example.org/my#> CONSTRUCT { BODY }
+        WHERE { $this irt:Run_Time ?seconds FILTER(?seconds > 60) }\"\"\" ] .
+"""
+SWRL = """my:run a swrl:Variable . my:other a swrl:Variable .
+[] a swrl:Imp ; rdfs:label "odd" ;
+    swrl:body ( [ a swrl:ClassAtom ; swrl:classPredicate irt:BODY ; swrl:argument1 my:run ] ) ;
+    swrl:head ( [ a swrl:ClassAtom ; swrl:classPredicate irt:Idle_Heavy_Run ; swrl:argument1 my:HEAD ] ) .
+"""
+SHAPE = (
+    "my:shape a sh:NodeShape ; sh:targetClass irt:IR_RunProcess ;\n    sh:property [ sh:path irt:Run_Time ; WHAT ] .\n"
+)
+MAPPING = """<#Long> rr:logicalTable [ rr:tableName "TABLE" ] ;
+    rr:subjectMap [ rr:template "https://w3id.org/irtwin/id/run/{run_id}" ; GRAPH ] ;
+    rr:predicateObjectMap [ rr:predicate my:p ; rr:objectMap [ rr:column "run_time_s" ] ] .
+"""
+GRAPH = "rr:graph <https://w3id.org/irtwin/graph/source/my>"
+QUESTION = (
+    "# title: Long runs\n# question: Which runs are long?\n# theme: run\nSELECT ?run { ?run irt:Run_Time ?s BODY }\n"
+)
+
+
+def put(place: Path, name: str, text: str) -> Path:
+    file = place / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text if name.endswith(".rq") else PREFIXES + text, encoding="utf-8")
+    return file
+
+
+FAULTS = [
+    ("ontology/my.ttl", "my:a my:b my:c .\nmy:d my:e\n", ", line 12: "),
+    ("rules/my_rules.ttl", RULE.replace("BODY", "?x a my:C"), r", line 10: the rule 'long run' concludes \?x, which"),
+    ("rules/my_rules.ttl", RULE.replace("BODY", "[] a my:C"), "line 10: .*blank nodes"),
+    ("rules/my_rules.ttl", RULE.replace("BODY", "$this a"), ", line 10: the rule 'long run' is no SPARQL: "),
+    (
+        "rules/my_rules.ttl",
+        RULE.replace("BODY", "$this a my:C").replace("FILTER", "SERVICE <http://e.org> { ?a ?b ?c } FILTER"),
+        "line 10: .*SERVICE asks another server",
+    ),
+    ("rules/my_rules.ttl", RULE.replace("BODY", "$this a my:C").replace("my:long_run", "[]"), "no IRI"),
+    (
+        "rules/my_rules.ttl",
+        RULE.replace("BODY", "$this a my:C").replace("long_run", "gap_alarm"),
+        "line 10: .* both have",
+    ),
+    ("rules/my_rules.ttl", RULE.replace("sh:targetClass", "sh:target"), "line 10: my:|line 10: https"),
+    ("rules/my_rules.ttl", "my:a a my:b .", "has no sh:rule"),
+    ("rules/my.swrl.ttl", SWRL.replace("BODY", "IR_RunProcess").replace("HEAD", "other"), r"line 11: .*\?other, which"),
+    ("rules/my.swrl.ttl", SWRL.replace("BODY", "Nothing_Such").replace("HEAD", "run"), "line 12: .*irt:Nothing_Such"),
+    ("rules/my.swrl.ttl", "my:a a my:b .", "has no swrl:Imp"),
+    ("shapes/my.ttl", SHAPE.replace("WHAT", 'sh:minCount "one"'), "line 11: not well-formed SHACL: sh:minCount"),
+    ("shapes/my.ttl", SHAPE.replace("WHAT", "sh:minCont 1"), "line 11: sh:minCont is no term of SHACL"),
+    ("shapes/my.ttl", SHAPE.replace("sh:path irt:Run_Time ; WHAT", "sh:minCount 1"), "line 10: not well-formed"),
+    ("shapes/my.ttl", "my:a a my:b .", "has no sh:NodeShape"),
+    ("questions/my.rq", QUESTION.replace("BODY", "FILTER(?s >"), r"my.rq, line \d, column \d+: "),
+    (
+        "questions/my.rq",
+        QUESTION.replace("BODY", "SERVICE <http://e.org> { ?a ?b ?c }"),
+        "line 4, column 36: SERVICE asks",
+    ),
+    ("questions/my.rq", QUESTION.replace("SELECT ?run {", "DELETE {"), r"line 4, column \d+: "),
+    ("questions/my.rq", QUESTION.replace("theme: run", "theme: weather"), "its theme is 'weather'"),
+    ("questions/my.rq", "SELECT * { ?s ?p ?o }", "line 1: a question begins with `# title: ...`"),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "said"), FAULTS)
+def test_a_fault_is_said_with_file_and_line(name: str, text: str, said: str, tmp_path: Path) -> None:
+    file = put(tmp_path, name, text)
+    with pytest.raises(InputError, match=said) as error:
+        check(resources_of(tmp_path))
+    assert str(error.value).startswith(str(file))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (MAPPING.replace("TABLE", "nothing_such").replace("GRAPH", GRAPH), "line 10: <Long>.*no such table"),
+        (MAPPING.replace("TABLE", "run").replace("GRAPH", GRAPH).replace("run_time_s", "colour"), "no column colour"),
+        (MAPPING.replace("TABLE", "run").replace("GRAPH", ""), "line 10: <Long>.* has no rr:graphMap"),
+        (MAPPING.replace("TABLE", "run").replace("GRAPH", "rr:graph my:own"), "its graph is none of a mapping"),
+        (MAPPING.replace("rr:tableName", "rr:tableNam").replace("GRAPH", GRAPH), "tableNam"),
+    ],
+)
+def test_a_mapping_is_held_to_the_tables(text: str, said: str, tmp_path: Path) -> None:
+    file = put(tmp_path, "mappings/my.r2rml.ttl", text)
+    with Workspace(tmp_path) as place, pytest.raises(InputError, match=said) as error:
+        check_mappings(place.resources, place.engine)
+    assert str(error.value).startswith(f"{file}, line ")
+
+
+def test_what_is_sound_holds_beside_what_ships(tmp_path: Path) -> None:
+    put(tmp_path, "rules/my_rules.ttl", RULE.replace("BODY", "$this a my:Long_Run"))
+    put(tmp_path, "rules/my.swrl.ttl", SWRL.replace("BODY", "IR_RunProcess").replace("HEAD", "run"))
+    put(tmp_path, "shapes/my.ttl", SHAPE.replace("WHAT", "sh:minCount 1"))
+    put(tmp_path, "questions/long_runs.rq", QUESTION.replace("BODY", ""))
+    put(tmp_path, "mappings/my.r2rml.ttl", MAPPING.replace("TABLE", "run").replace("GRAPH", GRAPH))
+    with Workspace(tmp_path) as place:
+        check(place.resources)
+        check_mappings(place.resources, place.engine)
+        assert "long run" in {rule.label for rule in all_rules(place.resources)}
+        assert "long_runs" in named_questions(place.resources)
+        assert "long_runs" not in named_questions()
+        assert not of_all_rules(Resources(place.resources.extensions)).unknown
+
+
+@pytest.mark.parametrize("command", [["query"], ["query", "robots"], ["explain", "?"], ["export", "--owl", "x.owl"]])
+def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    put(tmp_path / "irtwin-workspace", "rules/my_rules.ttl", RULE.replace("BODY", "$this a"))
+    done = irtwin(*command)
+    assert done.status == 2
+    assert done.err.startswith("irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL")
+    assert done.err.count("\n") == 1
+
+
+def test_status_lists_what_extends_and_what_is_wrong(tmp_path: Path) -> None:
+    Workspace(tmp_path).close()
+    file = put(tmp_path, "rules/my_rules.ttl", RULE.replace("BODY", "$this a"))
+    put(tmp_path, "shapes/shapes.ttl", SHAPE.replace("WHAT", "sh:minCount 1"))
+    done = irtwin("status", "--workspace", tmp_path)
+    assert done.status == 2
+    lines = done.out.splitlines()
+    assert any(line.split() == ["robots", "none"] for line in lines)
+    assert any("shapes/shapes.ttl of workspace, in place of what ships" in line for line in lines)
+    assert any(line.startswith("damage") and f"{file}, line 10: the rule 'long run'" in line for line in lines)

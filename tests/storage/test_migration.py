@@ -1,0 +1,125 @@
+"""An older workspace is migrated when it is opened: whole, or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from sqlalchemy import inspect, text
+from tests.rows import data_set
+
+from irtwin.errors import InputError
+from irtwin.storage import migration
+from irtwin.storage.database import Workspace
+from irtwin.storage.revisions.versions import r0001_tables_of_0_1
+from irtwin.storage.schema import Base
+
+# As a later irtwin would have it: runs have got the column `sample_rate_hz`.
+LATER = """
+import os
+import sqlalchemy as sa
+from alembic import op
+
+revision, down_revision = "0002", "0001"
+
+
+def upgrade():
+    recreate = "always" if op.get_bind().dialect.name == "sqlite" else "never"  # as for what SQLite cannot alter
+    with op.batch_alter_table("run", recreate=recreate) as run:
+        run.add_column(sa.Column("sample_rate_hz", sa.Float(), nullable=True))
+    op.execute("UPDATE run SET sample_rate_hz = 250.0")
+    if "KILLED" in os.environ:
+        os._exit(9)
+"""
+OPEN = """
+import sys
+from pathlib import Path
+from irtwin.storage import migration
+from irtwin.storage.database import Workspace
+
+migration.REVISIONS = Path(sys.argv[1])
+Workspace(Path(sys.argv[2])).close()
+"""
+
+
+def digest() -> str:
+    """Return what changes whenever a column does."""
+    columns = [
+        f"{table.name}.{column.name} {column.type} {column.nullable} {sorted(map(str, column.foreign_keys))}"
+        for table in Base.metadata.sorted_tables
+        for column in table.columns
+    ]
+    return hashlib.sha256("\n".join(sorted(columns)).encode()).hexdigest()[:16]
+
+
+def older(place: Workspace) -> None:
+    """Make the tables those of the first revision, as far as LATER goes, in a database that says no revision."""
+    robot, joints, runs, series = data_set()
+    place.ingest(robot, joints, runs, series)
+    with place.engine.begin() as connection:
+        connection.execute(text("ALTER TABLE run DROP COLUMN sample_rate_hz"))
+        connection.execute(text("DROP TABLE alembic_version"))
+
+
+def columns(place: Workspace) -> set[str]:
+    return {column["name"] for column in inspect(place.engine).get_columns("run")}
+
+
+@pytest.fixture
+def later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "revisions"
+    shutil.copytree(migration.REVISIONS, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "versions" / "r0002_rates.py").write_text(LATER, encoding="utf-8")
+    monkeypatch.setattr(migration, "REVISIONS", folder)
+    return folder
+
+
+def test_the_newest_revision_is_of_these_tables() -> None:
+    (file,) = (migration.REVISIONS / "versions").glob(f"r{migration.newest()}_*.py")
+    module = import_module(f"{r0001_tables_of_0_1.__package__}.{file.stem}")
+    assert digest() == module.TABLES, f"the tables changed: write a revision with TABLES = {digest()!r}"
+
+
+def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place, place.engine.connect() as connection:
+        assert migration.revision(connection) == migration.newest()
+
+
+@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
+def test_an_older_workspace_is_migrated(
+    on_server: bool, tmp_path: Path, later: Path, request: pytest.FixtureRequest
+) -> None:
+    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
+    with Workspace(tmp_path / "place", url) as place:
+        older(place)
+    with Workspace(tmp_path / "place", url) as place, place.engine.connect() as connection:
+        assert migration.revision(connection) == "0002"
+        assert set(connection.execute(text("SELECT sample_rate_hz FROM run")).scalars()) == {250.0}
+        assert connection.execute(text("SELECT count(*) FROM series")).scalar()  # which refer to runs
+        assert connection.execute(text("SELECT count(*) FROM run")).scalar() == len(data_set()[2])
+    assert (tmp_path / "place" / "irtwin.db.0001").is_file() is not on_server
+
+
+def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:
+    with Workspace(tmp_path / "place") as place:
+        older(place)
+        command = [sys.executable, "-c", OPEN, later, tmp_path / "place"]
+        assert subprocess.run(command, env={**os.environ, "KILLED": "yes"}, check=False).returncode == 9
+        assert "sample_rate_hz" not in columns(place)
+        with place.engine.connect() as connection:
+            assert migration.revision(connection) is None
+    with Workspace(tmp_path / "place") as place:
+        assert "sample_rate_hz" in columns(place)
+
+
+def test_a_workspace_of_a_newer_irtwin_is_refused(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place, place.engine.begin() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    with pytest.raises(InputError, match="its tables are of revision 9999, this irtwin knows none after"):
+        Workspace(tmp_path)
