@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
-from tests import plants
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -16,10 +13,8 @@ from irtwin.report.questions import Answer
 
 
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    plants.fill(graph, tmp_path_factory.mktemp("plant"))
-    return graph
+def graph(plant: KnowledgeGraph) -> KnowledgeGraph:
+    return plant
 
 
 def compared(graph: KnowledgeGraph, robot: str, *sides: Side | None) -> Comparison:
@@ -79,7 +74,7 @@ def test_what_is_no_day(text: str) -> None:
         side({"a_from": text}, "a")
 
 
-def test_a_time_without_runs(graph: KnowledgeGraph, tmp_path: Path) -> None:
+def test_a_time_without_runs(graph: KnowledgeGraph) -> None:
     asked = {"a_to": "2020-01-01", "b_from": "2026-03-03"}
     found = compared(graph, "Arm_A", side(asked, "a"), side(asked, "b"))
     assert all(pair.difference is None for _, pairs in found.kinds for pair in pairs)

@@ -21,10 +21,8 @@ TARIFF = Tariff(price=0.2, currency="EUR", co2=0.4)
 
 
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    plants.fill(graph, tmp_path_factory.mktemp("plant"))
-    return graph
+def graph(plant: KnowledgeGraph) -> KnowledgeGraph:
+    return plant
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +93,9 @@ def test_what_nobody_said_is_not_shown(answers: Answers) -> None:
 def test_a_plant_without_robots() -> None:
     graph = KnowledgeGraph()
     graph.load_ontology()
-    said = text(drawn(ask(graph, page.questions(), {}), TARIFF))
-    assert "No robots The graph knows no robot yet." in said
+    answers = ask(graph, page.questions(), {})
+    assert "No robots The graph knows no robot yet." in text(drawn(answers, TARIFF))
+    assert not overview.sheet(overview.overview(answers, TARIFF), TARIFF).rows
 
 
 def test_a_hundred_robots(answers: Answers) -> None:

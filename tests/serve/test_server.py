@@ -46,13 +46,6 @@ def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
 
 
 @pytest.mark.slow
-def test_a_tariff_that_cannot_be_used(new_graph: Callable[[], Path]) -> None:
-    workspace = new_graph().parent
-    (workspace / "plant.toml").write_text("prise = 1\n", encoding="utf-8")
-    assert "plant.toml: unknown key 'prise'" in refused("--workspace", workspace, "--port", 0)
-
-
-@pytest.mark.slow
 def test_a_host_that_is_not_ours(new_graph: Callable[[], Path]) -> None:
     assert "cannot listen on 203.0.113.1" in refused("--workspace", new_graph().parent, "--host", "203.0.113.1")
 

@@ -16,11 +16,12 @@ from irtwin.errors import InputError
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant import comparison, links, overview, page, robot, sheet
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.plant.tariff import FILE, Tariff, read_tariff
+from irtwin.report.plant.tariff import Tariff, read_tariff
 from irtwin.report.questions import Answers, Question
 from irtwin.serve.asking import Asking, Bindings
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
+from irtwin.storage.database import TARIFF
 
 POLICY = (
     "default-src 'none'; style-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'self'; "
@@ -149,7 +150,7 @@ class PlantPages:
             tariff = read_tariff(self._workspace)
         except InputError as error:
             trouble = str(error)
-        return {"tariff": tariff, "trouble": trouble, "file": FILE, "excel": sheet.excel_is_there()}
+        return {"tariff": tariff, "trouble": trouble, "file": TARIFF, "excel": sheet.excel_is_there()}
 
 
 def _individual(kind: str, tail: str) -> str:

@@ -12,8 +12,8 @@ from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
+from irtwin.storage.database import TARIFF
 
-FILE = "plant.toml"
 JOULES = 3.6e6  # of a kWh
 _KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh")
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
@@ -39,7 +39,7 @@ class Tariff:
 
 def read_tariff(workspace: Path) -> Tariff:
     """Read `plant.toml` of a workspace; an empty tariff where there is none. InputError where it cannot be used."""
-    file = workspace / FILE
+    file = workspace / TARIFF
     if not file.exists():
         return Tariff()
     try:
