@@ -9,10 +9,13 @@ from typing import Any
 
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
+    GRAPH_CHANGED,
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
+    GRAPH_REASONED,
     GRAPH_SOURCE,
     GRAPH_UPDATE,
+    GRAPH_VALIDATION,
     ID,
     RDF,
     shorten,
@@ -124,5 +127,11 @@ def _by(graph: str) -> tuple[str, str | None]:
         return f"concluded by {graph.removeprefix(GRAPH_INFERRED)}", None
     if graph.startswith(GRAPH_SOURCE):
         return f"taken in ({graph.removeprefix(GRAPH_SOURCE)})", None
-    known = {GRAPH_ONTOLOGY: "the ontology", GRAPH_UPDATE: "an update"}
+    known = {
+        GRAPH_ONTOLOGY: "the ontology",
+        GRAPH_UPDATE: "an update",
+        GRAPH_REASONED: "noted by the reasoner",
+        GRAPH_CHANGED: "noted by the reasoner",
+        GRAPH_VALIDATION: "the validation",
+    }
     return known.get(graph, shorten(graph)), None
