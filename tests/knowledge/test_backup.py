@@ -38,6 +38,7 @@ def fill(place: Workspace) -> None:
     report = place.report_path(rows.ROBOT)
     report.parent.mkdir()
     report.write_text("<html>")
+    (place.folder / "plant.toml").write_text("co2_kg_per_kwh = 0.4\n")
     with KnowledgeGraph(place.graph_folder) as graph:
         documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
         graph.load_ontology()
@@ -56,6 +57,7 @@ def state(place: Workspace) -> State:
         for folder in ("series", "twins", "reports")
         for file in (place.folder / folder).glob("*")
     }
+    files["plant.toml"] = checksum(place.folder / "plant.toml")
     with KnowledgeGraph(place.graph_folder) as graph:
         return tables, files, len(graph.triples()) + sum(len(graph.triples(name)) for name in graph.graphs())
 
@@ -88,7 +90,7 @@ def test_what_is_restored_is_what_was_kept(filled: Workspace, archive: Path, tmp
         assert place.read_series(f"{rows.ROBOT}.work").equals(rows.samples(1))
         assert place.ingest(*rows.data_set()) == "unchanged"
     left = {path.name for path in (tmp_path / "after").iterdir()}
-    assert left <= {"irtwin.db", "irtwin.db-wal", "irtwin.db-shm", "series", "twins", "reports", "graph"}
+    assert left <= {"irtwin.db", "irtwin.db-wal", "irtwin.db-shm", "series", "twins", "reports", "graph", "plant.toml"}
     assert not [path for path in tmp_path.rglob(".*")]
 
 

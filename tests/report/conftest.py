@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests import plants
 from tests.report.robots import Factory, PageOf
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -28,3 +29,11 @@ def page_of(graph: KnowledgeGraph, tmp_path: Path) -> PageOf:
         return out.read_text(encoding="utf-8")
 
     return page
+
+
+@pytest.fixture(scope="session")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
+    """A graph of four robots, for the pages of a plant."""
+    graph = KnowledgeGraph()
+    plants.fill(graph, tmp_path_factory.mktemp("plant"))
+    return graph

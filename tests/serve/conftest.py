@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests.endpoint import Server, make_graph, serving
+from tests.plants import make_plant
 
 
 @pytest.fixture(scope="session")
@@ -26,3 +27,21 @@ def server(new_graph: Callable[[], Path]) -> Iterator[Server]:
 def start() -> Callable[..., object]:
     """Give `serving`, for tests that need a server of their own."""
     return serving
+
+
+@pytest.fixture(scope="session")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server of four robots, one of them with a hostile name, a tariff and reports."""
+    folder = tmp_path_factory.mktemp("plant")
+    graph = make_plant(folder)
+    (folder / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\n', encoding="utf-8")
+    (folder / "reports").mkdir()
+    (folder / "reports/Arm_A.html").write_text(REPORT, encoding="utf-8")
+    (folder / "reports/out.html").symlink_to("/etc/hostname")
+    with serving(graph, token=None) as running:
+        yield running
+
+
+REPORT = """<!DOCTYPE html><title>Arm_A</title><p id="said">nothing</p><script>
+fetch("/sparql?query=ASK{}").then(() => { said.textContent = "it read"; }, () => { said.textContent = "kept out"; });
+</script>"""

@@ -34,7 +34,7 @@ def page(server) -> Iterator[tuple[Any, list[str]]]:
         page.on(
             "request", lambda request: None if request.url.startswith(server.url) else complaints.append(request.url)
         )
-        page.goto(server.url)
+        page.goto(f"{server.url}/query")
         page.wait_for_selector("#questions button")
         yield page, complaints
         browser.close()

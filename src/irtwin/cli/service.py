@@ -19,10 +19,11 @@ from irtwin.cli.options import DAY, Number, database_option, graph_option, say, 
 )
 @click.option("--token-file", type=click.Path(path_type=Path), help="File with the token that permits updates.")
 def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
-    """Serve the graph as a SPARQL endpoint, at /sparql.
+    """Serve the plant's pages at / and the graph as a SPARQL endpoint at /sparql.
 
-    A query page is at /, and the ontology at the paths of its IRIs. The endpoint is read-only unless you give a token
-    for updates, in a file or in the environment variable IRTWIN_TOKEN.
+    A query page is at /query, live robots at /live, the ontology and each individual at the paths of their IRIs. Prices
+    are shown where `plant.toml` in the workspace says price_per_kwh, currency and co2_kg_per_kwh. The endpoint is
+    read-only unless you give a token for updates, in a file or in the environment variable IRTWIN_TOKEN.
     """
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
@@ -33,7 +34,7 @@ def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, to
 
 
 def _announce(address: str) -> None:
-    click.echo(f"Serving {address}. Press Ctrl-C to stop.")
+    click.echo(f"Serving {address}, and pages of it at {address.removesuffix('sparql')}. Press Ctrl-C to stop.")
 
 
 @click.command()

@@ -21,11 +21,14 @@ _PAGE_HEADERS = {"Vary": "Accept", "Content-Security-Policy": "frame-ancestors '
 _FORMATS = {form.name: form for form in (RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
 
 
+def paths() -> list[str]:
+    """Return the paths of the modules and of their versions."""
+    return sorted(_modules())
+
+
 def module(request: Request) -> Response:
     """Return the module whose IRI or version IRI has the request's path; to a browser, the documentation of all."""
-    file = _modules().get(request.url.path)
-    if file is None:
-        raise Refusal(404, f"no ontology has this address; there are {', '.join(sorted(_modules()))}")
+    file = _modules()[request.url.path]
     accept = request.headers.get("accept", "")
     if negotiation.wants_page(accept):
         return Response(_documentation(), media_type="text/html", headers=_PAGE_HEADERS)

@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import PREFIXES
+from irtwin.report.plant.page import style as plant_style
 from irtwin.resources import Resources
 from irtwin.serve.protocol import Refusal
 from irtwin.virtual.robot_data import asset as scene_asset
@@ -29,13 +30,15 @@ _TYPES = {
     "live_list.js": "text/javascript",
     "meshcat.js": "text/javascript",
     "page.css": "text/css",
+    "plant.css": "text/css",
     "robot.js": "text/javascript",
     "page.js": "text/javascript",
     "yasgui.min.css": "text/css",
     "yasgui.min.js": "text/javascript",
 }
-_OF_THE_SCENE: dict[str, Callable[[], str]] = {
+_MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
     "meshcat.js": viewer_script,
+    "plant.css": plant_style,
     "robot.js": partial(scene_asset, "robot.js"),
 }
 
@@ -66,8 +69,8 @@ def questions(resources: Resources, request: Request) -> Response:
 
 @cache
 def _packed(name: str) -> bytes:
-    if name in _OF_THE_SCENE:
-        return gzip.compress(_OF_THE_SCENE[name]().encode("utf-8"), mtime=0)
+    if name in _MADE:
+        return gzip.compress(_MADE[name]().encode("utf-8"), mtime=0)
     packed = FOLDER / f"{name}.gz"
     return packed.read_bytes() if packed.exists() else gzip.compress((FOLDER / name).read_bytes(), mtime=0)
 

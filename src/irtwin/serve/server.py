@@ -1,4 +1,4 @@
-"""`irtwin serve`: the endpoint, the query page and the ontology behind one address."""
+"""`irtwin serve`: the plant's pages, the endpoint and whatever has an IRI of ours behind one address."""
 
 from __future__ import annotations
 
@@ -24,13 +24,17 @@ from starlette.routing import Route
 from irtwin.asking import checked
 from irtwin.errors import InputError
 from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.serve import ontology, page
+from irtwin.report.plant.tariff import read_tariff
+from irtwin.serve import individuals, page
+from irtwin.serve.asking import Asking
 from irtwin.serve.connections import Connection
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
 from irtwin.serve.live_page import LivePages
+from irtwin.serve.plant_pages import PlantPages
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.report_files import ReportFiles
 from irtwin.serve.updates import Updates
 
 _GRACE = 3  # s that answers under way may still take when the server stops
@@ -49,10 +53,11 @@ def serve(
     """Serve the graph in a folder until SIGINT or SIGTERM.
 
     Port 0 takes a free one; `announce` is told the endpoint's address once it answers.
-    Raises InputError where the graph is missing or the port is taken.
+    Raises InputError where the graph is missing, the port is taken, or the tariff cannot be used.
     """
     with Snapshot(graph):
         pass  # what cannot be read is said here, once, rather than by each worker
+    read_tariff(graph.parent)  # likewise: later, a page would say it
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
@@ -122,6 +127,9 @@ def application(
     updates = Updates(graph, token, limits)
     live = LivePages(graph)
     resources = checked(graph.parent)
+    asking = Asking(pool, updates, limits)
+    reports = ReportFiles(graph.parent)
+    plant = PlantPages(graph.parent, asking, reports)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -135,12 +143,14 @@ def application(
 
     app = Starlette(
         routes=[
-            Route("/", lambda request: page.response(), methods=["GET"]),
+            *plant.routes(),
+            Route("/query", lambda request: page.response(), methods=["GET"]),
             Route("/sparql", Endpoint(pool, updates, limits)),
             Route("/questions.json", partial(page.questions, resources), methods=["GET"]),
+            *reports.routes(),
             *live.routes(),
             Route("/assets/{name}", page.asset, methods=["GET"]),
-            Route("/irtwin{rest:path}", ontology.module, methods=["GET"]),
+            Route("/irtwin{rest:path}", partial(individuals.respond, asking), methods=["GET"]),
         ],
         middleware=[Middleware(Guard, local=_is_loopback(host))],
         exception_handlers={Refusal: _refused},

@@ -55,6 +55,7 @@ _FROM_A_BACKUP = (
     "again into a new one (where a server keeps the database, give --database)"
 )
 TWINS, DIAGNOSES, MESHES = "twins", "diagnoses", "meshes"
+TARIFF = "plant.toml"  # what a kilowatt hour costs and emits; a person writes it
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES)  # of files that rows name
 
 

@@ -27,7 +27,7 @@ from irtwin.knowledge.vocabulary import GRAPH_SOURCE
 from irtwin.resources import KINDS
 from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
-from irtwin.storage.database import DIAGNOSES, MESHES, TWINS, Workspace
+from irtwin.storage.database import DIAGNOSES, MESHES, TARIFF, TWINS, Workspace
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
@@ -36,7 +36,8 @@ from irtwin.storage.series import FOLDER
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
 _NAMES = re.compile(
-    rf"{re.escape(_GRAPH)}|(?:rows|{'|'.join((*_FOLDERS, *KINDS))}|reports/[a-z_]+)/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*"
+    rf"{re.escape(_GRAPH)}|{re.escape(TARIFF)}"
+    rf"|(?:rows|{'|'.join((*_FOLDERS, *KINDS))}|reports/[a-z_]+)/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*"
 )
 _AT_ONCE = 5000  # rows
 
@@ -132,6 +133,8 @@ def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
             except FileNotFoundError:  # the journal of a run that is in the database now
                 continue
             yield f"{name}/{file.name}", target
+    if (folder / TARIFF).is_file():
+        yield TARIFF, shutil.copyfile(folder / TARIFF, held / TARIFF)
 
 
 def _dump_rows(connection: Connection, held: Path) -> Iterator[tuple[str, Path]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from pyoxigraph import NamedNode
+from pyoxigraph import Literal, NamedNode
 
 # Comments, strings, variables and local names, and IRIs where no operand stands before them, which `<` compares.
 _NO_KEYWORD = re.compile(
@@ -36,15 +36,19 @@ def masked(text: str) -> str:
     return _NO_KEYWORD.sub(lambda match: " " * len(match[0]), text)
 
 
-def bound(text: str, bindings: Mapping[str, str]) -> str:
-    """Let the variables of one of the project's own queries have the given IRIs as their only values.
+def bound(text: str, bindings: Mapping[str, str | Literal]) -> str:
+    """Let the variables of one of the project's own queries have the given IRIs, or literals, as their only values.
 
-    ValueError where it has no outermost group.
+    ValueError where it has no outermost group, or where a text is no IRI.
     """
     if not bindings:
         return text
     group = _OUTERMOST_GROUP.search(masked(text))
     if group is None:
         raise ValueError("the query has no group to bind variables in")
-    values = " ".join(f"VALUES ?{name} {{ {NamedNode(iri)} }}" for name, iri in bindings.items())
+    values = " ".join(f"VALUES ?{name} {{ {_term(value)} }}" for name, value in bindings.items())
     return f"{text[: group.end()]} {values} {text[group.end() :]}"
+
+
+def _term(value: str | Literal) -> NamedNode | Literal:
+    return value if isinstance(value, Literal) else NamedNode(value)

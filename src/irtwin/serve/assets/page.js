@@ -17,7 +17,7 @@
     endpointCatalogueOptions: { getData: () => [] },
     yasqe: {
       autocompleters: ["variables"],
-      value: withPrefixes("SELECT ?robot ?name WHERE {\n  ?robot a irt:Industrial_Robot ; rdfs:label ?name .\n} LIMIT 100\n"),
+      value: withPrefixes("SELECT ?name ?energy_kWh WHERE {\n  ?robot irt:has_Information / irt:IR_Name ?name .\n  ?total irt:total_of ?robot ; a irt:Robot_Total ; irt:Total_Energy ?energy_J .\n  BIND(?energy_J / 3.6e6 AS ?energy_kWh)\n} LIMIT 100\n"),
     },
     yasr: { prefixes },
   });

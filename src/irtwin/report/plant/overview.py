@@ -1,0 +1,204 @@
+"""All robots of a plant: what each does, took, cost and emitted, and what is wrong with it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from irtwin.report.plant.energies import KINDS, Days, Kind, added_up, by_day, days, kind, share
+from irtwin.report.plant.sheet import Sheet
+from irtwin.report.plant.tariff import JOULES, Tariff
+from irtwin.report.questions import Answers, Row
+
+TREND = 30  # days in a robot's trend
+PLANT_TREND = 90
+MOST_ALARMS = 20  # shown of the newest
+
+
+@dataclass(frozen=True)
+class State:
+    """What a robot does, in words; `live` is "flowing" or "stale" where it is watched just now."""
+
+    words: str
+    live: str | None = None
+    at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class Line:
+    """A robot's energy of one kind, with all that is known of the robot beside it."""
+
+    robot: str
+    name: str
+    measured_at: str | None
+    simulated: bool
+    state: State
+    runs: int
+    time_s: float | None
+    energy_j: float | None
+    cost: float | None
+    co2_kg: float | None
+    standing: float | None  # share of time
+    standby: float | None  # share of energy
+    trend: Days | None
+    alarms: int
+    reidentify: bool
+    gap: Row | None
+
+
+@dataclass(frozen=True)
+class Group:
+    """Energies of one kind, the largest first; `kind` is None for robots that have none."""
+
+    kind: Kind | None
+    lines: tuple[Line, ...]
+
+    def total(self, name: str) -> float | None:
+        """Add up a column that can be added up."""
+        known = [value for line in self.lines if (value := getattr(line, name)) is not None]
+        return sum(known) if known else None
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What the page of a plant says."""
+
+    groups: tuple[Group, ...]
+    trends: tuple[tuple[Kind, Days], ...]
+    alarms: Sequence[Row]
+    active: int
+    robots: int
+    electrical_j: float | None
+    cost: float | None
+    co2_kg: float | None
+    standby: float | None
+
+
+def overview(answers: Answers, tariff: Tariff) -> Overview:
+    """Make the overview of the answers to `reports/plant/*.rq`."""
+    energies = answers["energy"].rows
+    groups = tuple(_groups(answers, tariff))
+    daily = by_day(answers["days"].rows)
+    plants = ((one, days(added_up(of for (_, name), of in daily.items() if name == one.name), PLANT_TREND))
+              for one in KINDS.values())  # fmt: skip
+    electrical = [group for group in groups if group.kind is not None and group.kind.electrical]
+    rows = [row for row in energies if kind(row["energy_from"]).electrical]
+    alarms = answers["alarms"].rows
+    return Overview(
+        groups=groups,
+        trends=tuple((one, trend) for one, trend in plants if trend is not None),
+        alarms=alarms[:MOST_ALARMS],
+        active=sum(row["state"] == "active" for row in alarms),
+        robots=len({row["robot"] for row in answers["robots"].rows}),
+        electrical_j=_sum(group.total("energy_j") for group in electrical),
+        cost=_sum(group.total("cost") for group in electrical),
+        co2_kg=_sum(group.total("co2_kg") for group in electrical),
+        standby=share(_sum(row["standby_j"] for row in rows), _sum(row["modelled_j"] for row in rows)),
+    )
+
+
+def states(answers: Answers) -> dict[str, State]:
+    """Return what each robot that is watched just now does, by its IRI."""
+    return {row["robot"]: _watched(row) for row in answers["live"].rows}
+
+
+def sheet(found: Overview, tariff: Tariff) -> Sheet:
+    """Return the table of robots, a row for each kind of energy of each."""
+    columns = [
+        "robot", "iri", "state", "energy_from", "measured_at", "runs", "run_time_s", "energy_kWh",
+        *([f"cost_{tariff.currency}"] if tariff.price is not None else []),
+        *(["CO2_kg"] if tariff.co2 is not None else []),
+        "standstill_share_of_time", "standby_share_of_energy", "active_alarms", "last_gap", "gap_closed_share",
+    ]  # fmt: skip
+    rows = [
+        (
+            line.name, line.robot, line.state.words, group.kind.name if group.kind else None,
+            line.measured_at if group.kind is KINDS["measured"] else None, line.runs, line.time_s,
+            None if line.energy_j is None else line.energy_j / JOULES,
+            *([line.cost] if tariff.price is not None else []),
+            *([line.co2_kg] if tariff.co2 is not None else []),
+            line.standing, line.standby, line.alarms, line.gap["verdict"] if line.gap else None,
+            line.gap["closed"] if line.gap else None,
+        )
+        for group in found.groups for line in group.lines
+    ]  # fmt: skip
+    return Sheet(tuple(columns), rows)
+
+
+def _groups(answers: Answers, tariff: Tariff) -> list[Group]:
+    known: dict[str, list[Row]] = {}
+    for row in answers["energy"].rows:
+        known.setdefault(row["robot"], []).append(row)
+    daily = by_day(answers["days"].rows)
+    beside = _Beside(answers)
+    lines: dict[Kind | None, list[Line]] = {}
+    for robot in {row["robot"]: row for row in answers["robots"].rows}.values():
+        for energy in known.get(robot["robot"], [None]):
+            of = kind(energy["energy_from"]) if energy is not None else None
+            trend = days(daily.get((robot["robot"], energy["energy_from"]), {}), TREND) if energy is not None else None
+            lines.setdefault(of, []).append(_line(robot, energy, of, trend, tariff, beside))
+    order = [*KINDS.values(), *(of for of in lines if of is not None and of.name not in KINDS), None]
+    return [
+        Group(of, tuple(sorted(lines[of], key=lambda line: (-(line.energy_j or 0.0), line.name))))
+        for of in order if of in lines
+    ]  # fmt: skip
+
+
+class _Beside:
+    """What is known of robots beside their energies, by their IRIs."""
+
+    def __init__(self, answers: Answers) -> None:
+        self.standing = {row["robot"]: share(row["idle_s"], row["known_s"]) for row in answers["standstill"].rows}
+        self.alarms = Counter(row["robot"] for row in answers["alarms"].rows if row["state"] == "active")
+        self.reidentify = {row["robot"] for row in answers["to_reidentify"].rows}
+        self.gaps = {row["robot"]: row for row in answers["gaps"].rows}  # the last of each
+        self.states = states(answers)
+
+
+def _line(robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, tariff: Tariff, beside: _Beside) -> Line:
+    iri = robot["robot"]
+    joules = energy["energy_j"] if energy is not None else None
+    electrical = energy if of is not None and of.electrical else None
+    priced = electrical["energy_j"] if electrical is not None else None
+    return Line(
+        robot=iri,
+        name=robot["name"],
+        measured_at=robot["measured_at"],
+        simulated=bool(robot["simulated"]),
+        state=beside.states.get(iri) or _left(robot),
+        runs=(energy["runs"] if energy is not None else robot["runs"]) or 0,
+        time_s=energy["time_s"] if energy is not None else robot["time_s"],
+        energy_j=joules,
+        cost=tariff.cost(priced),
+        co2_kg=tariff.emitted(priced),
+        standing=beside.standing.get(iri),
+        standby=share(electrical["standby_j"], electrical["modelled_j"]) if electrical is not None else None,
+        trend=trend,
+        alarms=beside.alarms[iri],
+        reidentify=iri in beside.reidentify,
+        gap=beside.gaps.get(iri),
+    )  # fmt: skip
+
+
+_STATES = {"moving": "moving", "standstill": "standing still"}
+
+
+def _watched(row: Row) -> State:
+    if row["stream"] == "stale":
+        return State(f"no news: {row['why']}" if row["why"] else "no news", "stale", row["began"])
+    return State(_STATES.get(row["state"], "watched"), "flowing", row["began"])
+
+
+def _left(robot: Row) -> State:
+    """Return what a robot did at the end of its last run."""
+    if robot["last_began"] is None:
+        return State("no run yet" if not robot["runs"] else "not known")
+    return State(_STATES.get(robot["state"], "not known"), None, robot["last_began"])
+
+
+def _sum(values: Any) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) if known else None

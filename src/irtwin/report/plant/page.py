@@ -1,0 +1,56 @@
+"""The pages of a plant as HTML: templates and questions of `reports/plant`, without a script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import jinja2
+
+from irtwin import resources
+from irtwin.report.energy.page import environment
+from irtwin.report.plant import links
+from irtwin.report.plant.tariff import JOULES
+from irtwin.report.questions import Answers, Question, read_questions
+
+FOLDER = resources.folder("reports") / "plant"
+
+
+@cache
+def questions(page: str = "") -> Mapping[str, Question]:
+    """Return the questions of a page, of the plant's own without a name."""
+    return read_questions(FOLDER / page)
+
+
+@cache
+def style() -> str:
+    """Return the style of all these pages: that of reports, and what they have beside it."""
+    return "\n".join(
+        (FOLDER.parent / name).read_text(encoding="utf-8") for name in ("layout/style.css", "plant/style.css")
+    )
+
+
+def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any) -> str:
+    """Return a page; `answers` and `bindings` are shown as the questions behind it."""
+    template = _templates().get_template(f"plant/{name}")
+    rows = {question: answer.rows for question, answer in answers.items()}
+    return template.render(answers=answers, rows=rows, bindings=bindings, **said)
+
+
+@cache
+def _templates() -> jinja2.Environment:
+    templates = environment(FOLDER.parent)
+    templates.filters |= {
+        "page_of": links.page_of, "individual": links.individual, "tail": links.tail, "kwh": _kwh, "spaced": _spaced,
+    }  # fmt: skip
+    return templates
+
+
+def _kwh(joules: float | None) -> float | None:
+    return None if joules is None else joules / JOULES
+
+
+def _spaced(text: str | None) -> str:
+    """Write a key as words: "dc_bus" -> "dc bus"."""
+    return (text or "").replace("_", " ")

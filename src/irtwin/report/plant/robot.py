@@ -1,0 +1,69 @@
+"""What the pages of one robot and of one run need beside the rows of their questions, and their tables as files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from irtwin.report.plant import page
+from irtwin.report.plant.energies import Days, Kind, by_day, days, kind, share
+from irtwin.report.plant.overview import PLANT_TREND, states
+from irtwin.report.plant.sheet import Sheet
+from irtwin.report.questions import Answers, Question, Row
+
+MOST_RUNS = 200  # that a page shows
+_OF_THE_PLANT = ("energy", "days", "standstill", "live")  # its questions, asked of one robot
+_RUNS = {  # columns of a table by what the question calls them
+    "name": "run", "run": "iri", "began": "began_UTC", "time_s": "time_s", "payload_kg": "payload_kg",
+    "energy_from": "energy_from", "energy_j": "energy_J", "power_w": "mean_power_W", "peak_w": "peak_power_W",
+    "idle_share": "standstill_share_of_time", "standby_j": "standby_J", "standby_share": "standby_share_of_energy",
+    "error_percent": "twin_error_percent", "part": "part_in_twin", "planned": "planned",
+}  # fmt: skip
+_LEDGER = {"joint_name": "joint", "effect_name": "effect", "effect": "effect_iri", "energy_j": "energy_J"}
+
+
+def questions() -> Mapping[str, Question]:
+    """Return the questions of a robot's page."""
+    of_the_plant = page.questions()
+    return {**page.questions("robot"), **{name: replace(of_the_plant[name], bind=("robot",)) for name in _OF_THE_PLANT}}
+
+
+def of_robot(answers: Answers) -> dict[str, Any]:
+    """Return what a robot's page says of the answers to its questions."""
+    energies = sorted(
+        answers["energy"].rows, key=lambda row: (not kind(row["energy_from"]).electrical, row["energy_from"])
+    )
+    daily = {of: found for (_, of), found in by_day(answers["days"].rows).items()}
+    standing = answers["standstill"].first
+    return {
+        "energies": [_energy(row, daily) for row in energies],
+        "standing": share(standing["idle_s"], standing["known_s"]) if standing else None,
+        "state": next(iter(states(answers).values()), None),
+        "most_runs": MOST_RUNS,
+    }
+
+
+def of_run(answers: Answers) -> dict[str, Any]:
+    """Return what a run's page says of the answers to its questions."""
+    run = answers["run"].first
+    assert run is not None
+    return {"of": kind(run["energy_from"]) if run["energy_j"] is not None else None}
+
+
+def runs_sheet(answers: Answers) -> Sheet:
+    """Return a robot's runs, which `runs.rq` answers."""
+    return _sheet(answers["runs"].rows, _RUNS)
+
+
+def ledger_sheet(answers: Answers) -> Sheet:
+    """Return a run's energy by joint and effect, which `ledger.rq` answers."""
+    return _sheet(answers["ledger"].rows, _LEDGER)
+
+
+def _energy(row: Row, daily: Mapping[str, Mapping[str, float]]) -> tuple[Kind, Row, Days | None]:
+    return kind(row["energy_from"]), row, days(daily.get(row["energy_from"], {}), PLANT_TREND)
+
+
+def _sheet(rows: tuple[Row, ...], columns: Mapping[str, str]) -> Sheet:
+    return Sheet(tuple(columns.values()), [tuple(row[name] for name in columns) for row in rows])

@@ -1,0 +1,68 @@
+"""What a kilowatt hour costs and emits at this plant: said once, in `plant.toml` of the workspace, never guessed."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from irtwin.errors import InputError
+from irtwin.input_file import read_input
+from irtwin.storage.database import TARIFF
+
+JOULES = 3.6e6  # of a kWh
+_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh")
+_CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
+_MOST_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class Tariff:
+    """Price and emission factor of a kWh; None where nobody said."""
+
+    price: float | None = None  # currency/kWh
+    currency: str = ""
+    co2: float | None = None  # kg/kWh
+
+    def cost(self, joules: float | None) -> float | None:
+        """Return what an electrical energy (J) costs, in the currency."""
+        return None if joules is None or self.price is None else joules / JOULES * self.price
+
+    def emitted(self, joules: float | None) -> float | None:
+        """Return the CO2 (kg) of an electrical energy (J)."""
+        return None if joules is None or self.co2 is None else joules / JOULES * self.co2
+
+
+def read_tariff(workspace: Path) -> Tariff:
+    """Read `plant.toml` of a workspace; an empty tariff where there is none. InputError where it cannot be used."""
+    file = workspace / TARIFF
+    if not file.exists():
+        return Tariff()
+    try:
+        said = tomllib.loads(read_input(file, _MOST_BYTES).decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: not a TOML file: {error}") from None
+    for key in said:
+        if key not in _KEYS:
+            near = get_close_matches(key, _KEYS, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(_KEYS)}"
+            raise InputError(f"{file}: unknown key {key!r}: {hint}")
+    price, currency = _number(file, said, "price_per_kwh"), said.get("currency", "")
+    if not isinstance(currency, str) or (currency and not _CURRENCY.fullmatch(currency)):
+        raise InputError(f'{file}: currency is a code or a sign, as "EUR", not {currency!r}')
+    if price is not None and not currency:
+        raise InputError(f'{file}: price_per_kwh needs a currency, as currency = "EUR"')
+    return Tariff(price, currency, _number(file, said, "co2_kg_per_kwh"))
+
+
+def _number(file: Path, said: dict[str, Any], key: str) -> float | None:
+    value = said.get(key)
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value >= 0):
+        raise InputError(f"{file}: {key} is a number of 0 or more, not {value!r}")
+    return float(value)

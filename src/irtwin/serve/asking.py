@@ -1,0 +1,91 @@
+"""Asks the workers what a page is made of, so that a page has no more of the machine than a query of SPARQL has."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+
+from pyoxigraph import Literal, QueryBoolean, QueryResultsFormat, parse_query_results
+from starlette.requests import Request
+
+from irtwin.knowledge.store.sparql_text import bound
+from irtwin.knowledge.store.table import to_python
+from irtwin.knowledge.vocabulary import ID
+from irtwin.report.questions import Answer, Answers, Question, Row
+from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.updates import Updates
+
+Bindings = Mapping[str, str | Literal]
+
+_JSON = "application/sparql-results+json"
+_MOST = 32 << 20  # bytes of one answer: a page of more is of no use to anybody
+_TRIES = 3  # workers that may be lost before they begin
+
+
+class Asking:
+    """Asks on behalf of clients, each in its turn; all that a page asks is asked of one worker, in a query's time."""
+
+    def __init__(self, pool: Pool, updates: Updates, limits: Limits) -> None:
+        self._pool, self._updates, self._limits = pool, updates, limits
+
+    async def answers(self, request: Request, questions: Mapping[str, Question], bindings: Bindings) -> Answers:
+        """Answer a page's questions; `bindings` gives variables an IRI or a literal. Raises Refusal."""
+        texts = {name: bound(question.text, bindings) for name, question in questions.items()}
+        bodies = await self._all(client(request), [(text, _JSON) for text in texts.values()])
+        rows = await asyncio.to_thread(lambda: [_rows(body) for _, body in bodies])
+        return {name: Answer(questions[name], found) for name, found in zip(texts, rows, strict=True)}
+
+    async def holds(self, request: Request, pattern: str, bindings: Bindings) -> bool:
+        """Whether the graph has what a pattern asks for."""
+        ((_, body),) = await self._all(client(request), [(bound(f"ASK {{ {pattern} }}", bindings), _JSON)])
+        found = parse_query_results(body, QueryResultsFormat.JSON)
+        assert isinstance(found, QueryBoolean)
+        return bool(found)
+
+    async def written(self, request: Request, text: str, accept: str) -> tuple[str, bytes]:
+        """Return an answer as it is sent, and its media type."""
+        (answer,) = await self._all(client(request), [(text, accept)])
+        return answer
+
+    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[str, bytes]]:
+        for _ in range(_TRIES):
+            with suppress(NotBegun):
+                return await self._of_one_worker(client, asked)
+        raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
+
+    async def _of_one_worker(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[str, bytes]]:
+        async with self._pool.worker(client) as worker:
+            deadline = time.monotonic() + self._limits.seconds
+            try:
+                async with asyncio.timeout_at(deadline):
+                    return [await self._body(worker, text, accept) for text, accept in asked]
+            except TimeoutError:
+                seconds = self._limits.seconds
+                raise Refusal(
+                    503, f"the page's queries were cancelled after {seconds:g} s: the graph is large"
+                ) from None
+
+    async def _body(self, worker: Worker, text: str, accept: str) -> tuple[str, bytes]:
+        about = {"text": text, "default_graphs": (), "named_graphs": (), "base": ID, "accept": accept}
+        media_type = await worker.ask({**about, "at_once": self._updates.just_now})
+        body = bytearray()
+        async for piece in worker.pieces():
+            body += piece
+            if len(body) > _MOST:
+                raise Refusal(503, "there is more of this than a page shows: ask /sparql for a part of it")
+        return media_type, bytes(body)
+
+
+def client(request: Request) -> str:
+    """Return the address that a client asks from; clients of one machine, or behind one proxy, share it."""
+    return request.client.host if request.client is not None else ""
+
+
+def _rows(body: bytes) -> tuple[Row, ...]:
+    found = parse_query_results(body, QueryResultsFormat.JSON)
+    assert not isinstance(found, QueryBoolean)
+    names = [variable.value for variable in found.variables]
+    return tuple({name: to_python(value) for name, value in zip(names, row, strict=True)} for row in found)

@@ -1,0 +1,188 @@
+"""/, /robot/NAME, /run/NAME, /compare and /tables: the plant as a person reads it, made of answers of the workers."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pyoxigraph import NamedNode
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from irtwin.errors import InputError
+from irtwin.knowledge.vocabulary import ID
+from irtwin.report.plant import comparison, links, overview, page, robot, sheet
+from irtwin.report.plant.sheet import Sheet
+from irtwin.report.plant.tariff import Tariff, read_tariff
+from irtwin.report.questions import Answers, Question
+from irtwin.serve.asking import Asking, Bindings
+from irtwin.serve.protocol import Refusal
+from irtwin.serve.report_files import ReportFiles
+from irtwin.storage.database import TARIFF
+
+POLICY = (
+    "default-src 'none'; style-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'self'; "
+    "frame-ancestors 'none'"
+)
+
+
+class PlantPages:
+    """The pages of a workspace, asked of its workers."""
+
+    def __init__(self, workspace: Path, asking: Asking, reports: ReportFiles) -> None:
+        self._workspace, self._asking, self._reports = workspace, asking, reports
+
+    def routes(self) -> list[Route]:
+        """Return where they are."""
+        pages = {
+            "/": self._plant,
+            "/robot/{name}": self._robot,
+            "/run/{name}": self._run,
+            "/compare": self._compare,
+            "/tables/robots.{form}": self._robots_table,
+            "/tables/runs.{form}": self._runs_table,
+            "/tables/ledger.{form}": self._ledger_table,
+            "/tables/comparison.{form}": self._comparison_table,
+        }
+        return [Route(path, page, methods=["GET"]) for path, page in pages.items()]
+
+    async def _plant(self, request: Request) -> Response:
+        answers = await self._asking.answers(request, page.questions(), {})
+        said = self._beside()
+
+        def drawn() -> str:
+            found = overview.overview(answers, said["tariff"])
+            return page.render("page.html.jinja", answers, {}, found=found, reports=self._reports.names(), **said)
+
+        return await html(drawn)
+
+    async def _robot(self, request: Request) -> Response:
+        iri = _individual("robot", request.path_params["name"])
+        answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
+        said = {**self._beside(), "report": self._reports.of_robot(links.tail(iri))}
+        return await html(
+            lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **robot.of_robot(answers), **said)
+        )
+
+    async def _run(self, request: Request) -> Response:
+        iri = _individual("run", request.path_params["name"])
+        answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
+        (run,) = answers["run"].rows
+        said = {**self._beside(), "report": self._reports.of_robot(links.tail(run["robot"]))}
+        return await html(
+            lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said)
+        )
+
+    async def _compare(self, request: Request) -> Response:
+        said, trouble = self._beside(), ""
+        try:
+            found, answers = await self._compared(request)
+        except InputError as error:
+            found, trouble = None, str(error)
+            answers = await self._choice(request)
+        bindings = {"robot": _individual("robot", request.query_params.get("robot", ""))}
+        said |= {"asked": dict(request.query_params), "query": request.url.query, "found": found}
+        said |= {"trouble": trouble} if trouble else {}
+        return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **said))
+
+    async def _robots_table(self, request: Request) -> Response:
+        answers = await self._asking.answers(request, page.questions(), {})
+        tariff = self._beside()["tariff"]
+        return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff), tariff))
+
+    async def _runs_table(self, request: Request) -> Response:
+        iri = _individual("robot", request.query_params.get("of", ""))
+        asked = {name: page.questions("robot")[name] for name in ("robot", "runs")}
+        answers = await self._known(request, asked, {"robot": iri}, "robot")
+        return await table(request, "runs", lambda: robot.runs_sheet(answers))
+
+    async def _ledger_table(self, request: Request) -> Response:
+        iri = _individual("run", request.query_params.get("of", ""))
+        asked = {name: page.questions("run")[name] for name in ("run", "ledger")}
+        answers = await self._known(request, asked, {"run": iri}, "run")
+        return await table(request, "ledger", lambda: robot.ledger_sheet(answers))
+
+    async def _comparison_table(self, request: Request) -> Response:
+        try:
+            found, _ = await self._compared(request)
+        except InputError as error:
+            raise Refusal(400, str(error)) from None
+        if found is None:
+            raise Refusal(400, "say both sides: a_from, a_to, b_from and b_to, or by=run, a_run and b_run")
+        return await table(request, "comparison", lambda: comparison.to_sheet(found))
+
+    async def _compared(self, request: Request) -> tuple[comparison.Comparison | None, Answers]:
+        """Return what a form asks for, None where it does not say both sides, and all answers. Raises InputError."""
+        answers = await self._choice(request)
+        sides = [comparison.side(request.query_params, which) for which in ("a", "b")]
+        if None in sides:
+            return None, answers
+        asked = {name: one for name, one in page.questions("comparison").items() if "first" in one.bind}
+        robot_iri = _individual("robot", request.query_params["robot"])
+        before, after = [
+            await self._asking.answers(request, asked, {"robot": robot_iri, **_iris(one.bindings())})
+            for one in sides if one is not None
+        ]  # fmt: skip
+        return comparison.comparison(before, after), {**answers, **before}
+
+    async def _choice(self, request: Request) -> Answers:
+        """Return the robot that is compared, and its runs."""
+        iri = _individual("robot", request.query_params.get("robot", ""))
+        asked = {name: page.questions("comparison")[name] for name in ("robot", "runs")}
+        return await self._known(request, asked, {"robot": iri}, "robot")
+
+    async def _known(
+        self, request: Request, asked: Mapping[str, Question], bindings: dict[str, str], about: str
+    ) -> Answers:
+        """Answer questions about an individual; Refusal where the first of them knows nothing of it."""
+        answers = await self._asking.answers(request, asked, bindings)
+        if answers[about].first is None:
+            raise Refusal(404, f"the graph knows no {about} {bindings[about]}")
+        return answers
+
+    def _beside(self) -> dict[str, Any]:
+        """Return what each page says beside its answers: the tariff as it is now, or what is wrong with its file."""
+        tariff, trouble = Tariff(), ""
+        try:
+            tariff = read_tariff(self._workspace)
+        except InputError as error:
+            trouble = str(error)
+        return {"tariff": tariff, "trouble": trouble, "file": TARIFF, "excel": sheet.excel_is_there()}
+
+
+def _individual(kind: str, tail: str) -> str:
+    try:
+        return NamedNode(f"{ID}{kind}/{tail}").value
+    except ValueError:
+        raise Refusal(404, f"no {kind} has this name") from None
+
+
+def _iris(bindings: Bindings) -> Bindings:
+    """Return bindings as they are. Refusal where a text is no IRI."""
+    try:
+        return {name: NamedNode(one).value if isinstance(one, str) else one for name, one in bindings.items()}
+    except ValueError:
+        raise Refusal(404, "no run has this name") from None
+
+
+async def html(drawn: Callable[[], str]) -> Response:
+    """Draw a page beside the server's other work, and return it."""
+    headers = {"Content-Security-Policy": POLICY, "Cache-Control": "no-cache", "Vary": "Accept"}
+    return Response(await asyncio.to_thread(drawn), media_type="text/html", headers=headers)
+
+
+async def table(request: Request, name: str, made: Callable[[], Sheet]) -> Response:
+    """Return a table as the file that its path asks for. Raises Refusal where it cannot be written so."""
+    form = request.path_params["form"]
+    forms: Mapping[str, tuple[Callable[[Sheet], bytes], str]] = {"csv": (sheet.to_csv, sheet.CSV)}
+    if sheet.excel_is_there():
+        forms = {**forms, "xlsx": (sheet.to_excel, sheet.EXCEL)}
+    if form not in forms:
+        raise Refusal(404, f"this table comes as {' or '.join(forms)}, not as {form}")
+    write, media_type = forms[form]
+    content = await asyncio.to_thread(lambda: write(made()))
+    headers = {"Content-Disposition": f'attachment; filename="{name}.{form}"', "Cache-Control": "no-cache"}
+    return Response(content, media_type=media_type, headers=headers)

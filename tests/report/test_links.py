@@ -1,0 +1,31 @@
+"""Where an IRI leads on a page."""
+
+from __future__ import annotations
+
+import pytest
+
+from irtwin.knowledge.vocabulary import ID, IRT
+from irtwin.report.plant.links import individual, page_of, tail
+
+
+@pytest.mark.parametrize(
+    ("iri", "path"),
+    [
+        (f"{ID}robot/Arm_A", "/robot/Arm_A"),
+        (f"{ID}robot/R%201", "/robot/R%25201"),
+        (f"{ID}run/Arm_A.fit_1", "/run/Arm_A.fit_1"),
+        (f"{ID}robot/Arm_A/information", "/irtwin/id/robot/Arm_A/information"),
+        (f"{ID}twin/t1", "/irtwin/id/twin/t1"),
+        (f"{IRT}Run_Time", "/irtwin#Run_Time"),
+        ("http://qudt.org/vocab/unit/J", "http://qudt.org/vocab/unit/J"),
+        ("javascript:alert(1)", None),
+        ("https://w3id.org/irtwinner", "https://w3id.org/irtwinner"),
+    ],
+)
+def test_page_of(iri: str, path: str | None) -> None:
+    assert page_of(iri) == path
+
+
+def test_an_individual_is_at_its_iris_path() -> None:
+    assert individual(f"{ID}robot/Arm_A") == "/irtwin/id/robot/Arm_A"
+    assert tail(f"{ID}run/a.b") == "a.b"

@@ -1,0 +1,204 @@
+"""The pages of a plant: what they say of four robots, of none and of a hundred, worked out by hand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from tests import plants
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import ID, IRT
+from irtwin.report.plant import individual, overview, page, robot
+from irtwin.report.plant.energies import KINDS, days, kind
+from irtwin.report.plant.tariff import Tariff
+from irtwin.report.questions import Answer, Answers, ask
+
+TARIFF = Tariff(price=0.2, currency="EUR", co2=0.4)
+
+
+@pytest.fixture(scope="module")
+def graph(plant: KnowledgeGraph) -> KnowledgeGraph:
+    return plant
+
+
+@pytest.fixture(scope="module")
+def answers(graph: KnowledgeGraph) -> Answers:
+    return ask(graph, page.questions(), {})
+
+
+def drawn(answers: Answers, tariff: Tariff) -> str:
+    found = overview.overview(answers, tariff)
+    return page.render(
+        "page.html.jinja", answers, {}, found=found, tariff=tariff, trouble="", file="", excel=True, reports=[]
+    )
+
+
+def text(html: str) -> str:
+    return " ".join(re.sub(r"<details.*?</details>|<[^>]*>", " ", html, flags=re.DOTALL).split())
+
+
+def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> None:
+    found = overview.overview(answers, TARIFF)
+    groups = {group.kind.name if group.kind else None: [line.name for line in group.lines] for group in found.groups}
+    assert groups == {"measured": ["Arm_A", "Arm_B"], "mechanical": ["Arm_C"], None: [plants.HOSTILE]}
+    (mechanical,) = (group.lines[0] for group in found.groups if group.kind is KINDS["mechanical"])
+    assert (mechanical.energy_j, mechanical.cost, mechanical.co2_kg, mechanical.standby) == (840.0, None, None, None)
+    assert found.electrical_j == 5900.0
+    assert found.cost == pytest.approx(5900 / 3.6e6 * 0.2)
+    assert found.co2_kg == pytest.approx(5900 / 3.6e6 * 0.4)
+    assert [(of.name, [bar.energy_j for bar in trend.bars]) for of, trend in found.trends] == [
+        ("measured", [3500.0, 1600.0, 800.0]), ("mechanical", [400.0, 440.0])
+    ]  # fmt: skip
+
+
+def test_shares_of_time_and_of_energy(answers: Answers) -> None:
+    line = overview.overview(answers, TARIFF).groups[0].lines[0]
+    assert line.standing == pytest.approx((0.1 * 10 + 0.2 * 20 + 0.8 * 30) / 60)
+    assert line.standby == pytest.approx((500 + 1000 + 1500) / (980 + 1760 + 1568))
+    assert (line.state.words, line.state.live, line.alarms, line.reidentify) == ("standing still", None, 0, True)
+    assert line.gap is not None and (line.gap["verdict"], line.gap["closed"]) == ("attributed", 0.8)
+
+
+def test_a_robot_that_is_watched(answers: Answers) -> None:
+    line = overview.overview(answers, TARIFF).groups[0].lines[1]
+    assert (line.name, line.state.words, line.state.live, line.alarms) == (
+        "Arm_B", "no news: no state came for 2.0 s", "stale", 1
+    )  # fmt: skip
+    assert "/live/Arm_B" in drawn(answers, TARIFF)
+
+
+def test_energies_of_two_kinds_of_one_robot_are_two_lines(answers: Answers) -> None:
+    rows = answers["energy"].rows
+    other = {**next(row for row in rows if row["robot"].endswith("Arm_A")), "energy_from": "modelled", "energy_j": 9e9}
+    found = overview.overview({**answers, "energy": replace(answers["energy"], rows=(*rows, other))}, TARIFF)
+    lines = [(group.kind.name, line.energy_j) for group in found.groups if group.kind for line in group.lines
+             if line.name == "Arm_A"]  # fmt: skip
+    assert lines == [("measured", 4600.0), ("modelled", 9e9)]
+
+
+def test_what_nobody_said_is_not_shown(answers: Answers) -> None:
+    priced, without = drawn(answers, TARIFF), drawn(answers, Tariff())
+    assert "cost, EUR" in priced and "CO₂, kg" in priced
+    assert "cost, " not in without and "CO₂, kg" not in without and "Cost and CO₂ are not shown" in without
+    assert overview.sheet(overview.overview(answers, Tariff()), Tariff()).columns == tuple(
+        name for name in overview.sheet(overview.overview(answers, TARIFF), TARIFF).columns
+        if name not in ("cost_EUR", "CO2_kg")
+    )  # fmt: skip
+
+
+def test_a_plant_without_robots() -> None:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    answers = ask(graph, page.questions(), {})
+    assert "No robots The graph knows no robot yet." in text(drawn(answers, TARIFF))
+    assert not overview.sheet(overview.overview(answers, TARIFF), TARIFF).rows
+
+
+def test_a_hundred_robots(answers: Answers) -> None:
+    answers = {
+        name: replace(answer, rows=tuple(renamed(row, number) for number in range(25) for row in answer.rows))
+        for name, answer in answers.items()
+    }
+    found = overview.overview(answers, TARIFF)
+    assert found.robots == sum(len(group.lines) for group in found.groups) == 100
+    assert found.electrical_j == 25 * 5900.0
+    assert drawn(answers, TARIFF).count('<th scope="row">') == 100
+
+
+def renamed(row: Mapping[str, Any], number: int) -> dict[str, Any]:
+    return {name: value.replace("Arm_", f"Arm_{number}_") if isinstance(value, str) else value
+            for name, value in row.items()}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["Arm_A", "Arm_C", "Arm_D"])
+def test_a_robots_page(graph: KnowledgeGraph, name: str) -> None:
+    bindings = {"robot": f"{ID}robot/{name}"}
+    html = of_robot(graph, bindings)
+    assert "<script" not in html
+    said = text(html)
+    assert {
+        "Arm_A": "Electrical energy, measured, at mains From logged power. Runs 3 Time 60.0 s Energy 0.00128 kWh",
+        "Arm_C": "Runs 2 Time 20.0 s Energy 0.000233 kWh Mean power 42.0 W 2026-03-04: 400 J",
+        "Arm_D": "No energy yet: neither was power logged, nor has the robot a twin.",
+    }[name] in said
+    assert ("Cost" in said) is (name == "Arm_A")
+
+
+def of_robot(graph: KnowledgeGraph, bindings: Mapping[str, str]) -> str:
+    answers = ask(graph, robot.questions(), bindings)
+    said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": None}
+    return page.render("robot/page.html.jinja", answers, bindings, **robot.of_robot(answers), **said)
+
+
+def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
+    sheet = robot.runs_sheet(ask(graph, robot.questions(), {"robot": f"{ID}robot/Arm_A"}))
+    assert "energy_J" in sheet.columns and "mean_power_W" in sheet.columns
+    assert [row[0] for row in sheet.rows] == ["idle_1", "check_1", "fit_1", "pick"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Arm_A.fit_1", "Energy 1.00 kJ In kWh 0.000278 kWh Cost"),
+        ("Arm_C.press_1", "which is mechanical energy alone"),
+        ("Arm_B.live_1", "power is up to 80 W from the twin"),
+        ("Arm_A.pick", "It is planned and did not take place: the twin says that it will take 1.90 kJ"),
+        ("Arm_D.first", "No energy: neither was power logged"),
+    ],
+)
+def test_a_runs_page(graph: KnowledgeGraph, name: str, words: str) -> None:
+    bindings = {"run": f"{ID}run/{name}"}
+    answers = ask(graph, page.questions("run"), bindings)
+    said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": "Arm.html"}
+    html = page.render("run/page.html.jinja", answers, bindings, **robot.of_run(answers), **said)
+    assert words in text(html) and "<script" not in html
+
+
+def test_an_individual_says_units_and_who_says_so(graph: KnowledgeGraph) -> None:
+    found = individual_of(graph, f"{ID}run/Arm_A.fit_1")
+    said = {one.iri.removeprefix(IRT): one.values for one in found.said}
+    assert [value.text for value in said["Energy_Consumption"]] == ["1000\N{NO-BREAK SPACE}J"]
+    assert said["Energy_Consumption"][0].by == (
+        ("activity energy.Arm_A.fit_1", f"{ID}activity/energy.Arm_A.fit_1"),
+    )  # fmt: skip
+    assert said["dominant_Joint"][0].by == (("concluded by shacl/dominant_joint", None),)
+    assert [value.text for value in said["run_of"]] == ["Arm_A"]
+    assert {one.label for one in found.incoming} >= {"share of run", "series of"}
+    assert (found.name, found.whole) == ("fit_1", True)
+
+
+def test_a_unit_that_another_property_gives(graph: KnowledgeGraph) -> None:
+    found = individual_of(graph, f"{ID}gap_excursion/Arm_B.live_1/j2/1")
+    (peak,) = (one.values[0].text for one in found.said if one.iri == f"{IRT}Peak_Residual")
+    assert peak == "7.125\N{NO-BREAK SPACE}N m"
+
+
+def individual_of(graph: KnowledgeGraph, iri: str) -> individual.Individual:
+    return individual.individual(iri, ask(graph, page.questions("individual"), {"individual": iri}))
+
+
+def test_of_many_values_some_are_shown(graph: KnowledgeGraph) -> None:
+    answers = ask(graph, page.questions("individual"), {"individual": f"{ID}robot/Arm_A"})
+    row = answers["said"].rows[0]
+    many = Answer(answers["said"].question, tuple({**row, "value": f"v{number}"} for number in range(5000)))
+    found = individual.individual(f"{ID}robot/Arm_A", {**answers, "said": many})
+    assert not found.whole and found.said[0].hidden == 4950
+    html = page.render("individual/page.html.jinja", answers, {}, found=found, most=individual.MOST_VALUES)
+    assert "and 4950 more" in html and html.count("v1") < 60
+
+
+def test_a_kind_of_energy_that_nobody_knows_has_no_price() -> None:
+    assert not kind("guessed").electrical
+
+
+def test_one_day_is_no_trend_and_negative_energy_no_bar() -> None:
+    assert days({"2026-03-02": 5.0}, 30) is None
+    trend = days({"2026-03-02": -5.0, "2026-03-03": 10.0, "2026-03-01": 5.0}, 2)
+    assert trend is not None
+    assert [(bar.day, bar.height) for bar in trend.bars] == [("2026-03-02", 0.0), ("2026-03-03", 1.0)]
+    nothing = days({"2026-03-02": 0.0, "2026-03-03": 0.0}, 2)
+    assert nothing is not None and {bar.height for bar in nothing.bars} == {0.0}

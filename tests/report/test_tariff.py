@@ -1,0 +1,47 @@
+"""`plant.toml`: what it may say, and what it is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from irtwin.errors import InputError
+from irtwin.report.plant.tariff import Tariff, read_tariff
+
+
+def read(folder: Path, text: str) -> Tariff:
+    (folder / "plant.toml").write_text(text, encoding="utf-8")
+    return read_tariff(folder)
+
+
+def test_nobody_said(tmp_path: Path) -> None:
+    tariff = read_tariff(tmp_path)
+    assert tariff == Tariff() and tariff.cost(3.6e6) is None and tariff.emitted(3.6e6) is None
+
+
+def test_all_of_it(tmp_path: Path) -> None:
+    tariff = read(tmp_path, 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.38\n')
+    assert (tariff.cost(7.2e6), tariff.currency, tariff.emitted(7.2e6)) == (0.4, "EUR", 0.76)
+    assert tariff.cost(None) is None
+    assert read(tmp_path, "co2_kg_per_kwh = 0\n") == Tariff(co2=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("price = ", "not a TOML file"),
+        ("price_per_kWh = 0.2", "unknown key 'price_per_kWh': did you mean price_per_kwh?"),
+        ("robots = 3", "unknown key 'robots': known are price_per_kwh, currency, co2_kg_per_kwh"),
+        ("price_per_kwh = 0.2", "price_per_kwh needs a currency"),
+        ('price_per_kwh = "0.2"', "price_per_kwh is a number of 0 or more, not '0.2'"),
+        ("co2_kg_per_kwh = -1", "co2_kg_per_kwh is a number of 0 or more, not -1"),
+        ("co2_kg_per_kwh = inf", "not inf"),
+        ("co2_kg_per_kwh = true", "not True"),
+        ('currency = "<script>"', "currency is a code or a sign"),
+    ],
+)
+def test_what_cannot_be_used(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=r"plant\.toml") as refused:
+        read(tmp_path, text)
+    assert message in str(refused.value)

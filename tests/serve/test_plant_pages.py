@@ -1,0 +1,160 @@
+"""/, /robot, /run, /compare, /tables and /reports: what they answer, to whom, and that no name breaks out of them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import httpx
+import pytest
+from tests import plants
+from tests.endpoint import Server
+
+from irtwin.errors import InputError
+from irtwin.serve.pool import Limits
+from irtwin.serve.server import serve
+
+pytestmark = pytest.mark.slow
+
+CLIENT = httpx.Client(timeout=60)
+SIDES = "a_to=2026-03-02&b_from=2026-03-03"
+PAGES = (
+    "/", "/robot/Arm_A", "/robot/Arm_D", "/run/Arm_A.fit_1", "/run/Arm_D.first", "/compare?robot=Arm_D",
+    f"/compare?robot=Arm_A&{SIDES}", "/compare?robot=Arm_A&by=run&a_run=Arm_A.fit_1&b_run=Arm_A.idle_1",
+    "/irtwin/id/robot/Arm_D/information", "/irtwin/id/robot/Arm_A",
+)  # fmt: skip
+BROWSER = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
+
+
+class Elements(HTMLParser):
+    """The names of a page's elements and of their attributes, and where it leads."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+        self.attributes: set[str] = set()
+        self.paths: set[str] = set()
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.names.add(tag)
+        self.attributes |= {name for name, _ in attrs}
+        self.paths |= {value or "" for name, value in attrs if name == "href"}
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_a_page_has_no_script_and_no_style_within(plant: Server, path: str) -> None:
+    response = CLIENT.get(plant.url + path, headers=BROWSER)
+    assert (response.status_code, response.headers["content-type"]) == (200, "text/html; charset=utf-8")
+    assert "script-src" not in response.headers["content-security-policy"]
+    assert "default-src 'none'" in response.headers["content-security-policy"]
+    elements = Elements(response.text)
+    assert "script" not in elements.names and "style" not in elements.names | elements.attributes
+    assert not [name for name in elements.attributes if name.startswith("on")]
+
+
+@pytest.mark.parametrize("path", ["/", "/robot/Arm_D", "/run/Arm_D.first", "/irtwin/id/robot/Arm_D/information"])
+def test_a_hostile_name_is_text(plant: Server, path: str) -> None:
+    html = CLIENT.get(plant.url + path, headers=BROWSER).text
+    assert plants.HOSTILE not in html
+    assert "&lt;script&gt;alert(" in html
+
+
+def test_each_link_of_the_plants_page_leads_somewhere(plant: Server) -> None:
+    found = set()
+    for path in ("/", "/robot/Arm_A", "/run/Arm_A.fit_1"):
+        found |= Elements(CLIENT.get(plant.url + path).text).paths
+    inner = {path.partition("#")[0] for path in found if path.startswith("/") and path != "/reports/out.html"}
+    of_each_kind = {tuple(path.split("?")[0].split("/")[:4]): path for path in sorted(inner)}
+    assert len(of_each_kind) > 15
+    for path in of_each_kind.values():
+        assert CLIENT.get(plant.url + path, headers=BROWSER).status_code == 200, path
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "said"),
+    [
+        ("/robot/nobody", 404, "the graph knows no robot https://w3id.org/irtwin/id/robot/nobody"),
+        ("/robot/a%3E%20b", 404, "no robot has this name"),
+        ("/run/nothing", 404, "the graph knows no run"),
+        ("/run/Arm_A", 404, "the graph knows no run"),
+        ("/compare", 404, "the graph knows no robot"),
+        ("/compare?robot=Arm_A&by=run&a_run=a%3E&b_run=b", 404, "no run has this name"),
+        ("/tables/robots.pdf", 404, "this table comes as csv"),
+        ("/tables/runs.csv", 404, "the graph knows no robot"),
+        ("/tables/comparison.csv?robot=Arm_A", 400, "say both sides"),
+        ("/tables/comparison.csv?robot=Arm_A&a_from=x&b_from=y", 400, "'x' is not a day"),
+        ("/reports/nothing.html", 404, "no such report"),
+        ("/reports/out.html", 404, "no such report"),
+        ("/reports/..%2Fplant.toml", 404, ""),
+        ("/reports/%2e%2e/plant.toml", 404, ""),
+    ],
+)
+def test_what_there_is_not(plant: Server, path: str, status: int, said: str) -> None:
+    response = CLIENT.get(plant.url + path)
+    assert response.status_code == status
+    assert response.text.count("\n") <= 1 and said in response.text
+
+
+def test_a_day_that_is_none_is_said_on_the_page(plant: Server) -> None:
+    response = CLIENT.get(f"{plant.url}/compare?robot=Arm_A&a_from=<b>&b_from=2026-03-02")
+    assert response.status_code == 200
+    assert "&#39;&lt;b&gt;&#39; is not a day: write it as 2026-03-02" in response.text
+
+
+def test_robots_as_csv_and_excel(plant: Server) -> None:
+    response = CLIENT.get(f"{plant.url}/tables/robots.csv")
+    assert response.headers["content-disposition"] == 'attachment; filename="robots.csv"'
+    rows = list(csv.DictReader(io.StringIO(response.text)))
+    assert [(row["robot"], row["energy_from"]) for row in rows] == [
+        ("Arm_A", "measured"), ("Arm_B", "measured"), ("Arm_C", "mechanical"), (f"'{plants.HOSTILE}", "")
+    ]  # fmt: skip
+    assert float(rows[0]["energy_kWh"]) == pytest.approx(4600 / 3.6e6)
+    assert float(rows[0]["cost_EUR"]) == pytest.approx(4600 / 3.6e6 * 0.2)
+    assert (rows[2]["cost_EUR"], "CO2_kg" in rows[0]) == ("", False)
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.load_workbook(io.BytesIO(CLIENT.get(f"{plant.url}/tables/robots.xlsx").content))
+    assert [cell.value for cell in book.active["A"]] == ["robot", "Arm_A", "Arm_B", "Arm_C", plants.HOSTILE]
+
+
+def test_tables_of_a_robot_of_a_run_and_of_a_comparison(plant: Server) -> None:
+    runs = CLIENT.get(f"{plant.url}/tables/runs.csv?of=Arm_A").text.splitlines()
+    assert len(runs) == 5 and runs[0].startswith("run,iri,began_UTC,time_s,payload_kg,energy_from,energy_J")
+    assert len(CLIENT.get(f"{plant.url}/tables/ledger.csv?of=Arm_A.fit_1").text.splitlines()) == 6
+    compared = CLIENT.get(f"{plant.url}/tables/comparison.csv?robot=Arm_A&{SIDES}").text
+    assert "measured,energy,J,3000.0,1600.0,-1400.0,-46.6" in compared
+
+
+def test_a_report_is_kept_apart(plant: Server) -> None:
+    response = CLIENT.get(f"{plant.url}/reports/Arm_A.html")
+    assert (response.status_code, response.headers["content-type"]) == (200, "text/html; charset=utf-8")
+    assert response.headers["content-security-policy"].startswith("sandbox allow-scripts")
+    assert "allow-same-origin" not in response.headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("path", ["/", "/robot/Arm_A", "/tables/robots.csv", "/reports/Arm_A.html"])
+def test_pages_of_other_sites_get_none_of_it(plant: Server, path: str) -> None:
+    assert CLIENT.get(plant.url + path, headers={"Origin": "http://evil.example"}).status_code == 403
+    assert CLIENT.get(plant.url + path, headers={"Host": "evil.example"}).status_code == 421
+    assert CLIENT.post(plant.url + path).status_code == 405
+
+
+def test_a_tariff_that_was_spoiled_meanwhile_is_said_and_nothing_is_priced(plant: Server) -> None:
+    file = plant.graph.parent / "plant.toml"
+    kept = file.read_text(encoding="utf-8")
+    try:
+        file.write_text("price_per_kwh = -1\n", encoding="utf-8")
+        html = CLIENT.get(plant.url).text
+    finally:
+        file.write_text(kept, encoding="utf-8")
+    assert "price_per_kwh is a number of 0 or more, not -1" in html
+    assert "cost, " not in re.sub("<details.*?</details>", "", html, flags=re.DOTALL)
+
+
+def test_a_tariff_that_cannot_be_used_is_said_before_anything_is_served(tmp_path: Path) -> None:
+    (tmp_path / "plant.toml").write_text("prise = 1\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"plant\.toml: unknown key 'prise'"):
+        serve(plants.make_empty_plant(tmp_path), "127.0.0.1", 0, token=None, limits=Limits(), announce=print)
