@@ -20,7 +20,7 @@ FOLDER = resources.folder("reports") / "plant"
 @cache
 def questions(page: str = "") -> Mapping[str, Question]:
     """Return the questions of a page, of the plant's own without a name."""
-    return read_questions(FOLDER / page)
+    return read_questions((FOLDER / page).glob("*.rq"))
 
 
 @cache
@@ -40,7 +40,8 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
 
 @cache
 def _templates() -> jinja2.Environment:
-    templates = environment(FOLDER.parent)
+    templates = environment(resources.shipped())
+    templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates.filters |= {
         "page_of": links.page_of, "individual": links.individual, "tail": links.tail, "kwh": _kwh, "spaced": _spaced,
     }  # fmt: skip
