@@ -24,7 +24,7 @@ _FINE = 2  # points of the spectrum for each that is independent
 _NEAR = 2  # independent points on either side that belong to a line,
 _AROUND = 12  # and beyond them those that it is held against
 _MEDIAN = float(np.log(np.log(2)))  # of the logarithm of what is exponential, with mean one
-_FREE = 0.3  # of a wave must be left by the columns beside it, for it to be looked for
+_FREE = 0.1  # of a wave must be left by the columns beside it, for it to be looked for
 _FREE_STILL = 0.01  # or to be placed: its best frequency may lie closer to theirs
 _MOST = 8  # lines of one channel
 
