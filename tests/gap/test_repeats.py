@@ -13,6 +13,7 @@ from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.isolation.verdict import beside
 from irtwin.gap.regression.correlation import correlation_samples
+from irtwin.gap.repeats import alike
 from irtwin.gap.repeats.disturbances import disturbances
 from irtwin.gap.repeats.lines import lines
 from irtwin.gap.repeats.series import Series
@@ -76,6 +77,13 @@ def test_a_load_that_switches_is_told_by_its_power_duty_and_period(duty):
     assert said["period"].value == pytest.approx(3.0, rel=0.1)
 
 
+@pytest.mark.parametrize(("duty", "later"), [(0.34, 0.15), (0.8, 0.3)])
+def test_motion_takes_nothing_of_a_load(duty, later):
+    case = repeated(lambda k, t: in_power(60.0 * ((t / 3.0 + later * k) % 1 < duty)))
+    one, said = only(disturbances(case))
+    assert one.kind == "switching" and said["P"].value == pytest.approx(60.0, rel=0.1)
+
+
 def test_an_offset_between_runs_is_located():
     one, said = only(disturbances(repeated(lambda k, t: in_joint_2(4.0 * k + 0 * t))))
     assert (one.joint, one.kind) == ("joint_2", "offset")
@@ -86,6 +94,37 @@ def test_a_drift_is_located_and_is_no_offset_too():
     one, said = only(disturbances(repeated(lambda k, t: in_joint_2(0.5 * k * t))))
     assert (one.joint, one.kind) == ("joint_2", "drift")
     assert said["drift"].lower < -0.5 < said["drift"].upper
+
+
+def test_a_drift_that_both_runs_share_is_told_by_what_the_twin_leaves():
+    one, said = only(disturbances(repeated(lambda k, t: in_joint_2(0.5 * t))))
+    assert (one.joint, one.kind) == ("joint_2", "drift")
+    assert said["drift"].lower < 0.5 < said["drift"].upper
+
+
+def test_an_offset_that_both_runs_share_repeats():
+    assert disturbances(repeated(lambda k, t: in_joint_2(4.0 + 0 * t))) == []
+
+
+def test_in_long_runs_differences_alone_tell(monkeypatch):
+    monkeypatch.setattr(alike, "_MOST", 1000)
+    assert disturbances(repeated(lambda k, t: in_joint_2(0.5 * t))) == []
+
+
+@pytest.mark.parametrize(("times", "count"), [(0.4, 0), (1.2, 1)])
+def test_an_offset_matters_from_half_of_the_noise_on(times, count):
+    quiet = repeated()
+    noise = noise_floor(quiet.runs, quiet.motions, DEFAULT.repeats).sensor_torque[1]
+    assert len(disturbances(repeated(lambda k, t: in_joint_2(times * noise * k + 0 * t)))) == count
+
+
+def test_a_strong_line_does_not_hide_itself_by_what_it_leaks():
+    time, rng = np.arange(1000) / 125, np.random.default_rng(0)
+    slow = np.column_stack([np.ones(1000), time, np.tanh(np.sin(2.4 * time) / 0.02), np.sin(2.4 * time)])
+    series = Series(time, 80 * np.sin(2 * np.pi * 0.8 * time) + rng.standard_normal(1000), slow)
+    found, _ = lines([series], 6, LIMITS)
+    assert [round(one.frequency, 2) for one in found] == [0.8]
+    assert found[0].p < 1e-12
 
 
 @pytest.mark.parametrize("count", [2, 4])

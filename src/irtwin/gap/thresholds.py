@@ -81,9 +81,18 @@ class NotRepeating:
         0.5, "least mean square of a line or a switching", "mean square of what else differs", _JUDGEMENT
     )
     least_slow: float = _threshold(
-        1.0, "least mean square of an offset or a drift between runs", "mean square of what else differs", _JUDGEMENT
+        0.25,
+        "least mean square of an offset or a drift between runs: half of what else differs, or of the sensor's noise",
+        "mean square of the larger of both",
+        "decisions/gap-not-repeating.md",
     )
-    least_noise: float = _threshold(1.0, "least RMS of a disturbance", "RMS of the sensor's noise", _JUDGEMENT)
+    least_shared: float = _threshold(
+        1.5,
+        "least mean square of a drift that repeats share: what a twin cannot follow may drift alike in both",
+        "mean square of what the twin leaves, or of the sensor's noise",
+        "decisions/gap-not-repeating.md",
+    )
+    least_noise: float = _threshold(1.0, "least RMS of a line or a switching", "RMS of the sensor's noise", _JUDGEMENT)
     periods: float = _threshold(3.0, "periods of a line in a run, at least", "periods", "the spectrum's resolution")
     highest: float = _threshold(0.95, "lines are looked for up to it", "share of the Nyquist frequency", "the sampling")
     pure: float = _threshold(

@@ -2,7 +2,8 @@
 
 At each frequency a wave is fitted beside the columns of a series (the least-squares periodogram of Lomb and Scargle,
 with nuisance columns). What it explains is held against the median of the frequencies around, on the side where these
-are louder, so that coloured noise is no line.
+are louder, so that coloured noise is no line. The frequencies around are those of what the wave leaves: a strong line
+leaks into them, and would hide itself.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ _FINE = 2  # points of the spectrum for each that is independent
 _NEAR = 2  # independent points on either side that belong to a line,
 _AROUND = 12  # and beyond them those that it is held against
 _MEDIAN = float(np.log(np.log(2)))  # of the logarithm of what is exponential, with mean one
-_FREE = 0.3  # of a wave must be left by the columns beside it
+_FREE = 0.1  # of a wave must be left by the columns beside it, for it to be looked for
+_FREE_STILL = 0.01  # or to be placed: its best frequency may lie closer to theirs
 _MOST = 8  # lines of one channel
 
 
@@ -59,14 +61,27 @@ def lines(series: Sequence[Series], tests: int, limits: NotRepeating) -> tuple[l
     while len(grid) > 4 * _AROUND and len(found) < _MOST:
         explained = np.array([_explained(one, grid) for one in series])
         noise = np.array([_noise(each, grid) for each in explained])
-        stands = (explained / noise).sum(axis=0)
-        best = int(np.argmax(stands))
+        likely = {int(np.argmax((explained / noise).sum(axis=0))), int(np.argmax(explained.sum(axis=0)))}
+        around = {best: _around(series, grid, best) for best in likely}
+        stands = {best: float(np.sum(explained[:, best] / around[best])) for best in likely}
+        best = max(likely, key=lambda place: stands[place])
         p = float(min(1.0, gamma.sf(stands[best], len(series)) * len(grid) / _FINE * tests))
         if not p <= limits.alpha:
             break
-        line, series = _line(series, grid, best, noise[:, best], p)
+        line, series = _line(series, grid, best, around[best], p)
         found.append(line)
     return found, series
+
+
+def _around(series: Sequence[Series], grid: np.ndarray, best: int) -> np.ndarray:
+    """Return what noise explains at a frequency of each series, (S,), told from what a wave of it leaves."""
+    near = np.abs(np.arange(len(grid)) - best) <= _FINE * _NEAR
+    found = []
+    for one in series:
+        left = _explained(one.with_columns(*waves(one.time, grid[best])), grid)
+        left[near] = np.interp(grid[near], grid[~near], left[~near])
+        found.append(_noise(left, grid)[best])
+    return np.array(found)
 
 
 def _grid(series: Sequence[Series], limits: NotRepeating) -> np.ndarray:
@@ -84,8 +99,11 @@ def _transform(values: np.ndarray, one: Series, grid: np.ndarray) -> np.ndarray:
     return np.asarray(czt(values, len(grid), ratio, start, axis=0))
 
 
-def _explained(one: Series, grid: np.ndarray) -> np.ndarray:
-    """Return the squares that a wave of each frequency explains beside the columns, (F,), halved: of mean S², white."""
+def _explained(one: Series, grid: np.ndarray, free: float = _FREE) -> np.ndarray:
+    """Return the squares that a wave of each frequency explains beside the columns, (F,), halved: of mean S², white.
+
+    Nothing, where the columns leave less than `free` of it.
+    """
     basis, count = one.basis(), len(one.values)
     left = one.left()
     sums = _transform(np.column_stack([left, basis]), one, grid)
@@ -96,7 +114,7 @@ def _explained(one: Series, grid: np.ndarray) -> np.ndarray:
     both[:, 0, 0] = (count + twice.real) / 2 - (cosine**2).sum(axis=1)
     both[:, 1, 1] = (count - twice.real) / 2 - (sine**2).sum(axis=1)
     both[:, 0, 1] = both[:, 1, 0] = -twice.imag / 2 - (cosine * sine).sum(axis=1)
-    imitated = np.linalg.eigvalsh(both)[:, 0] < _FREE * count / 2
+    imitated = np.linalg.eigvalsh(both)[:, 0] < free * count / 2
     both[imitated] = np.eye(2)
     right = np.stack([own.real, -own.imag], axis=1)
     found = np.einsum("fi,fi->f", right, np.linalg.solve(both, right[..., None])[..., 0]) / 2
@@ -124,8 +142,11 @@ def _line(
     step = grid[1] - grid[0]
 
     def missed(frequency: float) -> float:
+        return -float(np.sum(at(frequency) / noise))
+
+    def at(frequency: float) -> np.ndarray:
         near = np.array([frequency, frequency + step])
-        return -float(np.sum([_explained(one, near)[0] / level for one, level in zip(series, noise, strict=True)]))
+        return np.array([_explained(one, near, _FREE_STILL)[0] for one in series])
 
     placed = minimize_scalar(missed, bounds=(grid[best] - step, grid[best] + step), method="bounded")
     frequency = float(placed.x)
@@ -133,7 +154,7 @@ def _line(
     near = grid[max(0, best - _FINE * _NEAR) : best + _FINE * _NEAR + 1]
     rest = np.sum([_explained(one, near) for one in more], axis=0).max(initial=0.0)
     samples = np.array([len(one.values) for one in series])
-    whole = np.array([_explained(one, np.array([frequency, frequency + step]))[0] for one in series])
+    whole = at(frequency)
     squares = [float(np.sum(one.coefficients()[-2:] ** 2)) for one in more]
     amplitude = float(np.sqrt(np.mean(squares) / 2))  # of one run: a difference has two, of any phases
     deviation = float(np.sqrt(np.sum(2 * noise / samples)) / len(series) / np.sqrt(2))

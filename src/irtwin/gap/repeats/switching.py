@@ -16,6 +16,8 @@ _WIDTHS = (0.1, 0.25, 0.6)  # s on either side of a step, over which power is av
 _FEWEST = 4  # samples of that
 _LOUD = 0.8  # quantile of the steps that is one of the load, and not of what joints do between
 _HIGHER = (1.0, 1.4)  # times the steps' height: a first guess is low where steps are short
+_SIDES = (-1, 1)  # steps alone do not say which run had the load before the first: the second, the first
+_ENOUGH = 10  # samples for each column that the motion may take
 _ROUNDS = 10  # of fitting what the motion takes and what is on, in turn
 _SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
 _BIN = 0.02  # s, over which power is averaged before it is said when a load is on,
@@ -67,17 +69,22 @@ def switching(pairs: Sequence[Watched], runs: Mapping[str, Series], limits: NotR
 
     `runs`: each run's power by name, with columns beside it that the motion may take.
     """
-    found = [
-        _followed(pairs, runs, level * more, limits)
-        for level in filter(None, (_height(pairs, width, limits) for width in _WIDTHS))
-        for more in _HIGHER
-    ]
+    differences, found = [pair.difference for pair in pairs], []
+    for width in _WIDTHS:
+        steps = [_steps(one, width, limits) for one in differences]
+        level = _height(steps, limits)
+        if level is not None:
+            plain = [_beside(one, []) for one in differences]
+            found += [_followed(pairs, runs, level * more, plain, limits) for more in _HIGHER]
+            for side in _SIDES:
+                begun = [_beside_steps(*each, level, side) for each in zip(differences, steps, strict=True)]
+                found.append(_followed(pairs, runs, level, begun, limits, by_steps=True))
     return max((one for one in found if one is not None), key=lambda one: one.explained, default=None)
 
 
-def _height(pairs: Sequence[Watched], width: float, limits: NotRepeating) -> float | None:
+def _height(each: Sequence[Edges], limits: NotRepeating) -> float | None:
     """Return how high most steps are that stand out, W; None where they are of any height."""
-    heights = np.abs([step for pair in pairs for _, step in _steps(pair.difference, width, limits)])
+    heights = np.abs([step for steps in each for _, step in steps])
     heights = heights[heights > np.quantile(heights, _LOUD) / 2] if len(heights) else heights  # not the robot's own
     if len(heights) < 2:
         return None
@@ -89,20 +96,32 @@ def _height(pairs: Sequence[Watched], width: float, limits: NotRepeating) -> flo
 
 
 def _followed(
-    pairs: Sequence[Watched], runs: Mapping[str, Series], level: float, limits: NotRepeating
+    pairs: Sequence[Watched],
+    runs: Mapping[str, Series],
+    level: float,
+    differ: Sequence[np.ndarray],
+    limits: NotRepeating,
+    by_steps: bool = False,
 ) -> Switching | None:
-    """Return the load found from a first guess of its level, W: when it is on, and how high it is, in turn."""
+    """Return the load found from a first guess of its level, W: when it is on, and how high it is, in turn.
+
+    `differ`: a first guess of what each pair of runs differs by without what follows the motion. `by_steps`: it is a
+    good one, and the first course goes by it alone; what each run's motion takes is then told from where the runs
+    differ, as there one has the load and the other not.
+    """
     states = {name: np.zeros(len(runs[name].time)) for pair in pairs for name in pair.names}
-    deviation = 0.0
+    deviation, first, known = 0.0, by_steps, None
     for _ in range(_ROUNDS):
-        left, before = _left(runs, states, level), level
-        for pair in reversed(pairs):
-            states |= _on(pair, runs, left, level, states)
+        left, before = None if first else _left(runs, states, level, known), level
+        for pair, values in zip(reversed(pairs), reversed(differ), strict=True):
+            states |= _on(pair, runs, left, values, level)
+        known, first = _where_apart(pairs, states, runs) if first else None, False
         level, deviation = _level(pairs, states, runs)
         if level <= 0:
             return None
-        if abs(level - before) < _LEAST / 10 * level:
+        if known is None and abs(level - before) < _LEAST / 10 * level:
             break
+        differ = [_beside(pair.difference, [_apart(pair, states, runs)]) for pair in pairs]
     explained = _explained(pairs, states, runs)
     edges = {name: _edges(runs[name].time, state) for name, state in states.items()}
     if explained < limits.switching or sum(map(len, edges.values())) < 2:
@@ -118,12 +137,31 @@ def _steps(series: Series, width: float, limits: NotRepeating) -> Edges:
     spread = _white(series) * np.sqrt(2 / size)
     found: Edges = []
     for _ in range(_ROUNDS):
-        both = series.with_columns(*((series.time >= time).astype(float) for time, _ in found))
-        motion = both.coefficients()[: series.beside.shape[1]]
-        step = _step(series.values - series.beside @ motion, size)
+        step = _step(_beside(series, _stairs(series, found)), size)
         places, _ = find_peaks(np.abs(step), height=max(limits.step * spread, 1e-12), distance=size)
         found = [(float(series.time[k + size]), float(step[k])) for k in places]
     return found
+
+
+def _stairs(series: Series, edges: Edges) -> list[np.ndarray]:
+    """Return a column (N,) of each step: zero before it, one from it on."""
+    return [(series.time >= time).astype(float) for time, _ in edges]
+
+
+def _beside(series: Series, load: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the values (N,) without what follows the motion, which is fitted beside the columns of a load."""
+    motion = series.with_columns(*load).coefficients()[: series.beside.shape[1]]
+    return np.asarray(series.values - series.beside @ motion)
+
+
+def _beside_steps(series: Series, edges: Edges, level: float, side: int) -> np.ndarray:
+    """Return what differs (N,) beside steps, which take none of the load for the motion.
+
+    It is shifted to lie within one load either way; where there is room, to one `side`.
+    """
+    way = np.cumsum([0.0, *(step for _, step in edges)]) / level
+    start = round(float(1 - way.max() if side > 0 else -1 - way.min()))
+    return _beside(series, _stairs(series, edges)) + level * start
 
 
 def _step(values: np.ndarray, size: int) -> np.ndarray:
@@ -136,27 +174,28 @@ def _step(values: np.ndarray, size: int) -> np.ndarray:
 def _on(
     pair: Watched,
     runs: Mapping[str, Series],
-    left: Mapping[str, np.ndarray],
+    left: Mapping[str, np.ndarray] | None,
+    differ: np.ndarray,
     level: float,
-    states: Mapping[str, np.ndarray],
 ) -> dict[str, np.ndarray]:
     """Return when the load is on in the runs of a pair, by its likeliest course (Viterbi's).
 
-    Their difference says that one has it and not the other; their sum, of which the motion is a part too, which.
+    What they `differ` by says that one has it and not the other; their sum, of what is `left` of each, whether both do.
     """
     first, second = pair.names
     one, two = runs[first], runs[second]
-    own = np.interp(pair.difference.time, one.time, left[first])
-    other = np.interp(pair.difference.time - pair.shift, two.time, left[second])
-    apart = pair.difference.with_columns(_apart(pair, states, runs))
-    differ = pair.difference.values - pair.difference.beside @ apart.coefficients()[:-1]
+    said = [(differ, _BOTH[:, 0] - _BOTH[:, 1])]
+    if left is not None:
+        own = np.interp(pair.difference.time, one.time, left[first])
+        other = np.interp(pair.difference.time - pair.shift, two.time, left[second])
+        said.append((own + other, _BOTH.sum(axis=1)))
     size = max(1, round(_BIN * one.rate), -(-len(differ) // _MOST_BINS))
     count = len(differ) // size
     if count < 2:
         return {}
-    differ, together = (np.mean(each[: count * size].reshape(count, size), axis=1) for each in (differ, own + other))
     pays = np.zeros((count, len(_BOTH)))
-    for values, expected in ((differ, _BOTH[:, 0] - _BOTH[:, 1]), (together, _BOTH.sum(axis=1))):
+    for each, expected in said:
+        values = np.mean(each[: count * size].reshape(count, size), axis=1)
         off = (values[:, None] - level * expected) ** 2
         best = np.sqrt(off.min(axis=1))
         variance = float(np.mean(best**2)) * correlation_samples(values - level * expected[off.argmin(axis=1)])
@@ -194,9 +233,28 @@ def _stacked(runs: Mapping[str, Series], states: Mapping[str, np.ndarray]) -> Se
     return Series(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "values", "beside")))
 
 
-def _left(runs: Mapping[str, Series], states: Mapping[str, np.ndarray], level: float) -> dict[str, np.ndarray]:
-    """Return what the motion does not take of each run's power, fitted to all beside what is on."""
-    motion = _stacked(runs, states).coefficients()[:-1]
+def _where_apart(
+    pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, Series]
+) -> np.ndarray | None:
+    """Return where each run's load is known, as its partner's is another, one run after the other; None: too little."""
+    known = {name: np.zeros(len(state), dtype=bool) for name, state in states.items()}
+    for pair in pairs:
+        differ = np.abs(_apart(pair, states, runs))
+        for name, shift in zip(pair.names, (0.0, pair.shift), strict=True):
+            known[name] |= np.interp(runs[name].time, pair.difference.time - shift, differ) > 0.5
+    stacked = np.concatenate(list(known.values()))
+    columns = next(iter(runs.values())).beside.shape[1]
+    return stacked if stacked.sum() > _ENOUGH * columns else None
+
+
+def _left(
+    runs: Mapping[str, Series], states: Mapping[str, np.ndarray], level: float, known: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """Return what the motion does not take of each run's power, fitted to all, or the `known`, beside what is on."""
+    stacked = _stacked(runs, states)
+    if known is not None:
+        stacked = Series(stacked.time[known], stacked.values[known], stacked.beside[known])
+    motion = stacked.coefficients()[:-1]
     if not any(state.any() for state in states.values()):  # nothing is known to be on: the median is neither
         return {name: runs[name].values - runs[name].beside @ motion + level / 2 for name in states}
     return {name: runs[name].values - runs[name].beside @ motion for name in states}
