@@ -49,7 +49,7 @@ def record(
     linear = _linear_joints(workspace, robot_id, diagnosis)
     row, documents = _row(robot_id, diagnosis, curves, twin, motion)
     at = Place(row.diagnosis_id, robot_id, partial(_run_id, runs), linear)
-    rows = [row, *gap_rows.rows(diagnosis, at)]
+    rows = [row, *gap_rows.rows(diagnosis, at), *gap_rows.rows_of_curves(curves, at)]
     made = Made(robot_id, inputs(workspace, robot_id, runs.values()), rows, documents=documents)
     diagnosis_id = row.diagnosis_id
     _keep(workspace, "diagnosis", made, started)
