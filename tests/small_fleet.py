@@ -403,7 +403,7 @@ def _cause(
 def _activity(activity_id: str, robot: str, provider: str, ended: str) -> Base:
     return schema.Activity(
         activity_id=activity_id, robot_id=robot, provider=provider, subject=f"{ID}robot/{robot}", software=SOFTWARE,
-        started=_moment("2026-03-05 12:00"), ended=_moment(ended),
+        started=min(_moment("2026-03-05 12:00"), _moment(ended)), ended=_moment(ended),
     )  # fmt: skip
 
 

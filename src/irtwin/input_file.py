@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import stat
 from pathlib import Path
 
@@ -18,6 +19,15 @@ def read_input(path: Path, most: int) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name an existing file") from error
+
+
+def checksum(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal; of a folder, that of its files' names and checksums."""
+    if path.is_file():
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    files = sorted(one for one in path.iterdir() if one.is_file())
+    return hashlib.sha256("\n".join(f"{one.name} {checksum(one)}" for one in files).encode()).hexdigest()
 
 
 def check_file(path: Path) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
 from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace
@@ -113,3 +116,47 @@ def test_a_total_is_what_the_runs_come_to(graph: KnowledgeGraph, total: str) -> 
     values = {row["arm"]: row["value"] for row in kept}
     assert values == pytest.approx({row["arm"]: row["value"] for row in added_up if row["arm"] in values})
     assert len(values) >= 3
+
+
+def per_robot(rows: Iterable[Row], column: str) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for row in rows:
+        found[row["robot"]] = found.get(row["robot"], 0.0) + row[column]
+    return found
+
+
+def of_runs(graph: KnowledgeGraph, property: str) -> dict[str, float]:
+    """Return what a property comes to over each robot's runs."""
+    name = "?run irt:run_of / irt:has_Information / irt:IR_Name ?robot"
+    return per_robot(graph.query(f"SELECT ?robot ?value {{ ?run irt:{property} ?value . {name} }}"), "value")
+
+
+@pytest.mark.parametrize("question", ["energy_per_day", "energy_per_month", "energy_per_robot", "energy_per_run"])
+def test_parts_add_up_to_the_energy_of_all_runs(graph: KnowledgeGraph, question: str) -> None:
+    whole = of_runs(graph, "Energy_Consumption")
+    assert per_robot(ask(graph, question), "energy_J") == pytest.approx(whole)
+    (fleet,) = ask(graph, "fleet_totals")
+    assert 3.6e6 * fleet["energy_kWh"] == pytest.approx(sum(whole.values()))
+
+
+def test_effects_and_joints_add_up_to_the_modelled_energy(graph: KnowledgeGraph) -> None:
+    whole = of_runs(graph, "Modelled_Energy")
+    assert per_robot(ask(graph, "energy_per_effect"), "energy_J") == pytest.approx(whole)
+    of_joints = [row for row in ask(graph, "energy_per_joint_and_effect") if row["joint"] is not None]
+    assert per_robot(ask(graph, "energy_per_joint"), "energy_J") == pytest.approx(per_robot(of_joints, "energy_J"))
+
+
+def test_a_ledger_that_is_not_whole_is_told(graph: KnowledgeGraph) -> None:
+    assert [str(one) for one in validate(graph)] == []
+    lost = {
+        one for one in graph.quads() if "/ledger_total/Arm_A/" in str(one.subject) and "standby" in str(one.subject)
+    }
+    assert lost
+    graph.change(lost, ())
+    try:
+        told = [str(one) for one in validate(graph)]
+    finally:
+        graph.change((), lost)
+    assert told == [
+        "id:robot/Arm_A: id:robot_total/Arm_A: the entries of a robot's ledger add up to its modelled energy"
+    ]

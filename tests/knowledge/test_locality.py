@@ -16,7 +16,7 @@ def reach(body: str, head: str = "SELECT $this") -> Reach:
 
 def test_shipped_rules_look_backward_and_anywhere_by_few_predicates() -> None:
     found = locality.of_all_rules(shipped())
-    assert found.backward == {term(name) for name in ("has_Joint", "of_Run", "remedies_Effect")}
+    assert found.backward == {term(name) for name in ("has_Joint", "of_Run", "remedies_Effect", "total_of")}
     limits = (
         *("Closed_Fraction_To_Adopt", "Energy_Error_Limit", "Gap_Alarm_Ratio"),
         *("Idle_Share_Limit", "Returned_Share_Limit"),

@@ -7,7 +7,18 @@ from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, GRAPH_VALIDATION, ID, term
+from irtwin.knowledge.vocabulary import (
+    GRAPH_ACTIVITY,
+    GRAPH_ONTOLOGY,
+    GRAPH_SOURCE,
+    GRAPH_VALIDATION,
+    ID,
+    PROV,
+    RDF,
+    XSD,
+    shorten,
+    term,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -77,6 +88,65 @@ def test_broken_constraint_is_said_in_words(
     assert {one.node for one in violations} == {subject}
     kept = graph.query("PREFIX sh: <http://www.w3.org/ns/shacl#> SELECT ?node { ?r sh:result / sh:focusNode ?node }")
     assert {row["node"] for row in kept} == {subject}
+
+
+def typed(subject: str, kind: str) -> Quad:
+    return Quad(NamedNode(subject), NamedNode(RDF + "type"), NamedNode(term(kind)), NamedNode(GRAPH_SOURCE + "x"))
+
+
+def untyped(quads: list[Quad], subject: str) -> list[Quad]:
+    return [one for one in quads if (one.subject.value, one.predicate.value) != (subject, RDF + "type")]
+
+
+MAGIC, LUCK = "https://w3id.org/irtwin/effect/magic", "https://w3id.org/irtwin/family/luck"
+SMELL, FOUND = "https://w3id.org/irtwin/channel/smell", ID + "gap_finding/x"
+# what is wrong, though the closure makes all of it true
+WRONG_LINES = {
+    "id:robot/Arm_A: id:run/Arm_A.fit_1: is not said to be an industrial robot run process (irt:IR_RunProcess), "
+    "though only one has such properties",
+    f"id:robot/Arm_A: id:robot/Arm_A: a robot has at least one joint (irt:has_Joint is {JOINT})",
+    f"id:robot/Arm_A: {shorten(SHARE)}: an energy share is of one effect of the catalogue (irt:of_Effect is {MAGIC})",
+    f"id:robot/Arm_A: {shorten(PARAMETER)}: a parameter is of one effect of the catalogue (irt:of_Effect is {MAGIC}2)",
+    "id:robot/Arm_A: effect:magic2: is not in the ontology, which lists every effect (irt:Effect)",
+    f"{LUCK}: is not in the ontology, which lists every effect family (irt:Effect_Family)",
+    f"{shorten(FOUND)}: irt:has_Family leads to an effect family (irt:Effect_Family) of the ontology "
+    f"(irt:has_Family is {LUCK})",
+    f"{shorten(FOUND)}: irt:located_in_Channel leads to a channel (irt:Channel) of the ontology "
+    f"(irt:located_in_Channel is {SMELL})",
+}
+
+
+def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts: set())  # Pellet takes seconds to start
+    wrong = changed(untyped(untyped(two_robots, RUN), JOINT), SHARE, "of_Effect", NamedNode(MAGIC))
+    wrong = changed(wrong, PARAMETER, "of_Effect", NamedNode(MAGIC + "2"))
+    wrong += [typed(MAGIC + "2", "Effect"), typed(LUCK, "Effect_Family"), typed(FOUND, "Gap_Finding")]
+    for name, value in (("located_in_Channel", SMELL), ("has_Family", LUCK)):
+        wrong.append(Quad(NamedNode(FOUND), NamedNode(term(name)), NamedNode(value), wrong[-1].graph_name))
+    graph = reasoned(wrong)
+    for name, kind in ((RUN, "IR_RunProcess"), (JOINT, "Robot_Joint"), (MAGIC, "Effect"), (SMELL, "Channel")):
+        assert graph.holds(typed(name, kind).triple)
+    assert WRONG_LINES - set(map(str, validate(graph))) == set()
+
+
+def test_what_the_ontology_adds_to_a_catalogue_is_in_it(graph: KnowledgeGraph, two_robots: list[Quad]) -> None:
+    graph.replace(changed(two_robots, PARAMETER, "of_Effect", NamedNode(MAGIC)), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    assert {one.value for one in validate(graph)} == {MAGIC}
+    module = Quad(NamedNode(MAGIC), NamedNode(RDF + "type"), NamedNode(term("Effect")), NamedNode(GRAPH_ONTOLOGY))
+    graph.change((), {module})
+    assert validate(graph) == ()
+
+
+def test_an_activity_under_way_has_no_end(graph: KnowledgeGraph, two_robots: list[Quad]) -> None:
+    ended = [one for one in two_robots if one.predicate.value == PROV + "endedAtTime"]
+    assert ended
+    graph.replace(set(two_robots) - set(ended), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    assert validate(graph) == ()
+    early = Literal("1999-01-01T00:00:00Z", datatype=NamedNode(XSD + "dateTime"))
+    before = Quad(ended[0].subject, ended[0].predicate, early, ended[0].graph_name)
+    graph.change((), {before})
+    (said,) = validate(graph)
+    assert said.message == "an activity started before it ended"
 
 
 def test_report_is_replaced_not_gathered(two_robots: list[Quad], graph: KnowledgeGraph) -> None:

@@ -85,7 +85,7 @@ def test_each_runs_once_and_the_graph_is_refreshed_after_it(graph, monkeypatch):
         return provide
 
     monkeypatch.setattr(planner, "load_provider", made_by)
-    workspace = SimpleNamespace(replace_activity=lambda activity, *_: kept.append(activity))
+    workspace = SimpleNamespace(replace_activity=lambda activity, *_, **__: kept.append(activity))
     planner.populate(workspace, graph, lambda: refreshed.append(len(ran)), lambda line: None)
     assert ran[:1] == [("identification", "B")]
     assert ("energy", "A.2") in ran
@@ -104,7 +104,9 @@ def test_a_robot_that_a_provider_refuses_is_set_aside_and_others_go_on(graph, mo
         return provider.Made(key[0], [], [])
 
     monkeypatch.setattr(planner, "load_provider", lambda name: provide)
-    workspace = SimpleNamespace(replace_activity=lambda activity, *_: kept.append(activity.subject.rpartition("/")[2]))
+    workspace = SimpleNamespace(
+        replace_activity=lambda activity, *_, **__: kept.append(activity.subject.rpartition("/")[2])
+    )
 
     def populate(*set_aside: planner.SetAside) -> bool:
         return planner.populate(workspace, graph, lambda: None, lambda line: None, *set_aside)
@@ -114,3 +116,11 @@ def test_a_robot_that_a_provider_refuses_is_set_aside_and_others_go_on(graph, mo
     assert "A.2" in kept
     with pytest.raises(InputError, match="its torque is dead"):
         populate()
+
+
+def test_another_package_is_named_with_its_own_version(monkeypatch):
+    other = SimpleNamespace(name="co2", dist=SimpleNamespace(name="irtwin-co2", version="2.3"))
+    monkeypatch.setattr(provider, "entry_points", lambda group: [other])
+    assert provider.software_of("co2") == "irtwin-co2 2.3"
+    monkeypatch.setattr(provider, "entry_points", lambda group: [SimpleNamespace(name="co2", dist=None)])
+    assert provider.software_of("co2") == provider.software()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import itertools
+import json
 import math
 import re
 from collections.abc import Iterator
@@ -12,10 +13,14 @@ from typing import Any
 
 import pytest
 from tests import gap_cases
-from tests.gap_pages import figures_of, page_of
+from tests.gap_pages import figures_of, graph_of, page_of
+from tests.rows import ROBOT
 
 from irtwin.gap.document.document import Document
+from irtwin.providers.records import robot_iri
 from irtwin.report import wording
+from irtwin.report.gap.page import render_gap
+from irtwin.storage.database import Workspace
 
 pytestmark = pytest.mark.slow
 
@@ -159,3 +164,42 @@ def test_what_is_drawn_of_shares_adds_up(tmp_path: Path) -> None:
     assert math.fsum(bar["x"][0] for bar in bars) == pytest.approx(100)
     closed = said["shrink"]["yardstick"]["torque"]["closed"]
     assert math.fsum(bar["x"][0] for bar in bars[:2]) == pytest.approx(100 * closed)
+
+
+def without_numbers(value: Any) -> Any:
+    """Return JSON whose numbers are null."""
+    if isinstance(value, dict):
+        return {key: without_numbers(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [without_numbers(one) for one in value]
+    return None if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def without_curves(page: str) -> tuple[str, dict[str, Any]]:
+    """Return a page's text, and what it draws but for curves."""
+    data = re.search(r'id="page-data">(.*?)</script>', page)
+    assert data
+    drawn = json.loads(data[1])["figures"]
+    kept = {name: one for name, one in drawn.items() if not name.startswith("follows_") and name != "experiment"}
+    return page.replace(data[1], ""), kept
+
+
+def test_nothing_but_curves_is_of_the_evidence_file(tmp_path: Path) -> None:
+    said = told_apart(gap_cases.diagnosis("ambiguous"), itertools.count())
+    drawn = told_apart(gap_cases.evidence("ambiguous"), itertools.count(200))
+    page = page_of(tmp_path, said, drawn)
+    with Workspace(tmp_path / "w") as workspace:
+
+        def read(path: str, checksum: str) -> bytes:
+            assert path.endswith(".evidence.json")  # the diagnosis' own JSON is not read at all
+            stripped = without_numbers(json.loads(workspace.read_document(path, checksum)))
+            return json.dumps(stripped | {"heat_map": None, "runs": []}).encode()
+
+        render_gap(graph_of(workspace), robot_iri(ROBOT), read, tmp_path / "stripped.html")
+    assert without_curves((tmp_path / "stripped.html").read_text()) == without_curves(page)
+    cells, bars = (figures_of(tmp_path / "p.html")[name]["data"] for name in ("heat_map", "runs_torque"))
+    seen, given = (list(itertools.chain(*of)) for of in (cells[0]["customdata"], drawn["heat_map"]["excess"]))
+    assert seen == pytest.approx(given)
+    of_joint = [one for one in drawn["runs"] if one["joint"] == said["locations"][0]["joint"]]
+    assert bars[0]["y"] == pytest.approx([one["before"] for one in of_joint])
+    assert bars[1]["y"] == pytest.approx([one["after"] for one in of_joint])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -53,22 +54,33 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
 @workspace_option
 @graph_option
 @click.option("--json", "as_json", is_flag=True, help="Write nested JSON objects instead of an outline.")
-def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool) -> None:
+@click.option("--verify", is_flag=True, help="Check the files; exit status 2 where one changed or is missing.")
+def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool, verify: bool) -> None:
     """Explain where a triple of the graph comes from.
 
     The explanation names the rule, mapping or provider and the facts it used, down to runs, files and checksums.
     TRIPLE is subject, predicate and object: prefixed names, IRIs or literals. `?` or a missing part matches anything.
+    With --verify, a line for each file says whether its SHA-256 is still the one in the graph: whole, changed, missing,
+    or why that cannot be checked.
     """
     import json
 
     from irtwin import asking
     from irtwin.knowledge.explain.explanation import to_json, to_text
+    from irtwin.knowledge.explain.verify import verify as verified
 
     found = asking.explain(" ".join(triple), workspace, graph_url=graph_url)
+    files = verified(found, workspace) if verify else []
     if as_json:
-        click.echo(json.dumps([to_json(each) for each in found], indent=2, ensure_ascii=False))
+        said = [to_json(each) for each in found]
+        told = {"explanations": said, "files": [asdict(each) for each in files]} if verify else said
+        click.echo(json.dumps(told, indent=2, ensure_ascii=False))
     else:
         click.echo("\n\n".join(map(to_text, found)))
+        for line in ["", *map(str, files)] if verify else ():
+            click.echo(line)
+    if any(each.is_wrong for each in files):
+        sys.exit(2)
 
 
 @click.command()

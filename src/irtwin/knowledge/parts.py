@@ -112,10 +112,15 @@ def groups(ontology: Ontology, triples: Iterable[Triple]) -> tuple[set[Triple], 
 
 
 def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
-    """Return the robots of a part; where it has none, its first node."""
+    """Return the robots of a part."""
+    found = {node for one in part if (one.predicate, one.object) == (_TYPE, _ROBOT) for node in ontology.nodes(one)}
+    return sorted(found, key=str)
+
+
+def spoken_for(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
+    """Return who stands for a part: its robots; where it has none, its first node."""
     said = list(part)
-    found = {node for one in said if (one.predicate, one.object) == (_TYPE, _ROBOT) for node in ontology.nodes(one)}
-    return sorted(found or [min((node for one in said for node in ontology.nodes(one)), key=str)], key=str)
+    return robots(ontology, said) or [min((node for one in said for node in ontology.nodes(one)), key=str)]
 
 
 def join(ontology: Ontology, closure: Closure, count: int) -> str | None:

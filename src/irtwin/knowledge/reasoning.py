@@ -232,7 +232,7 @@ def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], befo
         common, of_parts = parts.groups(ontology, premises)
         bad = _contradictory(ontology, common, of_parts, before, clash)
         found = _infer(ontology, premises.difference(*(part for part, _ in bad)), before)
-        said = ((robot, reason) for part, reason in bad for robot in parts.robots(ontology, part))
+        said = ((robot, reason) for part, reason in bad for robot in parts.spoken_for(ontology, part))
         found.made_by = {Triple(robot, _CONTRADICTION, Literal(reason)) for robot, reason in said}
         return found
 

@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 
 from irtwin.live.joint_stream import STREAMED, State
+from irtwin.providers.live_energy import watching
 from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
@@ -124,7 +125,7 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
 
 def activities(run_id: str) -> tuple[str, str]:
     """Return the ids of the two activities of a live run: who watched it, and who worked out its energy."""
-    return f"{LIVE}.{run_id}", f"energy.{run_id}"
+    return watching(run_id), f"energy.{run_id}"
 
 
 def activity(header: Header, activity_id: str, provider: str, began: float, ended: float | None = None) -> Values:

@@ -12,7 +12,7 @@ from irtwin.identification.validation import APART
 from irtwin.providers import live_energy
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import load_run, load_twin, run_iri, twin_iri
+from irtwin.providers.records import inputs, load_run, load_twin, twin_iri
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion
@@ -38,9 +38,11 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         role = session.get_one(schema.TwinRun, (twin_id, run_id))
     motion = robot_motions(workspace, robot_id).motions[run_id]
     ledger = twin.ledger(motion)
+    read = inputs(workspace, robot_id, [run_id])
     return Made(
         robot_id=robot_id,
-        used=[run_iri(run_id), twin_iri(twin_id)],
+        used=[*read, twin_iri(twin_id)],
+        metered=[] if motion.power is None else [one for one in read if "/series/" in one],
         rows=[
             _run_energy(run_id, twin_id, role, twin, motion, ledger),
             *(
@@ -78,7 +80,7 @@ def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twi
     nothing = np.zeros(len(motion.time), dtype=bool)
     return Made(
         robot_id=robot_id,
-        used=[run_iri(run_id), twin_iri(twin_id)],
+        used=[*inputs(workspace, robot_id, [run_id]), twin_iri(twin_id)],
         rows=[row],
         series={run_id: modelled_series(twin, motion, nothing)},
     )

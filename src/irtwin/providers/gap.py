@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from importlib.metadata import version
 from typing import Any
 
 from sqlalchemy import select
@@ -22,8 +21,8 @@ from irtwin.providers import gap_rows
 from irtwin.providers.gap_rows import Place
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
-from irtwin.providers.provider import Made
-from irtwin.providers.records import identifier, robot_iri, run_iri
+from irtwin.providers.provider import Made, software
+from irtwin.providers.records import identifier, inputs, robot_iri
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.files import inside
@@ -50,8 +49,8 @@ def record(
     linear = _linear_joints(workspace, robot_id, diagnosis)
     row, documents = _row(robot_id, diagnosis, curves, twin, motion)
     at = Place(row.diagnosis_id, robot_id, partial(_run_id, runs), linear)
-    rows = [row, *gap_rows.rows(diagnosis, at)]
-    made = Made(robot_id, [run_iri(run_id) for run_id in runs.values()], rows, documents=documents)
+    rows = [row, *gap_rows.rows(diagnosis, at), *gap_rows.rows_of_curves(curves, at)]
+    made = Made(robot_id, inputs(workspace, robot_id, runs.values()), rows, documents=documents)
     diagnosis_id = row.diagnosis_id
     _keep(workspace, "diagnosis", made, started)
     with workspace.reading() as session:
@@ -81,7 +80,8 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     known = robot_motions(workspace, robot_id)
     parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
-    made = twin_made(robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts)
+    read = inputs(workspace, robot_id, known.keys.values())
+    made = twin_made(robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts, read)
     used = [*made.used, f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")
@@ -96,7 +96,7 @@ def _keep(workspace: Workspace, provider: str, made: Made, started: datetime, in
         subject=robot_iri(made.robot_id),
         started=started,
         ended=datetime.now(UTC),
-        software=f"irtwin {version('irtwin')}",
+        software=software(),
     )
     workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of=instead_of)
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Cause, Change, Document, Finding, Location, NotRepeating
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.storage import experiment_schema, gap_schema
@@ -55,6 +56,38 @@ def rows(said: Document, at: Place) -> Iterator[Base]:
         )
     if said.next_experiment is not None:
         yield from _experiment(said.next_experiment, at)
+
+
+def rows_of_curves(drawn: Curves, at: Place) -> Iterator[Base]:
+    """Yield the rows of what a page says in numbers of the evidence; curves stay in its file."""
+    if drawn.heat_map is not None:
+        for joint, values in zip(drawn.heat_map.joints, drawn.heat_map.excess, strict=True):
+            for rank, (regime, excess) in enumerate(zip(drawn.heat_map.regimes, values, strict=True), start=1):
+                yield gap_schema.GapRegimeExcess(
+                    diagnosis_id=at.diagnosis_id,
+                    joint=joint,
+                    regime=regime,
+                    rank=rank,
+                    robot_id=at.robot_id,
+                    excess=_finite(excess),
+                )
+    for number, one in enumerate(drawn.runs, start=1):
+        yield gap_schema.GapRunChange(
+            diagnosis_id=at.diagnosis_id,
+            number=number,
+            run_id=at.run_id(one.run),
+            robot_id=at.robot_id,
+            measure="power_rmse" if one.joint is None else "torque_rmse",
+            joint=one.joint,
+            before=_finite(one.before),
+            after=_finite(one.after),
+            noise_floor=_finite(one.floor),
+            unit="W" if one.joint is None else "N" if one.joint in at.linear else "N m",
+        )
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _sizes(said: Document, at: Place) -> Iterator[Base]:

@@ -14,7 +14,7 @@ from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import run_iri
+from irtwin.providers.records import inputs
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
@@ -34,11 +34,11 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
     parts = split(known.own, known.repeats)
     twin = identify(known.robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
-    return twin_made(robot_id, twin, known.keys, parts)
+    return twin_made(robot_id, twin, known.keys, parts, inputs(workspace, robot_id, known.keys.values()))
 
 
-def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> Made:
-    """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id."""
+def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split, used: Sequence[str]) -> Made:
+    """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id; `used`: IRIs."""
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"
@@ -55,7 +55,7 @@ def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> 
     )
     return Made(
         robot_id=robot_id,
-        used=[run_iri(run_id) for run_id in keys.values()],
+        used=used,
         rows=[
             row,
             *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effect_ids),

@@ -10,7 +10,6 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
 from sqlalchemy import func, select
@@ -22,8 +21,8 @@ from irtwin.gap.document.experiment import Experiment
 from irtwin.identification.validation import FIT_SHARE, Split
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions
-from irtwin.providers.provider import Made
-from irtwin.providers.records import load_run, load_twin, robot_iri, run_iri, twin_iri
+from irtwin.providers.provider import Made, software
+from irtwin.providers.records import inputs, load_run, load_twin, robot_iri, twin_iri
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -119,7 +118,7 @@ class _Loop:
         started = datetime.now(UTC)
         self.announce(f"  fitting the {tried}")
         twin = identify(self.known.robot, parts.fit, effects)
-        found = _Twin(_made(self.robot_id, self.known, twin, parts)[0], twin, parts)
+        found = _Twin(_made(self.workspace, self.robot_id, self.known, twin, parts)[0], twin, parts)
         before, after = _worst(self.best.twin, parts.held_out), _worst(twin, parts.held_out)
         earlier = self.best.twin_id
         if after < before:
@@ -131,7 +130,8 @@ class _Loop:
         )
         row = self._row(self.rounds[-1], earlier, found)
         read = {motion.run for motion in (*parts.fit, *parts.held_out)}
-        used = [twin_iri(earlier), *(run_iri(run_id) for name, run_id in self.known.keys.items() if name in read)]
+        run_ids = [run_id for name, run_id in self.known.keys.items() if name in read]
+        used = [twin_iri(earlier), *inputs(self.workspace, self.robot_id, run_ids)]
         activity = _activity("improvement", self.robot_id, f"{_ROUNDS}{row.round_id}", started)
         self.workspace.replace_activity(activity, used, [row])
 
@@ -221,14 +221,15 @@ def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
     return replace(run, signals=signals, repeat_of=run.repeat_of if run.repeat_of in names else None)
 
 
-def _made(robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:
-    made = twin_made(robot_id, twin, known.keys, parts)
+def _made(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:
+    used = inputs(workspace, robot_id, known.keys.values())
+    made = twin_made(robot_id, twin, known.keys, parts, used)
     return next(row.twin_id for row in made.rows if isinstance(row, schema.Twin)), made
 
 
 def _keep_twin(workspace: Workspace, robot_id: str, known: RobotMotions, best: _Twin) -> None:
     """Make a twin the robot's, with the parts that runs now take in it."""
-    _, made = _made(robot_id, known, best.twin, best.parts)
+    _, made = _made(workspace, robot_id, known, best.twin, best.parts)
     started = datetime.now(UTC)
     activity = _activity("identification", robot_id, robot_iri(robot_id), started)
     workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of="adoption")
@@ -242,5 +243,5 @@ def _activity(provider: str, robot_id: str, subject: str, started: datetime) -> 
         subject=subject,
         started=started,
         ended=datetime.now(UTC),
-        software=f"irtwin {version('irtwin')}",
+        software=software(),
     )

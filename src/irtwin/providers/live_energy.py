@@ -20,7 +20,7 @@ from sqlalchemy import select
 from irtwin.errors import InputError
 from irtwin.identification.validation import APART, energy_error
 from irtwin.providers.provider import Made
-from irtwin.providers.records import run_iri, twin_iri
+from irtwin.providers.records import inputs, run_iri, twin_iri
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.storage import live_schema, schema
 from irtwin.storage.database import Workspace
@@ -98,6 +98,8 @@ class LiveEnergy:
         if energy is None:
             return {}
         made = {"run_id": self._run_id, "activity_id": activity_id}
+        taken_by = activity_id if so_far.measured is None else watching(self._run_id)
+        energy = energy | {"taken_activity_id": taken_by}
         if self.known is None:
             return {"run_energy": [made | energy]}
         of = {**made, "robot_id": self._robot_id}
@@ -189,6 +191,11 @@ class LiveEnergy:
         return {"place": place, "channel": "torque", "joint": place, "unit": CHANNELS["torque"].unit_of(kind)}
 
 
+def watching(run_id: str) -> str:
+    """Return the id of the activity that watched a live run, and read its meter."""
+    return f"{schema.LIVE}.{run_id}"
+
+
 def used(run_id: str, known: KnownTwin | None) -> list[str]:
     """Return the IRIs of what the energy of a run is worked out from."""
     return [run_iri(run_id), *([] if known is None else [twin_iri(known.twin_id)])]
@@ -216,7 +223,8 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         stretches += energy.feed(piece, last=start + _AT_ONCE >= table.num_rows)
     rows = [_KINDS[name](**values) for name, some in energy.tables("").items() for values in some]
     series = {} if not stretches else {run_id: _modelled_series(joints, stretches, began)}
-    return Made(run.robot_id, used(run_id, known), rows, series)
+    read = {*inputs(workspace, run.robot_id, [run_id]), *used(run_id, known)}
+    return Made(run.robot_id, sorted(read), rows, series)
 
 
 def _modelled_series(joints: tuple[str, ...], stretches: list[Stretch], began: float) -> pa.Table:

@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from graphlib import CycleError, TopologicalSorter
-from importlib.metadata import version
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.providers.provider import load_provider
+from irtwin.providers.provider import Made, load_provider, software_of
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Activity
+from irtwin.storage.schema import METER, Activity
 
 _DECLARATIONS = """
 PREFIX irt: <https://w3id.org/irtwin#>
@@ -77,21 +76,27 @@ def populate(
                 refused.add(_robot_id(subject))
                 set_aside(_robot_id(subject), error)
                 continue
-            activity = Activity(
-                activity_id=f"{declaration.name}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
-                robot_id=made.robot_id,
-                provider=declaration.name,
-                subject=subject,
-                started=started,
-                ended=datetime.now(UTC),
-                software=f"irtwin {version('irtwin')}",
-            )
-            workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
+            activity = _activity(declaration.name, subject, made, started, software_of(declaration.name))
+            meter = _activity(METER, subject, made, started, activity.software)
+            metered = (meter, made.metered) if made.metered else None
+            workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents, metered=metered)
             count += 1
         if count:
             made_something = True
             refresh()
     return made_something
+
+
+def _activity(provider: str, subject: str, made: Made, started: datetime, software: str) -> Activity:
+    return Activity(
+        activity_id=f"{provider}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
+        robot_id=made.robot_id,
+        provider=provider,
+        subject=subject,
+        started=started,
+        ended=datetime.now(UTC),
+        software=software,
+    )
 
 
 def _robot_id(subject: str) -> str:

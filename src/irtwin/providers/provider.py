@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 
 import pyarrow as pa
 
@@ -17,13 +17,17 @@ GROUP = "irtwin.providers"
 
 @dataclass(frozen=True)
 class Made:
-    """What a provider made of one individual: rows, modelled series by run_id, documents by path, IRIs it read."""
+    """What a provider made of one individual: rows, modelled series by run_id, documents by path, IRIs it read.
+
+    `metered` are the IRIs that the energy taken was read from where a meter says it; nothing else was asked for that.
+    """
 
     robot_id: str
     used: Sequence[str]
     rows: Sequence[Base]
     series: Mapping[str, pa.Table] = field(default_factory=dict)
     documents: Mapping[str, bytes] = field(default_factory=dict)
+    metered: Sequence[str] = ()
 
 
 # A provider works on one individual, named by its key in the database: a robot_id or a run_id.
@@ -35,11 +39,26 @@ def load_provider(name: str) -> Provider:
 
     Raises InputError where none does: the ontology then declares a provider that nobody offers.
     """
+    provider: Provider = _entry_point(name).load()
+    return provider
+
+
+def software_of(name: str) -> str:
+    """Return name and version of the package that registers a provider, such as "irtwin 0.1.0"."""
+    package = _entry_point(name).dist
+    return software() if package is None else f"{package.name} {package.version}"
+
+
+def software() -> str:
+    """Return irtwin's own name and version."""
+    return f"irtwin {version('irtwin')}"
+
+
+def _entry_point(name: str) -> EntryPoint:
     found = [point for point in entry_points(group=GROUP) if point.name == name]
     if not found:
         raise InputError(
             f'provider "{name}" is declared in the ontology, but no installed package registers it as an entry '
             f"point of {GROUP}; install that package, or remove the declaration"
         )
-    provider: Provider = found[0].load()
-    return provider
+    return found[0]

@@ -8,7 +8,7 @@ import json
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,7 +30,19 @@ from irtwin.signals.conditioning import condition
 from irtwin.storage import schema
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.files import inside
-from irtwin.storage.schema import LIVE_RUN, MEASURED, MEASURED_RUN, PLANNED, PLANNED_RUN, Base, Joint, Robot, Run
+from irtwin.storage.schema import (
+    LIVE_RUN,
+    MEASURED,
+    MEASURED_RUN,
+    MODELLED,
+    PLANNED,
+    PLANNED_RUN,
+    Base,
+    Joint,
+    Robot,
+    Run,
+    SourceFile,
+)
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
@@ -47,7 +59,7 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
     robot_id = identifier(data_set.robot.name)
     now = datetime.now(UTC)
     listed = [*data_set.runs, *data_set.plans]
-    runs = [_run_row(robot_id, run, now) for run in listed]
+    runs = [_run_row(robot_id, run, now, data_set.folder) for run in listed]
     taken = {row.run_id for row in runs}
     if len(taken) < len(runs):
         raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
@@ -60,6 +72,7 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
     for line in undrawn:
         announce(line)
     parts: list[Base] = [
+        *_source_files(robot_id, data_set),
         *(_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)),
         *structure_rows(robot_id, data_set.robot, meshes),
         *device_rows(robot_id, data_set),
@@ -186,6 +199,17 @@ def _folded(name: str) -> str:
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
+def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[str]:
+    """Return the IRIs of what is read of some runs: they, their samples, and the files that say what they are of."""
+    ids = list(run_ids)
+    told = select(schema.Series.series_id, schema.Series.run_id)
+    told = told.where(schema.Series.run_id.in_(ids), schema.Series.kind != MODELLED)
+    files = select(SourceFile.source_file_id).where(SourceFile.robot_id == robot_id)
+    with workspace.reading() as session:
+        series = [f"{_INDIVIDUALS}series/{series_id}/{run_id}" for series_id, run_id in session.execute(told)]
+        return [*map(run_iri, ids), *series, *(f"{_INDIVIDUALS}source_file/{it}" for it in session.scalars(files))]
+
+
 def robot_iri(robot_id: str) -> str:
     """Return the IRI of a robot's individual."""
     return f"{_INDIVIDUALS}robot/{robot_id}"
@@ -278,6 +302,26 @@ def _columns(table: pa.Table) -> dict[str, np.ndarray]:
     return {name: np.array(table.column(name)) for name in table.column_names}
 
 
+def _source_files(robot_id: str, data_set: log.DataSet) -> list[SourceFile]:
+    return [
+        SourceFile(
+            source_file_id=f"{robot_id}.{identifier(path)}",
+            robot_id=robot_id,
+            kind="URDF" if file == data_set.urdf else "data set",
+            path=path,
+            folder=str(data_set.folder.resolve()),
+            sha256=checksum,
+        )
+        for file, checksum in data_set.sha256.items()
+        for path in [_within(data_set.folder, file)]
+    ]
+
+
+def _within(folder: Path, file: Path) -> str:
+    """Return the path of a data set's file from its folder on; the whole path of one that lies elsewhere."""
+    return (file.relative_to(folder) if file.is_relative_to(folder) else file.resolve()).as_posix()
+
+
 def _robot_row(robot_id: str, data_set: log.DataSet) -> Robot:
     robot, notes = data_set.robot, data_set.notes
     rated, arm = notes.get("rated_payload"), notes.get("arm_movement_type")
@@ -326,7 +370,7 @@ def _joint_row(robot_id: str, place: int, joint: description.Joint) -> Joint:
     )
 
 
-def _run_row(robot_id: str, run: log.Run, now: datetime) -> Run:
+def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = None) -> Run:
     time = run.signals.time
     duration = float(time[-1] - time[0])
     x, y, z = run.payload_com
@@ -348,6 +392,6 @@ def _run_row(robot_id: str, run: log.Run, now: datetime) -> Run:
         run_time_s=duration,
         sample_count=len(time),
         sample_rate_hz=(len(time) - 1) / duration,
-        file=run.file.name,
+        file=run.file.name if folder is None else _within(folder, run.file),
         sha256=run.sha256,
     )

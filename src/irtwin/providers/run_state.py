@@ -6,7 +6,7 @@ import numpy as np
 
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import run_iri
+from irtwin.providers.records import inputs
 from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import JointState, Run, RunState
@@ -40,7 +40,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         )
         for place, joint in enumerate(known.robot.joints)
     ]
-    return Made(robot_id, [run_iri(run_id)], [state, *joints])
+    return Made(robot_id, inputs(workspace, robot_id, [run_id]), [state, *joints])
 
 
 def standstill(motion: Motion) -> np.ndarray:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
+from irtwin.input_file import checksum
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
@@ -74,6 +75,7 @@ class DataSet:
     urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
     plans: tuple[Run, ...] = ()
     torque_scale_uncertainty: float | None = None  # share by which logged torque may be off, 95 %
+    sha256: Mapping[Path, str] = field(default_factory=dict)  # of `dataset.toml` and the URDF, as they were read
 
 
 def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
@@ -100,6 +102,7 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     if power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
     Table(file, "", document).check_keys(DATA_SET_KEYS)
+    urdf = table.path("urdf", folder) if "urdf" in table.values else None
     twin = document.get("twin", {})
     if isinstance(twin, dict):
         Table(file, "[twin]", twin).check_keys(TWIN_KEYS)
@@ -117,9 +120,10 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
         repairs=tuple(repairs),
         findings=tuple(findings),
-        urdf=table.path("urdf", folder) if "urdf" in table.values else None,
+        urdf=urdf,
         plans=tuple(run for run in listed if run.role == PLANNED),
         torque_scale_uncertainty=_torque_scale(table),
+        sha256={path: checksum(path) for path in (file, urdf) if path is not None},
     )
 
 
@@ -285,7 +289,7 @@ def _runs(
         run = Run(
             name=path.stem,
             file=path,
-            sha256=_checksum(path),
+            sha256=checksum(path),
             role=role,
             payload_mass=table.number("payload_mass", least=0.0) or 0.0,
             payload_com=_centre(table),
@@ -296,14 +300,6 @@ def _runs(
             signals=signals,
         )
         yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
-
-
-def _checksum(path: Path) -> str:
-    """Return the sha256 of a run's file, in hexadecimal; of a folder, that of its files' names and checksums."""
-    if path.is_file():
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    files = sorted(one for one in path.iterdir() if one.is_file())
-    return hashlib.sha256("\n".join(f"{one.name} {_checksum(one)}" for one in files).encode()).hexdigest()
 
 
 def _torque_scale(table: Table) -> float | None:

@@ -43,7 +43,9 @@ from irtwin.storage.schema import (
     Base,
     Robot,
     Run,
+    RunEnergy,
     Series,
+    SourceFile,
 )
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
 from irtwin.storage.structure_schema import LinkShape
@@ -148,6 +150,9 @@ class Workspace:
         with self._writing() as session:
             known = bool(session.scalar(select(exists().where(Robot.robot_id == robot.robot_id))))
             if known and self._holds(session, robot.robot_id, rows):
+                for row in parts:
+                    if isinstance(row, SourceFile):
+                        session.merge(row)  # the data set may lie in another folder now
                 return "unchanged"
             if known:
                 drop_data_set(session, robot.robot_id)
@@ -168,25 +173,32 @@ class Workspace:
         series: Mapping[str, pa.Table] | None = None,
         documents: Mapping[str, bytes] | None = None,
         instead_of: str | None = None,
+        metered: tuple[Activity, Iterable[str]] | None = None,
     ) -> None:
         """Keep what a provider made, in place of what it, or the provider `instead_of`, made of the same subject.
 
         used: IRIs of what the activity read; rows: of the tables with an `activity_id`, which is set here;
-        series: modelled samples by `run_id`; documents: files by their path in the workspace (`twins/ID.json`).
+        series: modelled samples by `run_id`; documents: files by their path in the workspace (`twins/ID.json`);
+        metered: the activity that read the meter alone, and from what.
         What was derived from the replaced rows (the energy of an earlier twin) is dropped too.
         """
+        made = [(activity, used), *([] if metered is None else [metered])]
         for row in rows:
             row.activity_id = activity.activity_id  # type: ignore[attr-defined]
-        uses = [ActivityUse(activity_id=activity.activity_id, entity=entity) for entity in sorted(set(used))]
+            if isinstance(row, RunEnergy) and not row.taken_activity_id:
+                row.taken_activity_id = made[-1][0].activity_id
+        uses = {(one.activity_id, entity) for one, read in made for entity in read}
+        read_rows = [ActivityUse(activity_id=of, entity=entity) for of, entity in sorted(uses)]
         with self._writing() as session:
             same = select(Activity.activity_id).where(
-                Activity.provider.in_((activity.provider, instead_of)), Activity.subject == activity.subject
+                Activity.provider.in_((*(one.provider for one, _ in made), instead_of)),
+                Activity.subject == activity.subject,
             )
             drop_activities(session, with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
                 files.write(inside(self.folder, path), content)
             modelled = self._store(series or {}, MODELLED, activity.activity_id)
-            insert_rows(session, [activity, *uses, *rows, *modelled])
+            insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
     def keep_live_run(self, run: Run, series: pa.Table, activity: Activity, rows: Sequence[Base]) -> Series:
@@ -283,8 +295,8 @@ class Workspace:
         runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_not(None)))
         stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
         for table in part_tables():
-            found = session.execute(select(table).where(table.columns["robot_id"] == robot_id))
-            stored |= {(table.name, *row) for row in found}
+            found = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
+            stored |= {(table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in found}
         measured = select(Series.path, Series.series_id).join(Run)
         measured = measured.where(Run.robot_id == robot_id, Series.kind != MODELLED)
         named = [(row.path, row.series_id) for row in session.execute(measured)]

@@ -56,6 +56,38 @@ class GapSize(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+class GapRegimeExcess(Base):
+    """The excess of one joint in one regime; none where it did not move so, or no floor is known."""
+
+    __tablename__ = "gap_regime_excess"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    joint: Mapped[str] = mapped_column(primary_key=True)
+    regime: Mapped[str] = mapped_column(primary_key=True)
+    rank: Mapped[int]  # of the regime
+    robot_id: Mapped[str]
+    excess: Mapped[float | None]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class GapRunChange(Base):
+    """What all causes together change in one run, or in one stretch of it, while it is held out of the fit."""
+
+    __tablename__ = "gap_run_change"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"))
+    robot_id: Mapped[str]
+    measure: Mapped[str]  # "torque_rmse" of a joint, or "power_rmse"
+    joint: Mapped[str | None]
+    before: Mapped[float | None]
+    after: Mapped[float | None]
+    noise_floor: Mapped[float | None]
+    unit: Mapped[str]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
 class GapLocation(Base):
     """A place where part of the gap lies."""
 

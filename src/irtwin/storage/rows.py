@@ -10,7 +10,19 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, exists, insert, select, update
 from sqlalchemy.orm import Session, aliased
 
-from irtwin.storage.schema import LIVE, LIVE_RUN, Activity, Base, Robot, Run, RunEnergy, RunPrice, Series, in_utc
+from irtwin.storage.schema import (
+    LIVE,
+    LIVE_RUN,
+    Activity,
+    Base,
+    Robot,
+    Run,
+    RunEnergy,
+    RunPrice,
+    Series,
+    SourceFile,
+    in_utc,
+)
 
 Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 
@@ -43,8 +55,8 @@ def values(row: Base) -> dict[str, Any]:
 
 
 def facts(row: Base) -> tuple[object, ...]:
-    """Return a row's values, to compare; the time of taking in is no fact of the data set."""
-    said = values(row)
+    """Return a row's values, to compare; when and from which folder it was taken in is no fact of a data set."""
+    said = values(row) | ({"folder": ""} if isinstance(row, SourceFile) else {})
     if isinstance(row, Run):
         said["start_time"] = in_utc(row.start_time) if row.start_time and row.start_time_from == "log" else None
     return (row.__tablename__, *said.values())

@@ -14,6 +14,7 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
 LIVE = "live"  # provider of what is known of runs that are watched
+METER = "meter"  # provider of what was measured of a run's power
 # Kinds of run, by their classes in the ontology: made up, taken in as a log, or watched while it lasted.
 PLANNED_RUN, MEASURED_RUN, LIVE_RUN = "Planned_Run", "Measured_Run", "Live_Run"
 MEASURED, PLANNED, MODELLED = "measured", "planned", "modelled"  # kinds of series
@@ -68,6 +69,19 @@ class Robot(Base):
     urdf_sha256: Mapped[str]
     twin_effects: Mapped[str | None]  # comma separated: what the data set says that its twin models
     notes: Mapped[str]  # JSON: what the data set says beside the contract
+
+
+class SourceFile(Base):
+    """A file of a data set that says what its runs are of; `source_file_id` is `robot_id.` and a name of its path."""
+
+    __tablename__ = "source_file"
+
+    source_file_id: Mapped[str] = mapped_column(primary_key=True)
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
+    kind: Mapped[str]  # "data set": dataset.toml, or "URDF"
+    path: Mapped[str]  # from the data set's folder
+    folder: Mapped[str]  # of the data set, when it was taken in
+    sha256: Mapped[str]
 
 
 class Joint(Base):
@@ -308,6 +322,10 @@ class TorqueFit(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+def _own_activity(context: Any) -> str:
+    return str(context.get_current_parameters()["activity_id"])
+
+
 class RunEnergy(Base):
     """Energy and power of a run: as measured and as its twin models them."""
 
@@ -328,6 +346,8 @@ class RunEnergy(Base):
     standby_share: Mapped[float | None]  # of the modelled energy, 0 to 1
     returned_energy_j: Mapped[float | None]  # mechanical energy that the joints gave back while they braked, positive
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+    # whose work the energy taken is: of who read the meter, else of who asked the twin
+    taken_activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), default=_own_activity)
 
 
 class RunPrice(Base):

@@ -15,6 +15,7 @@ from irtwin.knowledge.explain import provenance
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.explain.mapping import mapping_of
 from irtwin.knowledge.explain.rules import premises
+from irtwin.knowledge.explain.swrl import swrl_rules
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.shacl.rules import ShaclRule, all_rules, graph_of
@@ -84,6 +85,10 @@ class Explainer:
             found = premises(self._graph, rule, triple) if graph_of(rule.name) in graphs else None
             if found is not None:
                 return self._by_rule(triple, rule, found, swrl=GRAPH_SWRL in graphs)
+        for rule in swrl_rules(self._graph.resources.of("rules", ".swrl.ttl")) if GRAPH_SWRL in graphs else ():
+            found = premises(self._graph, rule, triple)
+            if found is not None:
+                return self._because(triple, f'the rule "{rule.label}", in SWRL', rule, found)
         if GRAPH_SWRL in graphs:
             return Explanation(what, "the SWRL rules of rules/, run by Pellet")
         return self._inferred(tuple(triple))
@@ -94,22 +99,25 @@ class Explainer:
         if iri in self._told:
             return Explanation(what, _ABOVE)
         self._told.add(iri)
-        file, checksum = provenance.file_of(self._graph, iri)
+        kept = provenance.file_of(self._graph, iri)
         makers = provenance.makers(self._graph, iri)
         used = [thing for maker in makers for thing in provenance.used_by(self._graph, maker["activity"])]
         return Explanation(
             what,
             " and ".join(map(_maker, makers)) or self._known_from(iri),
             (*map(self.individual, dict.fromkeys(used)), *self._runs_recorded_as(iri)),
-            file=file,
-            checksum=checksum,
+            file=kept.file,
+            checksum=kept.checksum,
+            folder=kept.folder,
         )
 
     def _runs_recorded_as(self, series: str) -> Iterator[Explanation]:
         """Name the run that samples were read from, and its own file."""
         for run in provenance.recorded_of(self._graph, series):
-            file, checksum = provenance.file_of(self._graph, run)
-            yield Explanation(shorten(run), self._known_from(run), file=file, checksum=checksum)
+            if run in self._told:
+                continue
+            kept = provenance.file_of(self._graph, run)
+            yield Explanation(shorten(run), self._known_from(run), (), None, kept.file, kept.checksum, kept.folder)
 
     def _known_from(self, run: str) -> str:
         return _PLANNED if provenance.is_planned(self._graph, run) else _RECORDED
@@ -121,16 +129,18 @@ class Explainer:
             used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
             return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
         if name.startswith(GRAPH_SOURCE):
-            file, checksum = self._file_near(triple)
-            return Explanation(
-                what, mapping_of(triple, self._graph.resources.of("mappings")), file=file, checksum=checksum
-            )
+            near = self._file_near(triple)
+            maker = mapping_of(triple, self._graph.resources.of("mappings"))
+            return Explanation(what, maker, (), None, near.file, near.checksum, near.folder)
         if name == GRAPH_ONTOLOGY:
             return Explanation(what, "the ontology", file=_module(triple, self._graph.resources.of("ontology")))
         return Explanation(what, f"what was written into {shorten(name)}")
 
     def _by_rule(self, triple: Triple, rule: ShaclRule, found: Iterable[Triple], *, swrl: bool) -> Explanation:
         by = f'the rule "{rule.label}", in SHACL' + (" and in SWRL" if swrl else "")
+        return self._because(triple, by, rule, found)
+
+    def _because(self, triple: Triple, by: str, rule: ShaclRule, found: Iterable[Triple]) -> Explanation:
         return Explanation(_show(triple), by, tuple(map(self.triple, found)), rule.comment or None)
 
     def _inferred(self, statement: Statement) -> Explanation:
@@ -180,13 +190,15 @@ class Explainer:
         self._told.add(statement)
         return self._inferred(statement)
 
-    def _file_near(self, triple: Triple) -> tuple[str | None, str | None]:
-        """Return the file of the subject, or else of the object."""
-        for term in (triple.subject, triple.object):
-            file = provenance.file_of(self._graph, term.value) if isinstance(term, NamedNode) else (None, None)
-            if file[0] is not None:
-                return file
-        return (None, None)
+    def _file_near(self, triple: Triple) -> provenance.File:
+        """Return the file that says a triple: a data set's, or else that of the subject, or of the object."""
+        ends = [term.value for term in (triple.subject, triple.object) if isinstance(term, NamedNode)]
+        if isinstance(triple.subject, NamedNode):
+            told = provenance.told_in(self._graph, triple.subject.value, triple.predicate.value)
+            if told.file is not None:
+                return told
+        found = (provenance.file_of(self._graph, end) for end in ends)
+        return next((one for one in found if one.file is not None), provenance.File())
 
 
 def _is_individual(term: object) -> TypeGuard[NamedNode]:

@@ -12,7 +12,7 @@ class Explanation:
     """A triple or an individual, with prefixes; who or what says it; and from what, down to files.
 
     `meaning` is what the rule or provider does, in words. `file` and `checksum` are of the individual's own file, or
-    of the document that says the triple.
+    of the document that says the triple; its path begins in the workspace, or in the `folder` of a data set.
     """
 
     what: str
@@ -21,6 +21,7 @@ class Explanation:
     meaning: str | None = None
     file: str | None = None
     checksum: str | None = None
+    folder: str | None = None
 
 
 def to_text(explanation: Explanation) -> str:
@@ -30,7 +31,7 @@ def to_text(explanation: Explanation) -> str:
 
 def to_json(explanation: Explanation) -> dict[str, Any]:
     """Write an explanation as nested objects, for JSON; what it lacks is left out."""
-    plain = {name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "checksum")}
+    plain = {name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "folder", "checksum")}
     found = {name: value for name, value in plain.items() if value is not None}
     if explanation.because:
         found["because"] = [to_json(each) for each in explanation.because]
@@ -46,7 +47,8 @@ def _lines(explanation: Explanation, margin: str) -> Iterator[str]:
         yield f"{inner}({explanation.meaning})"
     if explanation.file:
         checksum = f", sha256 {explanation.checksum}" if explanation.checksum else ""
-        yield f"{inner}file {explanation.file}{checksum}"
+        place = f" in {explanation.folder}" if explanation.folder else ""
+        yield f"{inner}file {explanation.file}{place}{checksum}"
     for each in explanation.because:
         first, *rest = _lines(each, inner + "  ")
         yield f"{inner}- {first.lstrip()}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Row
 
@@ -17,9 +19,29 @@ ORDER BY ?finished ?activity"""
 
 _INPUTS = "SELECT ?entity WHERE { ?activity prov:used ?entity } ORDER BY ?entity"
 
-_FILES = (
-    "SELECT ?file ?checksum WHERE { ?thing irt:File ?file OPTIONAL { ?thing irt:Checksum ?checksum } } ORDER BY ?file"
-)
+_FILES = """
+SELECT ?file ?checksum (COALESCE(?own, ?shared) AS ?folder)
+WHERE {
+  ?thing irt:File ?file
+  OPTIONAL { ?thing irt:Checksum ?checksum }
+  OPTIONAL { ?thing irt:Data_Folder ?own }
+  OPTIONAL {
+    ?thing irt:Run_Role ?role ; irt:run_of / ^irt:source_of ?source .
+    ?source irt:Source_Kind "data set" ; irt:Data_Folder ?shared
+  }
+}
+ORDER BY ?file"""
+
+_TOLD_IN = """
+SELECT ?file ?checksum ?folder
+WHERE {
+  ?property irt:told_in ?kind .
+  ?thing (irt:run_of | ^irt:has_Joint | ^irt:has_Information) ?robot .
+  ?source irt:source_of ?robot ; irt:Source_Kind ?kind ; irt:File ?file ; irt:Checksum ?checksum ;
+    irt:Data_Folder ?folder .
+  FILTER NOT EXISTS { ?thing irt:run_of ?robot FILTER NOT EXISTS { ?thing irt:Run_Role ?role } }
+}
+ORDER BY ?file"""
 
 _RUN = "SELECT ?run WHERE { ?thing irt:series_of ?run FILTER NOT EXISTS { ?thing prov:wasGeneratedBy ?activity } }"
 
@@ -30,6 +52,15 @@ WHERE {
   OPTIONAL { ?activity irt:Software ?software }
   OPTIONAL { ?activity prov:endedAtTime ?finished }
 }"""
+
+
+@dataclass(frozen=True)
+class File:
+    """A file and its SHA-256; its path begins in the workspace, or in the `folder` of a data set."""
+
+    file: str | None = None
+    checksum: str | None = None
+    folder: str | None = None
 
 
 def makers(graph: KnowledgeGraph, thing: str) -> list[Row]:
@@ -60,7 +91,11 @@ def is_planned(graph: KnowledgeGraph, thing: str) -> bool:
     return bool(list(graph.query(_PLAN, {"thing": thing})))
 
 
-def file_of(graph: KnowledgeGraph, thing: str) -> tuple[str | None, str | None]:
-    """Return the path and the checksum of the file that a thing is kept in, as far as they are known."""
-    found = next(iter(graph.query(_FILES, {"thing": thing})), {})
-    return (found.get("file"), found.get("checksum"))
+def file_of(graph: KnowledgeGraph, thing: str) -> File:
+    """Return the file that a thing is kept in, as far as it is known."""
+    return File(**next(iter(graph.query(_FILES, {"thing": thing})), {}))
+
+
+def told_in(graph: KnowledgeGraph, thing: str, property: str) -> File:
+    """Return the file of a data set that says a property of a thing, where one does."""
+    return File(**next(iter(graph.query(_TOLD_IN, {"thing": thing, "property": property})), {}))

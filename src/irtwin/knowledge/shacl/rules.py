@@ -22,7 +22,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.shacl.shapes import Node, Shapes
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.store.sparql_text import masked
-from irtwin.knowledge.vocabulary import GRAPH_SHACL, OWL, PREFIXES, RDF, RDFS, shorten
+from irtwin.knowledge.vocabulary import GRAPH_SHACL, OWL, PREFIXES, RDF, RDFS, SH, shorten
 from irtwin.resources import Files, Resources
 
 MOST_ROUNDS = 100
@@ -112,7 +112,7 @@ def rules_of(shapes: Shapes) -> tuple[ShaclRule, ...]:
     """Return the rules of a shapes graph, like `read_rules`."""
     return tuple(
         _rule(shapes, shape, rule)
-        for shape in shapes.subjects("rule")
+        for shape in shapes.having(SH + "rule")
         if not shapes.is_deactivated(shape)
         for rule in shapes.values(shape, "rule")
         if not shapes.is_deactivated(rule)

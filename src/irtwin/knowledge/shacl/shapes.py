@@ -21,9 +21,13 @@ class Shapes:
         for triple in sorted(triples, key=str):
             self._objects.setdefault(triple.subject, {}).setdefault(triple.predicate.value, []).append(triple.object)
 
-    def subjects(self, name: str) -> list[Node]:
-        """Return the nodes that have a property of SHACL's."""
-        return [subject for subject, found in self._objects.items() if SH + name in found]  # type: ignore[misc]
+    def having(self, name: str, value: str | None = None) -> list[Node]:
+        """Return the nodes that have a property, by its whole IRI; with that value, an IRI, if one is given."""
+        return [
+            subject  # type: ignore[misc]
+            for subject, found in self._objects.items()
+            if name in found and (value is None or NamedNode(value) in found[name])
+        ]
 
     def values(self, node: object, name: str) -> list[Node]:
         """Return the values of a property of SHACL's, or of any by its whole IRI."""

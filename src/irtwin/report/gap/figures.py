@@ -1,4 +1,4 @@
-"""Figures of the gap report: curves and maps come from the evidence file of the diagnosis, which the graph names."""
+"""Figures of the gap report: numbers by the questions, curves alone from the evidence file that the graph names."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from irtwin.gap.document.curves import Curves, ExcessMap, Followed, PlannedMotion, RunError
+from irtwin.gap.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.energy.figures import MEASURED, PALETTE, Figure, plain
 from irtwin.report.gap.verdict import effect_name
-from irtwin.report.questions import Answers
+from irtwin.report.questions import Answers, Row
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
 _CAUSES = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#004C78", "#7FC8A9")
@@ -28,14 +28,13 @@ _CURVES = 3  # of one effect
 def figures(answers: Answers, curves: Curves) -> dict[str, Figure]:
     """Return every figure that there is something to draw for, by name."""
     drawn: dict[str, Figure | None] = {}
-    if curves.heat_map is not None:
-        drawn["heat_map"] = heat_map(curves.heat_map)
+    drawn["heat_map"] = heat_map(answers["regime_excess"].rows)
     for place, curve in enumerate(curves.follows):
         unit = "W" if curve.channel == "power" else effort_unit(curve.joint, answers)
         drawn[f"follows_{place}"] = follows(curve, unit, effect_names(answers))
     for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
         if name == "runs_power" or joint is not None:
-            drawn[name] = runs(curves.runs, joint, "W" if joint is None else effort_unit(joint, answers))
+            drawn[name] = runs([row for row in answers["run_changes"].rows if row["joint"] == joint])
     drawn["by_cause"] = by_cause(answers)
     drawn["budget"] = budget(answers)
     if curves.experiment is not None:
@@ -54,17 +53,20 @@ def effort_unit(joint: str | None, answers: Answers) -> str:
     return "N" if any(row["joint"] == joint for row in answers["sliding_joints"].rows) else "N m"
 
 
-def heat_map(given: ExcessMap) -> Figure | None:
+def heat_map(given: Sequence[Row]) -> Figure | None:
     """Draw the excess of each joint in each regime, None where it is known of none."""
-    values = given.excess
-    known = [value for row in values for value in row if value is not None]
+    known = [row["excess"] for row in given if row["excess"] is not None]
     if not known:
         return None
-    regimes = [plain(name.replace("_", " ")) for name in given.regimes]
+    regimes = [plain(name) for name in dict.fromkeys(row["regime"] for row in given)]
+    joints: dict[str, list[float | None]] = {}
+    for row in given:
+        joints.setdefault(row["joint"], []).append(row["excess"])
+    values = list(joints.values())
     top = math.log10(1 + max(_LEAST_TOP, *known))
     ticks = [tick for tick in (_TICKS if top < _WIDE else _DECADES) if math.log10(1 + tick) <= top]
     cells = {
-        "type": "heatmap", "x": regimes, "y": [plain(name) for name in given.joints], "zmin": 0, "zmax": top,
+        "type": "heatmap", "x": regimes, "y": [plain(name) for name in joints], "zmin": 0, "zmax": top,
         "z": [[None if value is None else math.log10(1 + max(value, 0.0)) for value in row] for row in values],
         "customdata": values, "colorscale": _SHADES, "xgap": 2, "ygap": 2, "hoverongaps": False,
         "text": [[_cell(value) for value in row] for row in values], "texttemplate": "%{text}",
@@ -151,26 +153,23 @@ def follows(curve: Followed, unit: str, names: Mapping[str, str]) -> Figure:
     return {"data": data, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"residual, {unit}"}}}}
 
 
-def runs(given: Sequence[RunError], joint: str | None, unit: str) -> Figure | None:
-    """Draw the RMSE of each held-out run before and after, of this unit, with its floor; power where `joint` is None.
-
-    None where nothing changed.
-    """
-    rows = [row for row in given if row.joint == joint]
-    if all(row.before == row.after for row in rows):
+def runs(rows: Sequence[Row]) -> Figure | None:
+    """Draw the RMSE of each held-out run before and after, with its floor; None where nothing changed."""
+    if all(row["before"] == row["after"] for row in rows):
         return None
-    names = _numbered([plain(row.run) for row in rows])
+    unit = rows[0]["unit"]
+    names = _numbered([plain(row["run_name"]) for row in rows])
     data: list[dict[str, Any]] = [
         {
             "type": "bar", "name": name, "x": names, "y": values, "marker": {"color": colour},
             "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
         }
         for name, values, colour in (
-            ("before", [row.before for row in rows], BEFORE),
-            ("with the causes added", [row.after for row in rows], AFTER),
+            ("before", [row["before"] for row in rows], BEFORE),
+            ("with the causes added", [row["after"] for row in rows], AFTER),
         )
     ]  # fmt: skip
-    if any(row.floor is not None for row in rows):
+    if any(row["floor"] is not None for row in rows):
         marker = {"symbol": "line-ew", "size": 34, "line": {"color": FLOOR, "width": 2}}
         data.append(
             {
@@ -178,7 +177,7 @@ def runs(given: Sequence[RunError], joint: str | None, unit: str) -> Figure | No
                 "mode": "markers",
                 "name": "noise floor",
                 "x": names,
-                "y": [row.floor for row in rows],
+                "y": [row["floor"] for row in rows],
                 "marker": marker,
                 "hovertemplate": f"noise floor %{{y:.3~g}} {unit}<extra></extra>",
             }

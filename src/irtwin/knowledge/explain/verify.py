@@ -1,0 +1,62 @@
+"""Are the files that an explanation ends in still those that were read? Their checksums, worked out again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from irtwin.input_file import checksum
+from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.storage.files import inside
+
+WHOLE, CHANGED, MISSING, UNKNOWN = "whole", "changed", "missing", "cannot be checked"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A file, what became of it since it was read, and why that is not known where it is not."""
+
+    file: str
+    state: str
+    why: str | None = None
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the file is not what it was."""
+        return self.state in (CHANGED, MISSING)
+
+    def __str__(self) -> str:
+        """Return one line."""
+        return f"{self.state}: {self.file}{f' ({self.why})' if self.why else ''}"
+
+
+def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict]:
+    """Return what became of each file that explanations name, in their order; each once."""
+    found = dict.fromkeys(
+        (each.folder, each.file, each.checksum) for one in explanations for each in _all(one) if each.file
+    )
+    return [_verdict(workspace, folder, file, known) for folder, file, known in found]
+
+
+def _all(explanation: Explanation) -> Iterator[Explanation]:
+    yield explanation
+    for each in explanation.because:
+        yield from _all(each)
+
+
+def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) -> Verdict:
+    if known is None:
+        return Verdict(file, UNKNOWN, "it is part of irtwin, which keeps no checksum of it")
+    base = workspace if folder is None else Path(folder)
+    path = inside(workspace, file) if folder is None else base / file
+    if not base.is_dir():
+        what = "the workspace" if folder is None else "its data set"
+        return Verdict(str(path), UNKNOWN, f"{what} is not at {base}; take it in again from where it is")
+    if not path.exists():
+        return Verdict(str(path), MISSING)
+    try:
+        now = checksum(path)
+    except OSError as error:
+        return Verdict(str(path), UNKNOWN, f"it cannot be read: {error.strerror}")
+    return Verdict(str(path), WHOLE) if now == known else Verdict(str(path), CHANGED, f"sha256 is now {now}")
