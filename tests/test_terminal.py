@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -43,6 +44,13 @@ def test_a_reader_that_leaves_needs_no_word():
     done = subprocess.run(f"{sys.executable} -m irtwin query --format csv | head -1", shell=True, capture_output=True)
     assert done.stderr == b""
     assert done.stdout.startswith(b"theme,name")
+
+
+def test_a_system_that_is_not_posix_is_told_in_one_line(monkeypatch):
+    monkeypatch.setattr("irtwin.cli.command_line.os", SimpleNamespace(name="nt"))
+    said = irtwin("demo")
+    line = "irtwin: this system is not supported: irtwin runs on Linux; on Windows, install it in WSL\n"
+    assert (said.status, said.out, said.err) == (2, "", line)
 
 
 def test_names_neither_break_the_line_nor_steer_the_terminal(tmp_path):

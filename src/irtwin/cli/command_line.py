@@ -19,6 +19,9 @@ _LONGEST = 2000  # characters of an error
 
 def main() -> None:
     """Run the command line; a user's mistake is one line on standard error and exit status 2."""
+    if os.name != "posix":  # before anything that locks files is imported
+        say("irtwin: this system is not supported: irtwin runs on Linux; on Windows, install it in WSL")
+        sys.exit(2)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 is no reason to stop
