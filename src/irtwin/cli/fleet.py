@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import say
+from irtwin.cli.options import announce, say
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _work(source: str, out: Path, kind: str, workers: int | None, scheduler: str
     from irtwin.fleet.fleet import work
 
     found = work(
-        source, out, kind, batch=batch, workers=workers or os.cpu_count() or 1, scheduler=scheduler, announce=say
+        source, out, kind, batch=batch, workers=workers or os.cpu_count() or 1, scheduler=scheduler, announce=announce
     )
     _show(found)
     if found.set_aside:

@@ -8,11 +8,17 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import Number, database_option, graph_option, say, workspace_option
+from irtwin.cli.options import Number, announce, database_option, graph_option, say, workspace_option
+
+
+def _known_questions(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
+    from irtwin.knowledge.questions.queries import named_questions
+
+    return [name for name in named_questions() if name.startswith(begun)]
 
 
 @click.command()
-@click.argument("question", required=False)
+@click.argument("question", required=False, shell_complete=_known_questions)
 @click.option("--robot", metavar="NAME", help="Ask about this robot only.")
 @workspace_option
 @graph_option
@@ -128,7 +134,7 @@ def reason(
         else:
             from irtwin.workflow import reason_again
 
-            reason_again(workspace, engine=engine, database=database, graph_url=graph_url, announce=say)
+            reason_again(workspace, engine=engine, database=database, graph_url=graph_url, announce=announce)
     except Contradiction as clash:
         say(f"irtwin: {source or workspace}: {clash}")
         sys.exit(3)

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import DAY, Number, database_option, graph_option, payload_com_option, payload_mass_option, say
+from irtwin.cli.options import (
+    DAY,
+    Number,
+    database_option,
+    graph_option,
+    payload_com_option,
+    payload_mass_option,
+    say,
+    speech,
+)
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -208,7 +217,8 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     motion.write_csv(out)
     _say_unchecked(checks_itself)
     ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
-    click.echo(f"\n{ended}This is the best motion so far." if ended else "", err=True)
+    if ended or not speech.quiet:
+        click.echo(f"\n{ended}This is the best motion so far." if ended else "", err=True)
     click.echo(
         f"{out}: condition number {motion.condition_number:.1f}, "
         f"{motion.limit_margin:.1%} margin to the joint limits, "
@@ -238,6 +248,8 @@ def _excitation_progress() -> Callable[[int, float, float], None]:
     shown = [-5.0]
 
     def progress(iteration: int, condition: float, elapsed: float) -> None:
+        if speech.quiet:
+            return
         line = f"{elapsed:5.0f} s  step {iteration:4d}  condition number {condition:8.1f}"
         if sys.stderr.isatty():
             click.echo(f"\r{line}", err=True, nl=False)

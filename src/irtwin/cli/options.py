@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,17 @@ payload_com_option = click.option(
 )
 
 
+@dataclass
+class Speech:
+    """How much is said beside results: `quiet` leaves out progress, `verbose` adds how a mistake came about."""
+
+    quiet: bool = False
+    verbose: bool = False
+
+
+speech = Speech()
+
+
 def say(line: str) -> None:
     """Write one line to standard error."""
     click.echo(printable(line), err=True)
@@ -62,3 +74,33 @@ def say(line: str) -> None:
 def printable(line: str) -> str:
     """Return a line without what breaks lines or steers a terminal: names that were read may hold it."""
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
+
+
+def announce(line: str) -> None:
+    """Say what a command is about to do, unless it is to be quiet."""
+    if not speech.quiet:
+        say(line)
+
+
+def add_speech(command: click.Command) -> None:
+    """Give a command, or each command of a group, the options --quiet and --verbose."""
+    if isinstance(command, click.Group):
+        for each in command.commands.values():
+            add_speech(each)
+        return
+    command.params += [
+        click.Option(
+            ["-q", "--quiet"], is_flag=True, expose_value=False, callback=_set, help="Say results and mistakes alone."
+        ),
+        click.Option(
+            ["-v", "--verbose"],
+            is_flag=True,
+            expose_value=False,
+            callback=_set,
+            help="With a mistake, say where it was noticed.",
+        ),
+    ]
+
+
+def _set(context: click.Context, option: click.Parameter, value: bool) -> None:
+    setattr(speech, str(option.name), value)

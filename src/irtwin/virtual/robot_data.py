@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -94,9 +93,6 @@ def asset(name: str) -> Markup:
 
 @cache
 def viewer_script() -> Markup:
-    """Return MeshCat's bundle, which holds three.js. The Python package is not imported: that would start ZeroMQ."""
-    package = find_spec("meshcat")
-    if package is None or package.origin is None:
-        raise ModuleNotFoundError("meshcat is not installed")
-    bundle = Path(package.origin).parent / "viewer" / "dist" / "main.min.js"
-    return Markup(bundle.read_text(encoding="utf-8"))
+    """Return MeshCat's bundle, which holds three.js."""
+    packed = files("irtwin.virtual").joinpath("meshcat.min.js.gz").read_bytes()
+    return Markup(gzip.decompress(packed).decode("utf-8"))

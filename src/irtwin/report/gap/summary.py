@@ -1,0 +1,70 @@
+"""A diagnosis in two tables, for the terminal: the gap before and after its causes are added, and these causes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from irtwin.gap.document.document import Document
+from irtwin.knowledge.store.table import Row, Table
+
+_DIGITS = 3  # significant ones: more than any interval leaves sure
+
+
+def gap(diagnosis: Document) -> Table:
+    """Return the gap on runs outside the fit: torque and power as RMSE, energy as its error."""
+    changes = (
+        ("torque (RMSE)", diagnosis.shrink.torque_rmse, "N m"),  # of joints that slide, N
+        ("power (RMSE)", diagnosis.shrink.power_rmse, "W"),
+        ("energy (error)", diagnosis.shrink.energy_error_percent, "%"),
+    )
+    rows: list[Row] = [
+        {
+            "gap": name,
+            "before": _short(one.before),
+            "after": _short(one.after),
+            "noise floor": None if one.noise_floor is None else _short(one.noise_floor),
+            "unit": unit,
+        }
+        for name, one, unit in changes
+        if one is not None
+    ]
+    return Table(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
+
+
+def causes(diagnosis: Document) -> Table:
+    """Return each cause with its confidence and its parameters, these with their 95 % intervals."""
+    columns = ("cause", "joints", "sure, %", "parameter", "value", "95 % from", "to", "unit")
+    return Table(columns, tuple(_rows_of_causes(diagnosis)))
+
+
+def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
+    for cause in diagnosis.causes:
+        first: Row = {
+            "cause": cause.effect.replace("_", " "),
+            "joints": ", ".join(cause.joints) or "whole robot",
+            "sure, %": round(100 * cause.confidence),
+        }
+        nothing = dict.fromkeys(("parameter", "value", "95 % from", "to", "unit"))
+        if not cause.parameters:
+            yield first | nothing
+        for one in cause.parameters:
+            lower, upper = one.interval95 or (None, None)
+            yield first | {
+                "parameter": f"{one.name} of {one.joint}" if one.joint and len(cause.joints) > 1 else one.name,
+                "value": _short(one.value),
+                "95 % from": None if lower is None else _short(lower),
+                "to": None if upper is None else _short(upper),
+                "unit": "" if one.unit == "1" else one.unit,
+            }
+            first = dict.fromkeys(first)  # said once
+
+
+def next_steps(diagnosis: Document) -> list[str]:
+    """Return what to log next, a line for each motion."""
+    return [
+        f"To log next: {motion}" for motion in (diagnosis.next_experiment.motions if diagnosis.next_experiment else ())
+    ]
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")

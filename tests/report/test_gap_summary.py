@@ -1,0 +1,40 @@
+"""The tables that the terminal shows of a diagnosis."""
+
+from __future__ import annotations
+
+import pytest
+from tests import gap_cases
+
+from irtwin.report.gap import summary
+
+
+def test_the_gap_stands_before_and_after_with_its_unit():
+    diagnosis = gap_cases.document("attributed")
+    rows = summary.gap(diagnosis).rows
+    assert [(row["gap"], row["unit"]) for row in rows][:2] == [("torque (RMSE)", "N m"), ("power (RMSE)", "W")]
+    change = diagnosis.shrink.torque_rmse
+    assert change is not None
+    assert rows[0]["before"] == pytest.approx(change.before, rel=0.01)
+    assert rows[0]["after"] == pytest.approx(change.after, rel=0.01)
+
+
+def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
+    rows = summary.causes(gap_cases.document("attributed")).rows
+    assert [(row["cause"], row["joints"], row["sure, %"]) for row in rows if row["cause"]] == [
+        ("viscous friction", "joint_a3", 70),
+        ("stribeck friction", "joint_a3", 96),
+    ]
+    assert (rows[0]["parameter"], rows[0]["value"], rows[0]["95 % from"], rows[0]["to"], rows[0]["unit"]) == (
+        ("Fs", 1.82, 1.6, 2.04, "Nm")
+    )
+    assert rows[1] == {**dict.fromkeys(rows[1]), "parameter": "d", "value": 1.0, "unit": ""}
+
+
+@pytest.mark.parametrize("verdict", ["no_gap", "unexplained"])
+def test_where_nothing_is_to_blame_there_is_no_table_of_causes(verdict):
+    assert not summary.causes(gap_cases.document(verdict))
+
+
+def test_what_to_log_next_has_a_line_each():
+    assert all(line.startswith("To log next: ") for line in summary.next_steps(gap_cases.document("ambiguous")))
+    assert summary.next_steps(gap_cases.document("no_gap")) == []
