@@ -10,7 +10,7 @@ from io import TextIOWrapper
 import click
 
 from irtwin import __version__
-from irtwin.cli import graph, motion, robot, service, twin, upkeep
+from irtwin.cli import alarms, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import say
 from irtwin.errors import InputError
 
@@ -56,7 +56,7 @@ for command in (
     *(twin.check, twin.run, twin.demo, twin.case_study, twin.diagnose, twin.adopt, twin.improve),
     *(motion.plan, motion.predict, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
-    *(service.serve, service.live),
+    *(service.serve, service.live, alarms.alarms),
     *(upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
     robot.robot,
 ):
