@@ -141,7 +141,7 @@ def test_what_is_missing_is_said(
 
 def test_a_run_without_energy_does_not_hide_the_others(graph: KnowledgeGraph, page_of: PageOf):
     factory = Factory("R", "R").robot().run("known").run("unknown").twin(["known"], []).into(graph)
-    assert re.search(r"8.82 kJ</b>\s*<span>energy taken</span>\s*<small>2 runs, 40.0 s", text(page_of(factory)))
+    assert re.search(r"2.45 Wh</b>\s*<span>energy taken</span>\s*<small>2 runs, 40.0 s", text(page_of(factory)))
 
 
 def test_a_robot_without_twin_or_runs_has_a_page(graph: KnowledgeGraph, page_of: PageOf):

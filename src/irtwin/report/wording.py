@@ -14,6 +14,7 @@ _SPACE = "\N{NO-BREAK SPACE}"  # between a number and its unit
 _THIN = "\N{NARROW NO-BREAK SPACE}"  # between thousands
 _MINUS = "\N{MINUS SIGN}"
 _POWER = re.compile(r"\^(-?\d+)")
+_LEAST_SHARE = 0.1  # per cent
 _ENERGY_UNITS = ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"))
 
 
@@ -56,10 +57,12 @@ def percent(value: float | None, digits: int = 2) -> str:
 
 
 def share(value: float | None) -> str:
-    """Write a share of 0 to 1 in per cent, without claiming 100 % short of it."""
+    """Write a share of 0 to 1 in per cent, without claiming 100 % short of it, or digits that nobody can use."""
     if value is None:
         return NONE
     hundredths = 100.0 * value
+    if 0 < hundredths < _LEAST_SHARE:
+        return f"less than {_LEAST_SHARE:g}{_SPACE}%"
     return quantity(hundredths, "%", 3 if 99.0 < hundredths < 99.95 else 2)
 
 
@@ -73,6 +76,14 @@ def energy(value: float | None, digits: int = 3) -> str:
     """Write an energy (J) in the unit that suits it."""
     size, unit = energy_unit([value])
     return NONE if value is None else quantity(value / size, unit, digits)
+
+
+def kilowatt_hours(joules: float | None, digits: int = 3) -> str:
+    """Write an energy (J) as a bill does: in kWh, in Wh below a tenth of one."""
+    if joules is None:
+        return NONE
+    hours = joules / 3.6e6
+    return quantity(hours, "kWh", digits) if abs(hours) >= 0.1 else quantity(1000 * hours, "Wh", digits)
 
 
 def duration(seconds: float | None) -> str:

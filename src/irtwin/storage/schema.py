@@ -62,7 +62,7 @@ class Robot(Base):
     arm_movement_type: Mapped[str | None]
     rated_payload_kg: Mapped[float | None]
     ambient_temperature_degc: Mapped[float | None]
-    power_measured_at: Mapped[str]
+    power_measured_at: Mapped[str | None]  # none where nobody said
     simulated: Mapped[bool]
     urdf: Mapped[str]
     urdf_sha256: Mapped[str]

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.packing import Fragment, embedded_json, packed_scripts
+from irtwin.packing import Fragment, packed_scripts
 from irtwin.report.case_study.figures import figures
-from irtwin.report.energy.page import DrawScene, content_policy, environment
+from irtwin.report.energy.page import DrawScene, content_policy, environment, page_data, plotly
 from irtwin.report.explorer import Columns, ReadSeries
 from irtwin.report.questions import Answers, Graph, ask, read_questions
 from irtwin.storage.files import write
@@ -48,7 +47,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
     drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
     scripts = packed_scripts(
         [
-            get_plotlyjs(),
+            plotly(),
             (folder / "layout" / "figures.js").read_text(encoding="utf-8"),
             (folder / "case_study" / "configurations.js").read_text(encoding="utf-8"),
         ]
@@ -65,7 +64,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
         seed_measured=SEED_MEASURED,
         seed_error=SEED_ERROR,
         scene=scene.html,
-        data=embedded_json({"figures": drawn, "explorer": None}),
+        data=page_data(drawn),
         style=Markup("\n".join(style.read_text(encoding="utf-8") for style in styles)),
         scripts=scripts.html,
         policy=content_policy([*scripts.scripts, *scene.scripts]),

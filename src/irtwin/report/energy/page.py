@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
@@ -11,15 +12,14 @@ from typing import Any
 
 import jinja2
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.packing import Fragment, embedded_json, packed_scripts
-from irtwin.report import wording
-from irtwin.report.energy import tables, verdict
-from irtwin.report.energy.figures import figures
+from irtwin.report import colours, wording
+from irtwin.report.energy import lead, tables, verdict
+from irtwin.report.energy.figures import Figure, figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.questions import Answers, Graph, Question, ask, read_questions
 from irtwin.storage.files import write
@@ -80,7 +80,11 @@ def _page(
         answers=answers,
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
-        verdict=verdict.sentence(answers),
+        taken=lead.taken(answers),
+        could_save=lead.could_save(answers),
+        saving=lead.saving(answers),
+        trust=lead.trust(answers),
+        constant=lead.constant_power(answers),
         torque=verdict.torque(answers),
         energy=verdict.energy(answers),
         seed_error=verdict.SEED_ENERGY_ERROR,
@@ -91,7 +95,7 @@ def _page(
         java=HOW_TO_GET.replace("`", ""),
         drawn=drawn,
         curves=curves,
-        data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),
+        data=page_data({name: figure for name, figure in drawn.items() if figure}, curves),
         scene=None if scene is None else scene.html,
         style=Markup((folder / "layout" / "style.css").read_text(encoding="utf-8")),
         scripts=scripts.html,
@@ -102,7 +106,19 @@ def _page(
 def figure_scripts() -> Fragment:
     """Return the scripts that draw a page's figures."""
     drawing = resources.folder("reports") / "layout" / "figures.js"
-    return packed_scripts([get_plotlyjs(), drawing.read_text(encoding="utf-8")])
+    return packed_scripts([plotly(), drawing.read_text(encoding="utf-8")])
+
+
+def page_data(drawn: Mapping[str, Figure], curves: Mapping[str, Any] | None = None) -> Markup:
+    """Return what a page's figures are drawn from: themselves, packed curves of runs, and the colours of lines."""
+    return embedded_json({"figures": drawn, "explorer": curves, "colours": colours.of_lines()})
+
+
+@cache
+def plotly() -> str:
+    """Return the part of Plotly that pages draw with: bars, lines and maps."""
+    packed = resources.folder("reports") / "layout" / "plotly-cartesian.min.js.gz"
+    return gzip.decompress(packed.read_bytes()).decode()
 
 
 def content_policy(scripts: Iterable[str]) -> str:
@@ -133,6 +149,7 @@ def environment(folder: Path) -> jinja2.Environment:
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
         wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
         wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
+        wording.kilowatt_hours, tables.is_unsure,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment
