@@ -57,13 +57,18 @@ def percent(value: float | None, digits: int = 2) -> str:
 
 
 def share(value: float | None) -> str:
-    """Write a share of 0 to 1 in per cent, without claiming 100 % short of it, or digits that nobody can use."""
+    """Write a share of 0 to 1 in per cent, without claiming 100 % short of it."""
     if value is None:
         return NONE
     hundredths = 100.0 * value
-    if 0 < hundredths < _LEAST_SHARE:
-        return f"less than {_LEAST_SHARE:g}{_SPACE}%"
     return quantity(hundredths, "%", 3 if 99.0 < hundredths < 99.95 else 2)
+
+
+def part(value: float | None) -> str:
+    """Write a share as a sentence does, in which digits of next to nothing are of no use."""
+    if value is not None and 0 < 100 * value < _LEAST_SHARE:
+        return f"less than {_LEAST_SHARE:g}{_SPACE}%"
+    return share(value)
 
 
 def energy_unit(values: Iterable[float | None]) -> tuple[float, str]:
