@@ -106,7 +106,7 @@ def browser() -> Iterator[Any]:
 @pytest.mark.system
 def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any) -> None:
     file = done[1] / "reports" / "case_study.html"
-    assert file.stat().st_size < 6_000_000
+    assert file.stat().st_size < 3_000_000
     page = browser.new_page(viewport={"width": 400, "height": 900})
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text))
@@ -116,7 +116,7 @@ def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any
     page.wait_for_function("document.querySelector('.pose[data-at=last] img').src")
     first, last = (page.get_attribute(f".pose[data-at={at}] img", "src") for at in ("first", "last"))
     assert first and last and first != last
-    assert page.locator("#figure-power .scatterlayer .trace").count() == 3
+    assert page.locator("#figure-power .scatterlayer .trace").count() == 4
     assert page.locator(".is-run option").all_inner_texts() == [case_study.PLANNED, case_study.MEASURED]
     page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time: 1e9}}))")
     (row,) = ask("planned_against_measured", done[1]).rows

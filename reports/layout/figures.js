@@ -2,21 +2,31 @@
 // Draws the page's figures from the data that it carries. Nothing is fetched.
 (function () {
   const page = JSON.parse(document.getElementById("page-data").textContent);
-  const INK = "#1c2733", SOFT = "#56636f", LINE = "#e3e8ec";
-  const MEASURED = "#5f6d7a", MODELLED = "#d55e00", HELD_OUT = "#0072b2";
+  const COLOURS = page.colours;
+  const DARK = matchMedia("(prefers-color-scheme: dark)"), root = getComputedStyle(document.documentElement);
+  const LIGHT = { ink: "#1c2733", soft: "#56636f", line: "#e3e8ec", axis: "#9aa5af", paper: "#ffffff" };
+  let theme = LIGHT;
   const FONT = getComputedStyle(document.body).fontFamily;
   const PAPER_WIDTH = 680; // CSS pixels between the margins of an A4 page
-  const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  // A chart leaves the page as a picture that its reader saves, and in no other way.
+  const BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]];
+  const CONFIG = { displaylogo: false, responsive: true, showSendToCloud: false, showEditInChartStudio: false, modeBarButtons: BUTTONS };
+
+  function chooseTheme(forPaper) {
+    const of = (name) => root.getPropertyValue("--" + name).trim();
+    theme = forPaper || !DARK.matches ? LIGHT : { ink: of("ink"), soft: of("soft"), line: of("line"), axis: of("faint"), paper: of("paper") };
+  }
 
   function base(extra) {
-    const axis = { gridcolor: LINE, zerolinecolor: "#9aa5af", linecolor: "#9aa5af", automargin: true, title: { standoff: 8 } };
+    const axis = { gridcolor: theme.line, zerolinecolor: theme.axis, linecolor: theme.axis, automargin: true, title: { standoff: 8 } };
     const layout = {
-      font: { family: FONT, size: 12, color: INK }, paper_bgcolor: "#fff", plot_bgcolor: "#fff",
+      font: { family: FONT, size: 12, color: theme.ink }, paper_bgcolor: theme.paper, plot_bgcolor: theme.paper,
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.axis, activecolor: theme.ink },
       margin: { l: 56, r: 12, t: 30, b: 40 }, hovermode: "x unified",
-      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", xanchor: "left", font: { color: SOFT } },
+      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", xanchor: "left", font: { color: theme.soft } },
     };
     Object.assign(layout, extra);
-    layout.xaxis = Object.assign({ type: "category" }, axis, { gridcolor: "#fff" }, extra.xaxis);
+    layout.xaxis = Object.assign({ type: "category" }, axis, { gridcolor: theme.paper }, extra.xaxis);
     layout.yaxis = Object.assign({}, axis, extra.yaxis);
     return layout;
   }
@@ -33,13 +43,18 @@
 
   function curves(chart, unit, suffix, legend) {
     const x = values(chart.time), traces = [];
-    const add = (name, packed, colour, width) => traces.push({
-      type: "scatter", mode: "lines", name: name, x: x, y: values(packed), line: { color: colour, width: width },
+    const add = (name, packed, colour, width, y) => traces.push({
+      type: "scatter", mode: "lines", name: name, x: x, y: y || values(packed), line: { color: colour, width: width },
       xaxis: "x" + suffix, yaxis: "y" + suffix, legendgroup: name, showlegend: legend,
       hovertemplate: name + ": %{y:.4~g} " + unit + "<extra></extra>",
     });
-    if (chart.measured) add("measured", chart.measured, MEASURED, 1.5);
-    add("modelled", chart.modelled, MODELLED, 1.5);
+    if (chart.measured) add("measured", chart.measured, COLOURS.measured, 1.5);
+    add("modelled", chart.modelled, COLOURS.modelled, 1.5);
+    if (chart.measured) {
+      const [measured, modelled] = traces.map((trace) => trace.y);
+      const left = measured.map((value, i) => (value === null || modelled[i] === null ? null : value - modelled[i]));
+      add("measured less modelled", null, COLOURS.residual, 1, left);
+    }
     return traces;
   }
 
@@ -57,19 +72,19 @@
       const left = column * (width + gapX), top = 1 - row * (panelHeight + gapY);
       const last = index + columns >= charts.length;
       layout["xaxis" + suffix] = {
-        domain: [left, left + width], anchor: "y" + suffix, matches: index ? "x" : undefined, gridcolor: LINE, zeroline: false,
-        showticklabels: last, title: last ? { text: "time since the run began, s", font: { size: 11, color: SOFT }, standoff: 6 } : undefined,
+        domain: [left, left + width], anchor: "y" + suffix, matches: index ? "x" : undefined, gridcolor: theme.line, zeroline: false,
+        showticklabels: last, title: last ? { text: "time since the run began, s", font: { size: 11, color: theme.soft }, standoff: 6 } : undefined,
       };
       layout["yaxis" + suffix] = {
-        domain: [top - panelHeight, top], anchor: "x" + suffix, gridcolor: LINE, zerolinecolor: "#b4bec6", nticks: 5, fixedrange: false,
+        domain: [top - panelHeight, top], anchor: "x" + suffix, gridcolor: theme.line, zerolinecolor: theme.axis, nticks: 5, fixedrange: false,
       };
       layout.annotations.push({
         text: "<b>" + plain(chart.title) + "</b>, " + chart.unit, x: left, xref: "paper", xanchor: "left", y: top, yref: "paper", yanchor: "bottom",
-        showarrow: false, font: { size: 12, color: INK },
+        showarrow: false, font: { size: 12, color: theme.ink },
       });
       heldOut.forEach((span) => layout.shapes.push({
         type: "rect", xref: "x" + suffix, yref: "y" + suffix + " domain", x0: span[0], x1: span[1], y0: 0, y1: 1,
-        fillcolor: HELD_OUT, opacity: 0.07, line: { width: 0 }, layer: "below",
+        fillcolor: COLOURS.held_out, opacity: theme === LIGHT ? 0.07 : 0.18, line: { width: 0 }, layer: "below",
       }));
       data.push.apply(data, curves(chart, chart.unit, suffix, index === 0));
     });
@@ -149,28 +164,35 @@
     follow(second, first);
   }
 
-  function drawAll() {
+  function drawAll(forPaper) {
+    chooseTheme(forPaper);
     for (const holder of document.querySelectorAll("[data-figure]")) {
       const figure = page.figures[holder.dataset.figure];
       const several = figure.data.length > 1, bars = new Set(figure.data.flatMap((trace) => trace.x)).size;
       const layout = base(Object.assign({ showlegend: several, bargap: Math.max(0.3, 1 - 0.14 * bars) }, figure.layout));
       if (!several) layout.margin.t = 8;
       if (bars > 8 && layout.xaxis.type === "category") layout.xaxis.tickangle = -35;
-      Plotly.newPlot(holder, figure.data, layout, CONFIG);
+      Plotly.react(holder, figure.data, layout, CONFIG);
     }
+    if (page.explorer) drawRun(Number(document.getElementById("run-choice").value));
+  }
+
+  function begin() {
+    drawAll(false);
+    DARK.addEventListener("change", () => drawAll(false));
     if (!page.explorer) return;
     const choice = document.getElementById("run-choice");
-    drawRun(Number(choice.value));
     choice.addEventListener("change", () => drawRun(Number(choice.value)));
     link(document.getElementById("figure-torque"), document.getElementById("figure-power"));
     if (document.querySelector(".scene")) followScene(choice);
   }
 
-  // On paper a chart is as wide as the page, and closed tables stand open.
+  // On paper a chart is as wide as the page and dark on white, and closed tables stand open.
   function forPaper(yes) {
     for (const long of document.querySelectorAll("details.long")) {
       if (yes) { long.dataset.was = long.open; long.open = true; } else long.open = long.dataset.was === "true";
     }
+    if (DARK.matches) drawAll(yes);
     for (const plot of document.querySelectorAll(".js-plotly-plot")) {
       if (yes) plot.dataset.height = plot._fullLayout.height;
       const height = Number(plot.dataset.height);
@@ -192,7 +214,7 @@
     document.querySelectorAll("main > section, main > header").forEach((section) => mark.observe(section));
   }
 
-  drawAll();
+  begin();
   followSections();
   window.addEventListener("beforeprint", () => forPaper(true));
   window.addEventListener("afterprint", () => forPaper(false));

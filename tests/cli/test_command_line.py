@@ -18,7 +18,7 @@ from irtwin.workflow import unpack_demo
 pytestmark = pytest.mark.slow
 
 PHYSICS = ("scipy", "pinocchio", "coal", "duckdb", "pyarrow")
-HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "plotly", "owlready2", "pyarrow")
+HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "owlready2", "pyarrow")
 
 
 def irtwin(*arguments: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:

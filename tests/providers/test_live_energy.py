@@ -16,6 +16,7 @@ from tests import small_robots, synthetic
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
+from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.rules import graph_of
 from irtwin.knowledge.shacl.validation import validate
@@ -158,6 +159,20 @@ def test_a_gap_that_lasts_raises_one_alarm_and_clears_it(
     found = graph.triples(graph_of(RULE))
     reason(graph)
     assert graph.triples(graph_of(RULE)) == found  # what was raised live is what the rules conclude of the whole graph
+    assert validate(graph) == ()
+
+
+def test_a_run_that_the_twin_misses_raises_an_alarm_when_it_ends(place: Workspace, graph: KnowledgeGraph) -> None:
+    metered = replace((run := log()).signals, power=run.signals.power + 500.0)
+    with LiveTwin(place, graph) as twin:
+        for state in states(replace(run, signals=metered)):
+            twin.receive(state)
+    (alarm,) = (row for row in ask(graph, "alarms") if row["rule"] == "twin_alarm")
+    assert (alarm["state"], alarm["since"].timestamp()) == ("active", NOON)
+    assert alarm["reason"].startswith("the twin misses the energy of this run by ")
+    found = graph.triples(graph_of(RULE.replace("gap_alarm", "twin_alarm")))
+    reason(graph)
+    assert graph.triples(graph_of(RULE.replace("gap_alarm", "twin_alarm"))) == found
     assert validate(graph) == ()
 
 

@@ -85,14 +85,14 @@ def test_at_most_three_are_named_and_the_rest_is_counted() -> None:
     told = said("ambiguous", *many, finding(**LITTLE), finding(channel="power", **LITTLE))
     assert "joint_3" in told and "joint_4" not in told
     assert told.endswith(
-        "Not named here: 3 findings together close 20 % of the gap in torque and 1 finding closes 0.040 % of the gap "
-        "in power."
+        "Not named here: 3 findings together close 20 % of the gap in torque and 1 finding closes less than 0.1 % "
+        "of the gap in power."
     )
 
 
 def test_what_closes_nothing_is_no_gap_and_named_nowhere() -> None:
     assert said("no_gap", finding("environment", **LITTLE)) == (
-        "There is no gap that matters: 1 finding closes 0.040 % of the gap in torque."
+        "There is no gap that matters: 1 finding closes less than 0.1 % of the gap in torque."
     )
     assert said("no_gap") == "There is no gap: the twin explains the data down to the noise floor."
 

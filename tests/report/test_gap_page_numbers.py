@@ -26,7 +26,8 @@ pytestmark = pytest.mark.slow
 
 NUMBER = re.compile(r"−?\d[\d\u202f]*(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 CELLS = re.compile(
-    r'<(td class="number"|small|dd|b|span class="badge[^"]*"|p class="hint")>(.*?)</(?:td|dd|b|span|p|small)>'
+    r'<(td class="number(?: unsure)?"|small|dd|b|span class="badge[^"]*"|p class="hint")>'
+    r"(.*?)</(?:td|dd|b|span|p|small)>"
 )
 WORDS = {
     "95",  # % of an interval
@@ -148,7 +149,7 @@ def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     for part, confidence, share, value in ((parts[0], "72 %", "65 %", "6.50"), (parts[1], "61 %", "35 %", "3.50")):
         assert f"confidence {confidence}" in part
         assert f"{share} of the closed gap" in part
-        assert f'<td class="number">{value}</td>' in part
+        assert f'<td class="number unsure">{value}</td>' in part  # without an interval
         assert f"<dd>{10 * float(value):.1f}</dd>" in part
     drawn = figures_of(tmp_path / "p.html")
     alone, without = drawn["by_cause"]["data"]

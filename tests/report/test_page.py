@@ -66,12 +66,12 @@ def time_range(page: Page, figure: str) -> list[float]:
 def test_every_figure_is_drawn(page: Page):
     for plot in page.locator(".plot").all():
         assert plot.locator(".plot-container").count() == 1
-    assert page.locator("#figure-torque .scatterlayer .trace").count() == 12
-    assert page.locator("#figure-power .scatterlayer .trace").count() == 4
+    assert page.locator("#figure-torque .scatterlayer .trace").count() == 18
+    assert page.locator("#figure-power .scatterlayer .trace").count() == 6
 
 
 def test_the_file_is_small(file: Path):
-    assert file.stat().st_size < 4e6
+    assert file.stat().st_size < 3e6
 
 
 def test_the_scenes_script_may_run(page: Page):

@@ -1,15 +1,17 @@
+import html
 import re
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from markupsafe import Markup
-from pyoxigraph import NamedNode, Triple
+from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests.report.robots import Factory, PageOf, power_only, six_axis
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
 from irtwin.packing import Fragment
 from irtwin.report.energy.page import content_policy, render
 
@@ -141,7 +143,7 @@ def test_what_is_missing_is_said(
 
 def test_a_run_without_energy_does_not_hide_the_others(graph: KnowledgeGraph, page_of: PageOf):
     factory = Factory("R", "R").robot().run("known").run("unknown").twin(["known"], []).into(graph)
-    assert re.search(r"8.82 kJ</b>\s*<span>energy taken</span>\s*<small>2 runs, 40.0 s", text(page_of(factory)))
+    assert re.search(r"2.45 Wh</b>\s*<span>energy taken</span>\s*<small>2 runs, 40.0 s", text(page_of(factory)))
 
 
 def test_a_robot_without_twin_or_runs_has_a_page(graph: KnowledgeGraph, page_of: PageOf):
@@ -182,3 +184,18 @@ def test_an_unknown_robot_is_the_users_mistake(graph: KnowledgeGraph, tmp_path: 
     with pytest.raises(InputError, match="this robot is not in the graph"):
         render(graph, "https://w3id.org/irtwin/id/robot/none", lambda path, checksum: None, tmp_path / "x.html")  # type: ignore[arg-type, return-value]
     assert not (tmp_path / "x.html").exists()
+
+
+def test_a_robot_that_contradicts_itself_is_said_on_its_page_alone(graph: KnowledgeGraph, page_of: PageOf):
+    other = Factory("B", "B").robot().run("a").into(graph)
+    wrong = Factory("A", "A").robot().run("a").into(graph)
+    why = "prp-fp: two values of irt:IR_Weight, <50> and <60>"
+    triple = Triple(NamedNode(wrong.iri), NamedNode(term("Contradiction")), Literal(why))
+    graph.replace([Quad(*triple, NamedNode(GRAPH_REASONED))], GRAPH_REASONED)
+    page = page_of(wrong)
+    (banner,) = re.findall(r'<p class="banner" id="contradiction">(.*?)</p>', page, re.DOTALL)
+    said = html.unescape(re.sub("<[^>]*>", "", banner))
+    assert said == (
+        f"Nothing is concluded of this robot: {why}. Correct what was said of it, and run the data set again."
+    )
+    assert 'id="contradiction"' not in page_of(other)

@@ -10,7 +10,7 @@ def test_joint_parameters_make_a_matrix_and_the_rest_lists(graph: KnowledgeGraph
     assert [line.name for line in parameters.per_joint] == ["Fc", "Fv"]
     assert list(parameters.per_joint[0].cells) == list(parameters.joints)
     assert parameters.per_joint[0].cells["joint_1"].value == "7.14"
-    assert parameters.per_joint[1].cells["joint_6"].holds_zero
+    assert parameters.per_joint[1].cells["joint_6"].unsure
     others = dict(parameters.others)
     assert [line.name for line in others["rigid-body dynamics"]][:3] == ["base_1", "base_2", "base_3"]
     assert [line.cell and line.cell.interval for line in others["standby power"]] == ["149.90 … 150.10"]

@@ -94,7 +94,7 @@ def test_a_data_set_is_understood(folder):
     assert data_set.robot.weight == 12.5
     assert data_set.robot.joints[0].gear_ratio == 50
     assert data_set.effects is None
-    assert data_set.power_at == "mains"
+    assert data_set.power_at is None  # nobody said
     assert data_set.notes["torque"] == "a note"
     one, two = data_set.runs
     assert (one.name, one.role, one.payload_mass, one.payload_com) == ("one", "observed", 1.5, (0.0, 0.0, 0.1))

@@ -11,7 +11,7 @@ from io import TextIOWrapper
 import click
 
 from irtwin import __version__
-from irtwin.cli import bring, fleet, graph, motion, robot, service, twin, upkeep
+from irtwin.cli import alarms, bring, fleet, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
 from irtwin.errors import InputError
 
@@ -67,7 +67,7 @@ for command in (
     *(twin.check, twin.run, twin.demo, twin.case_study, twin.diagnose, twin.adopt, twin.improve),
     *(motion.plan, motion.predict, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
-    *(service.serve, service.live),
+    *(service.serve, service.live, alarms.alarms),
     *(upkeep.status, upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
     robot.robot,
     fleet.fleet,

@@ -8,7 +8,7 @@ from typing import cast
 from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
 
 from irtwin.knowledge.mapping import RowMapper, refresh
-from irtwin.knowledge.shacl.rules import conclusions, graph_of, read_rules
+from irtwin.knowledge.shacl.rules import ShaclRule, conclusions, graph_of, read_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SHACL, GRAPH_SOURCE, term
 from irtwin.live.live_run import Tables, activities
@@ -28,6 +28,7 @@ class ShownRuns:
         self._documents = graph.resources.paths("mappings")
         self.mapper = RowMapper(place.engine, self._documents)
         self._rules = read_rules(graph.resources.path("rules", "live_rules.ttl"))
+        self._rules_of_runs = read_rules(graph.resources.path("rules", "rules.ttl"))  # of a run that is over
         self._beside: set[Triple] | None = None
         self._changed = False  # since the last flush
 
@@ -45,15 +46,18 @@ class ShownRuns:
         self._changed = True
 
     def mapped(self, tables: Tables) -> set[Quad]:
-        """Return the quads of rows, and of the alarms that follow from them."""
+        """Return the quads of the rows of a run that is over, and what follows from them."""
         quads = {quad for it in tables.items() for quad in self.mapper.quads(*it)}
-        return quads | self.alarms(quads)
+        return quads | self._conclusions(quads, self._rules + self._rules_of_runs)
 
     def alarms(self, quads: Iterable[Quad]) -> set[Quad]:
-        """Return what the rules of `rules/live_rules.ttl` conclude from excursions among the quads."""
+        """Return what the rules of `rules/live_rules.ttl` conclude from a run's excursions or state among the quads."""
+        return self._conclusions(quads, self._rules)
+
+    def _conclusions(self, quads: Iterable[Quad], rules: tuple[ShaclRule, ...]) -> set[Quad]:
         if self._beside is None:
             self._beside = self._graph.construct(_BESIDE)
-        found = conclusions(self._beside | {quad.triple for quad in quads}, self._rules)
+        found = conclusions(self._beside | {quad.triple for quad in quads}, rules)
         return {quad for name, triples in found.items() for quad in in_graph(triples, graph_of(name))}
 
     def refresh(self) -> None:
@@ -69,7 +73,7 @@ class ShownRuns:
               {{ VALUES ?g {{ {graphs} }} GRAPH ?g {{ ?s ?p ?o }} }} UNION
               {{ GRAPH ?g {{ {run} ?p ?o }} BIND({run} AS ?s)
                  FILTER(STRSTARTS(STR(?g), "{GRAPH_SOURCE}") && ?p != irt:has_Series) }} UNION
-              {{ GRAPH ?g {{ ?s a irt:Gap_Alarm ; irt:gap_of_Run {run} ; ?p ?o }}
+              {{ GRAPH ?g {{ ?s irt:alarm_of_Run {run} ; ?p ?o }}
                  FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }}"""
         )
         return {Quad(row["s"], row["p"], row["o"], row["g"]) for row in cast(QuerySolutions, found)}

@@ -56,7 +56,10 @@ class WatchedRun:
     alarms: AlarmNews = field(default_factory=AlarmNews)
     shown: set[Quad] | None = field(default_factory=set)
     doubted: State | None = None
+    standing_since: float | None = None  # s since 1970; None while a joint moves
     _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
+    _stood: float | None = None  # s, of which the alarms are those of `_idle`: once a second is enough
+    _idle: set[Quad] = field(default_factory=set)
 
     @classmethod
     def begun(cls, folder: Path, state: State, joints: Sequence[str], plan: str | None) -> Self:
@@ -98,8 +101,11 @@ class WatchedRun:
             self.speed = live_run.speed_of(state, before)
             self.acceleration = [(now - was) / step for now, was in zip(self.speed, speed_before, strict=True)]
         self.fastest = [max(top, abs(now)) for top, now in zip(self.fastest, self.speed, strict=True)]
+        moves = live_run.moving(self.speed, self.fastest)
+        if moves or self.standing_since is None:
+            self.standing_since = None if moves else state.time
         if before is not None:
-            frozen = self.values.take(state, before, not live_run.moving(self.speed, self.fastest))
+            frozen = self.values.take(state, before, not moves)
         self.newest = state
         self.count += 1
         self.waiting.append(state)
@@ -124,8 +130,10 @@ class WatchedRun:
                 quads = set(shown.mapper.quads(table, rows))
                 if table == "gap_excursion":
                     quads |= shown.alarms(quads) if rows else set()
+                if table == "live_state" and (stood := rows[0].get("standing_s")) != self._stood:
+                    self._stood, self._idle = stood, set() if stood is None else shown.alarms(quads)
                 self._mapped[table] = rows, quads
-        return set().union(*(quads for _, quads in self._mapped.values()))
+        return self._idle.union(*(quads for _, quads in self._mapped.values()))
 
     def work_out(self, states: Sequence[State], known: KnownTwin | None) -> list[Stretch]:
         """Work out energy and gap from the next states, as far as they go."""
@@ -136,5 +144,9 @@ class WatchedRun:
         return self.energy.feed(dict(zip(self.header.columns, rows.T, strict=True)), least=LEAST)
 
     def counts(self, waited: float) -> live_run.Values:
-        """Return what the graph says of how well it kept up."""
-        return {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}
+        """Return what the graph says of how well it kept up, and how long the robot has been at rest."""
+        said = {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}
+        if self.newest is None or self.standing_since is None:
+            return said
+        since = datetime.fromtimestamp(self.standing_since, UTC).replace(tzinfo=None)
+        return {**said, "standing_since": since, "standing_s": float(int(self.newest.time - self.standing_since))}

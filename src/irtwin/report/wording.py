@@ -14,6 +14,7 @@ _SPACE = "\N{NO-BREAK SPACE}"  # between a number and its unit
 _THIN = "\N{NARROW NO-BREAK SPACE}"  # between thousands
 _MINUS = "\N{MINUS SIGN}"
 _POWER = re.compile(r"\^(-?\d+)")
+_LEAST_SHARE = 0.1  # per cent
 _ENERGY_UNITS = ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"))
 
 
@@ -79,6 +80,13 @@ def share(value: float | None) -> str:
     return quantity(hundredths, "%", 3 if 99.0 < hundredths < 99.95 else 2)
 
 
+def part(value: float | None) -> str:
+    """Write a share as a sentence does, in which digits of next to nothing are of no use."""
+    if value is not None and 0 < 100 * value < _LEAST_SHARE:
+        return f"less than {_LEAST_SHARE:g}{_SPACE}%"
+    return share(value)
+
+
 def energy_unit(values: Iterable[float | None]) -> tuple[float, str]:
     """Return the divisor and the unit in which energies (J) of one table or figure are written."""
     largest = max((abs(value) for value in values if value is not None), default=0.0)
@@ -89,6 +97,14 @@ def energy(value: float | None, digits: int = 3) -> str:
     """Write an energy (J) in the unit that suits it."""
     size, unit = energy_unit([value])
     return NONE if value is None else quantity(value / size, unit, digits)
+
+
+def kilowatt_hours(joules: float | None, digits: int = 3) -> str:
+    """Write an energy (J) as a bill does: in kWh, in Wh below a tenth of one."""
+    if joules is None:
+        return NONE
+    hours = joules / 3.6e6
+    return quantity(hours, "kWh", digits) if abs(hours) >= 0.1 else quantity(1000 * hours, "Wh", digits)
 
 
 def duration(seconds: float | None) -> str:

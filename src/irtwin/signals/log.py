@@ -67,7 +67,7 @@ class DataSet:
     runs: tuple[Run, ...]
     effects: tuple[str, ...] | None
     ambient_temperature: float | None  # degC
-    power_at: str
+    power_at: str | None
     simulated: bool
     notes: Mapping[str, Any]
     repairs: tuple[str, ...] = ()
@@ -98,8 +98,8 @@ def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
     runs = tuple(run for run in listed if run.role != PLANNED)
     if not runs:
         raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
-    power_at = table.text("power_at", "mains")
-    if power_at not in _POWER_AT:
+    power_at = table.text("power_at")
+    if power_at is not None and power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
     Table(file, "", document).check_keys(DATA_SET_KEYS)
     urdf = table.path("urdf", folder) if "urdf" in table.values else None
@@ -161,7 +161,7 @@ def read_log(
         runs=tuple(_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)),
         effects=None,
         ambient_temperature=None,
-        power_at="mains",
+        power_at=None,
         simulated=False,
         notes={},
         repairs=tuple(dropped),

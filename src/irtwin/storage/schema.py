@@ -63,7 +63,7 @@ class Robot(Base):
     arm_movement_type: Mapped[str | None]
     rated_payload_kg: Mapped[float | None]
     ambient_temperature_degc: Mapped[float | None]
-    power_measured_at: Mapped[str]
+    power_measured_at: Mapped[str | None]  # none where nobody said
     simulated: Mapped[bool]
     urdf: Mapped[str]
     urdf_sha256: Mapped[str]
@@ -207,6 +207,8 @@ class LiveState(Base):
     state_time: Mapped[datetime]  # of the joint states that the graph shows
     superseded_states: Mapped[int | None]  # never shown, as a newer one was there; none where a crash forgot them
     waited_s: Mapped[float | None]  # that the source was made to wait for storage; likewise
+    standing_since: Mapped[datetime | None]  # none while the robot moves, and where the run is over
+    standing_s: Mapped[float | None]  # whole seconds, likewise
     stream_state: Mapped[str]  # "flowing", "stale" or "ended"
     stale_since: Mapped[datetime | None]  # by this machine's clock, as are the next: of the last good state
     stale_reason: Mapped[str | None]

@@ -342,7 +342,7 @@ def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
         f"an exciting motion of all joints, {_EXCITING:g} s",
         robot.joint_names,
         (motion,),
-        settings=Settings(command=f"irtwin excite {robot.name}.urdf --seconds {_EXCITING:g} --out motion.csv"),
+        settings=Settings(command=f"irtwin excite URDF --seconds {_EXCITING:g} --out motion.csv"),
     )
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.report.energy.figures import MEASURED, MODELLED, PALETTE, Figure, plain
+from irtwin.report.colours import HELD_OUT, MEASURED, MODELLED, PALETTE, RESIDUAL
+from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.explorer import Columns
 from irtwin.report.questions import Row
 from irtwin.signals.channels import CHANNELS
 
 _TIME = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
-_ACCENT = "#0b5a8c"
 
 
 def figures(plan: Columns, run: Columns, joints: Sequence[Row]) -> dict[str, Figure]:
@@ -42,7 +42,8 @@ def _compared(plan: Columns, run: Columns, name: str, title: str, unit: str) -> 
     data = [
         _line("measured", run, run[name], unit, MEASURED),
         _line("modelled, along the measured motion", run, run[f"{name}_model"], unit, MODELLED),
-        _line("planned, before it moved", plan, plan[f"{name}_model"], unit, _ACCENT, dash="dot"),
+        _line("measured less modelled", run, run[name] - run[f"{name}_model"], unit, RESIDUAL),
+        _line("planned, before it moved", plan, plan[f"{name}_model"], unit, HELD_OUT, dash="dot"),
     ]
     axis = {"title": {"text": f"{title}, {unit}"}, "rangemode": "tozero"}
     return {"data": data, "layout": {"xaxis": _TIME, "yaxis": axis}}

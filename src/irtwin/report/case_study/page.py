@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from irtwin.errors import InputError
-from irtwin.packing import Fragment, embedded_json, packed_scripts
+from irtwin.packing import Fragment, packed_scripts
 from irtwin.report.case_study.figures import figures
-from irtwin.report.energy.page import DrawScene, content_policy, style, written
+from irtwin.report.energy.page import DrawScene, content_policy, page_data, plotly, style, written
 from irtwin.report.explorer import Columns, ReadSeries
 from irtwin.report.questions import Answers, Graph, ask, questions_of
 from irtwin.resources import folder, shipped
@@ -47,7 +46,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
     drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
     scripts = packed_scripts(
         [
-            get_plotlyjs(),
+            plotly(),
             (folder("reports") / "layout" / "figures.js").read_text(encoding="utf-8"),
             (folder("reports") / "case_study" / "configurations.js").read_text(encoding="utf-8"),
         ]
@@ -65,7 +64,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
         seed_measured=SEED_MEASURED,
         seed_error=SEED_ERROR,
         scene=scene.html,
-        data=embedded_json({"figures": drawn, "explorer": None}),
+        data=page_data(drawn),
         style=Markup("\n").join([style(shipped()), style(shipped(), "case_study/style.css")]),
         scripts=scripts.html,
         policy=content_policy([*scripts.scripts, *scene.scripts]),

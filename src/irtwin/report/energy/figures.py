@@ -8,14 +8,12 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from irtwin.report import wording
+from irtwin.report.colours import LIMIT, MEASURED, MODELLED, PALETTE, effect_colour
 from irtwin.report.energy.verdict import SEED_ENERGY_ERROR
 from irtwin.report.questions import Answer, Answers, Row
 
 Figure = dict[str, Any]  # {"data": [...], "layout": {...}}
 
-# Okabe and Ito's palette, told apart with every kind of colour blindness; yellow last, it is weak on white.
-PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#7F8C99", "#F0E442")
-MEASURED, MODELLED = "#5F6D7A", "#D55E00"
 ROBOT_WIDE = "whole robot"
 
 
@@ -75,7 +73,7 @@ def energy_error(answer: Answer) -> Figure | None:
     lines = lines if any(row["error_percent"] < 0 for row in rows) else lines[:1]
     seed = {
         "x": 0.005, "xref": "paper", "xanchor": "left", "y": SEED_ENERGY_ERROR, "yanchor": "bottom", "showarrow": False,
-        "text": f"seed paper: {SEED_ENERGY_ERROR} %", "font": {"color": "#8C2D04"}, "bgcolor": "rgba(255,255,255,0.85)",
+        "text": f"seed paper: {SEED_ENERGY_ERROR} %", "font": {"color": LIMIT},
     }  # fmt: skip
     layout = {"barmode": "overlay", "xaxis": order, "yaxis": _axis("energy error", "%"),
               "shapes": lines, "annotations": [seed]}  # fmt: skip
@@ -143,7 +141,7 @@ def _bars(name: str, x: Sequence[Any], y: Sequence[Any], unit: str, colour: str)
 
 
 def _level(value: float) -> dict[str, Any]:
-    line = {"color": "#8C2D04", "width": 1.5, "dash": "dash"}
+    line = {"color": LIMIT, "width": 1.5, "dash": "dash"}
     return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value, "line": line}
 
 
@@ -174,9 +172,12 @@ def _by_effect(row: Row) -> str:
 def _effect_colours(answers: Answers) -> dict[str, str]:
     """Return a colour for each effect's label, that which takes the most energy first."""
     taken: dict[str, float] = {}
+    colours: dict[str, str] = {}
     for row in answers["energy_per_effect"].rows:
-        taken[_by_effect(row)] = taken.get(_by_effect(row), 0.0) + row["energy_j"]
-    return _palette(sorted(taken, key=lambda label: taken[label], reverse=True))
+        label = _by_effect(row)
+        taken[label] = taken.get(label, 0.0) + row["energy_j"]
+        colours[label] = effect_colour(wording.local_name(row["effect"]))
+    return {label: colours[label] for label in sorted(taken, key=lambda label: taken[label], reverse=True)}
 
 
 def _palette(names: Iterable[str]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
@@ -12,14 +13,13 @@ from typing import Any
 import jinja2
 from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from irtwin.errors import InputError
 from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.packing import Fragment, embedded_json, packed_scripts
-from irtwin.report import wording
-from irtwin.report.energy import tables, verdict
-from irtwin.report.energy.figures import figures
+from irtwin.report import colours, wording
+from irtwin.report.energy import lead, tables, verdict
+from irtwin.report.energy.figures import Figure, figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
 from irtwin.resources import Resources, folder, shipped
@@ -79,7 +79,11 @@ def _page(
         added=added_to(resources, "energy"),
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
-        verdict=verdict.sentence(answers),
+        taken=lead.taken(answers),
+        could_save=lead.could_save(answers),
+        saving=lead.saving(answers),
+        trust=lead.trust(answers),
+        constant=lead.constant_power(answers),
         torque=verdict.torque(answers),
         energy=verdict.energy(answers),
         seed_error=verdict.SEED_ENERGY_ERROR,
@@ -90,7 +94,7 @@ def _page(
         java=HOW_TO_GET.replace("`", ""),
         drawn=drawn,
         curves=curves,
-        data=embedded_json({"figures": {name: figure for name, figure in drawn.items() if figure}, "explorer": curves}),
+        data=page_data({name: figure for name, figure in drawn.items() if figure}, curves),
         scene=None if scene is None else scene.html,
         style=style(resources),
         scripts=scripts.html,
@@ -101,7 +105,19 @@ def _page(
 def figure_scripts() -> Fragment:
     """Return the scripts that draw a page's figures."""
     drawing = folder("reports") / "layout" / "figures.js"
-    return packed_scripts([get_plotlyjs(), drawing.read_text(encoding="utf-8")])
+    return packed_scripts([plotly(), drawing.read_text(encoding="utf-8")])
+
+
+def page_data(drawn: Mapping[str, Figure], curves: Mapping[str, Any] | None = None) -> Markup:
+    """Return what a page's figures are drawn from: themselves, packed curves of runs, and the colours of lines."""
+    return embedded_json({"figures": drawn, "explorer": curves, "colours": colours.of_lines()})
+
+
+@cache
+def plotly() -> str:
+    """Return the part of Plotly that pages draw with: bars, lines and maps."""
+    packed = folder("reports") / "layout" / "plotly-cartesian.min.js.gz"
+    return gzip.decompress(packed.read_bytes()).decode()
 
 
 def content_policy(scripts: Iterable[str]) -> str:
@@ -157,7 +173,7 @@ def environment(resources: Resources) -> jinja2.Environment:
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
         wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
         wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
-        wording.shown,
+        wording.shown, wording.kilowatt_hours, tables.is_unsure,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,11 +18,11 @@ Explain = Callable[[str, str, str], Explanation | None]  # subject, predicate an
 
 @dataclass(frozen=True)
 class Cell:
-    """A parameter's value and 95 % interval as text; `holds_zero` where the interval does."""
+    """A parameter's value and 95 % interval as text; `unsure` where it is known to no better than half its value."""
 
     value: str
     interval: str | None
-    holds_zero: bool
+    unsure: bool
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,13 @@ def _cell(row: Row) -> Cell:
     lower: Any = row["lower"]
     upper: Any = row["upper"]
     if lower is None or upper is None:
-        return Cell(wording.number(row["value"]), None, False)
+        return Cell(wording.number(row["value"]), None, True)
     value, interval = wording.interval(row["value"], lower, upper)
-    return Cell(value, interval, lower <= 0 <= upper)
+    return Cell(value, interval, is_unsure(row["value"], lower, upper))
+
+
+def is_unsure(value: float, lower: float | None, upper: float | None) -> bool:
+    """Return whether a number is known to no better than half of it, or its interval not at all."""
+    if lower is None or upper is None or not math.isfinite(upper - lower):
+        return True
+    return upper - lower >= abs(value)

@@ -9,12 +9,12 @@ from typing import Any
 
 from irtwin.gap.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
-from irtwin.report.energy.figures import MEASURED, PALETTE, Figure, plain
+from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
+from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers, Row
 
-BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], "#8C2D04"
-_CAUSES = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#004C78", "#7FC8A9")
+BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], LIMIT
 _SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
 _BANDED = 0.25
 _TICKS = (0, 1, 3, 10, 30, 100, 300)
@@ -134,7 +134,7 @@ def follows(curve: Followed, unit: str, names: Mapping[str, str]) -> Figure:
     if curve.fitted is not None:
         effect = curve.effect or "fitted_curve"
         name = plain(names.get(effect, effect.replace("_", " ")))
-        line = {"color": PALETTE[5], "width": 2.5}
+        line = {"color": effect_colour(effect), "width": 2.5}
         data.append(
             {
                 "type": "scatter",
@@ -212,7 +212,7 @@ def by_cause(answers: Answers) -> Figure | None:
     shape = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": before, "y1": before, "line": line}
     note = {
         "x": 0.995, "xref": "paper", "xanchor": "right", "y": before, "yanchor": "bottom", "showarrow": False,
-        "text": "before", "font": {"color": BEFORE}, "bgcolor": "rgba(255,255,255,0.85)",
+        "text": "before", "font": {"color": BEFORE},
     }  # fmt: skip
     yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
@@ -238,9 +238,9 @@ def budget(answers: Answers) -> Figure | None:
     for place, row in enumerate(answers["causes"].rows):
         if closed := parts.get(row["cause"]):
             of_channel = {closed["channel"]: closed["part"]}
-            bar(f"{place + 1}. {effect_name(row)}", of_channel, _CAUSES[place % len(_CAUSES)])
+            bar(f"{place + 1}. {effect_name(row)}", of_channel, effect_colour(wording.local_name(row["effect"])))
     bar("could be closed, cause unknown", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
-    bar("not closed", {name: one["rest"] for name, one in given.items()}, "#E3E8EC")
+    bar("not closed", {name: one["rest"] for name, one in given.items()}, "#C9D1D8")
     xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
     layout = {"barmode": "stack", "xaxis": xaxis, "yaxis": {"type": "category", "autorange": "reversed"}}
     legend = {

@@ -94,13 +94,13 @@ def _closes(one: Finding, count: int) -> str:
     ends = " to ".join(map(wording.share, one.interval))
     of = "gap in" if one.of.startswith("the gap") else "mean square of"
     return (
-        f" {what} closes {wording.share(one.share)} of the {of} {one.channel} on held-out runs (95 % interval {ends})."
+        f" {what} closes {wording.part(one.share)} of the {of} {one.channel} on held-out runs (95 % interval {ends})."
     )
 
 
 def folded(count: int, channel: str, share: float) -> str:
     """Say how many findings there are that are not told by themselves, and what they close together."""
-    closed = wording.share(share) if share > 0 else "nothing"
+    closed = wording.part(share) if share > 0 else "nothing"
     found = "1 finding closes" if count == 1 else f"{count} findings together close"
     return f"{found} {closed} of the gap in {channel}"
 

@@ -16,11 +16,10 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl import rules as shacl_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
-from irtwin.packing import embedded_json
 from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
 from irtwin.report import wording
-from irtwin.report.energy.page import content_policy, figure_scripts, style, written
+from irtwin.report.energy.page import content_policy, figure_scripts, page_data, style, written
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
@@ -95,7 +94,7 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
         effect_names=gap_figures.effect_names(answers),
         experiment=experiment(answers),
         drawn=drawn,
-        data=embedded_json({"figures": drawn, "explorer": None}),
+        data=page_data(drawn),
         style=style(resources),
         scripts=scripts.html,
         policy=content_policy(scripts.scripts),

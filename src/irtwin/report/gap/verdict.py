@@ -70,7 +70,7 @@ def where(channel: str, joint: str | None, regime: str | None) -> str:
 def closes(share: float, interval: Sequence[float] | None) -> str:
     """Say how much of a gap closes."""
     within = "" if interval is None else f" (95 % interval {' to '.join(map(wording.share, interval))})"
-    return f" Adding this to the twin closes {wording.share(share)} of the gap on held-out runs{within}."
+    return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
 
 
 def effect_name(row: Row, variable: str = "effect") -> str:

@@ -36,7 +36,7 @@ def class_tree(forests: Mapping[str, list[Node]]) -> str:
         heights[column] += TITLE + len(rows) * ROW + 18
     width, height = COLUMNS * COLUMN, max(heights)
     return (
-        f'<svg class="tree" viewBox="0 0 {width} {height}" role="img" aria-label="Tree of the classes, by module">'
+        f'<svg class="tree" viewBox="0 0 {width} {height}" role="group" aria-label="Tree of the classes, by module">'
         f"{''.join(parts)}</svg>"
     )
 

@@ -162,7 +162,7 @@
     irt:Gap_Band ?band ; irt:Gap_Ratio ?ratio ; irt:Residual_Unit ?unit ; irt:Band_State ?state .
     OPTIONAL { ?gap irt:gap_at_Joint ?joint . ?joint irt:Joint_Name ?name ; irt:Joint_Number ?number }
     BIND(COALESCE(?name, "power") AS ?label) } ORDER BY COALESCE(?number, 99)`;
-  const ALARMS = `SELECT ?state ?since ?until ?reason ?rule { ?alarm a irt:Gap_Alarm ; irt:gap_of_Run ?RUN ; irt:Alarm_State ?state ;
+  const ALARMS = `SELECT ?state ?since ?until ?reason ?rule { ?alarm irt:alarm_of_Run ?RUN ; irt:Alarm_State ?state ;
     irt:Alarm_Since ?since ; irt:Alarm_Reason ?reason ; irt:raised_by_Rule ?rule OPTIONAL { ?alarm irt:Alarm_Until ?until } } ORDER BY DESC(?since)`;
 
   const element = (kind, text, name) => Object.assign(document.createElement(kind), { textContent: text, className: name || "" });

@@ -6,7 +6,7 @@
     ?run irt:run_of ?robot ; a irt:Live_Run ; irt:Start_Time ?start ; irt:Stream_State ?stream ; irt:State_Time ?at .
     ?robot irt:has_Information / irt:IR_Name ?name .
     OPTIONAL { ?run irt:Energy_Consumption ?energy ; irt:Run_Power ?power }
-    OPTIONAL { ?alarm a irt:Gap_Alarm ; irt:gap_of_Run ?run ; irt:Alarm_State "active" }
+    OPTIONAL { ?alarm irt:alarm_of_Run ?run ; irt:Alarm_State "active" }
   } GROUP BY ?robot ?name ?stream ?at ?energy ?power ORDER BY ?name`;
   const rows = document.getElementById("robots"), none = document.getElementById("none"), trouble = document.getElementById("trouble");
 

@@ -1,0 +1,106 @@
+"""The graph is asked for its alarms again and again; what is new is told, once, over restarts as well."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+from irtwin.alarms.alarm import ACTIVE, Alarm, Event, message
+from irtwin.alarms.delivery import Delivery
+from irtwin.errors import InputError
+from irtwin.storage import files
+
+EVERY = 1.0  # s between two looks
+Look = Callable[[], Sequence[Alarm]]
+Announce = Callable[[str], None]
+_FOLDER, _TOLD = "alarms", "told.json"  # in the workspace
+
+
+class Told:
+    """What was told of alarms until now, kept in a file. Of alarms that were over before the first look nothing is."""
+
+    def __init__(self, file: Path) -> None:
+        """Begin with what the file holds. Raises InputError where it cannot be understood."""
+        self._file = file
+        self._known: dict[tuple[str | None, ...], Alarm] | None = None
+        if file.exists():
+            try:
+                alarms = [Alarm.of(row) for row in json.loads(file.read_bytes())]
+            except (ValueError, KeyError, TypeError) as error:
+                raise InputError(f"{file}: cannot be understood ({error}); delete it, and all is told anew") from None
+            self._known = {alarm.key: alarm for alarm in alarms}
+
+    def news(self, found: Sequence[Alarm]) -> list[tuple[Event, Alarm]]:
+        """Return what was not told of the alarms that there are now. One that is there no more is over."""
+        now = {alarm.key: alarm for alarm in found}
+        before = self._known
+        if before is None:
+            before = {key: alarm for key, alarm in now.items() if alarm.state != ACTIVE}
+        news: list[tuple[Event, Alarm]] = []
+        for key, alarm in now.items():
+            if key not in before:
+                news.append(("raised", alarm))
+            if alarm.state != ACTIVE and (key not in before or before[key].state == ACTIVE):
+                news.append(("cleared", alarm))
+        gone = (alarm for key, alarm in before.items() if key not in now and alarm.state == ACTIVE)
+        news += [("cleared", alarm) for alarm in gone]
+        if news or self._known is None:
+            self._known = now
+            files.write(self._file, json.dumps([alarm.as_dict() for alarm in found], indent=1).encode())
+        return news
+
+
+def follow(
+    look: Look,
+    told: Told,
+    write: Callable[[bytes], None],
+    deliveries: Sequence[Delivery],
+    done: threading.Event,
+    announce: Announce,
+    sparql: Mapping[str, str],
+) -> None:
+    """Write each news as a line of JSON and hand it to the deliveries, until it is `done`; `sparql`: of rules, by name.
+
+    A graph that cannot be read is announced, and asked again; the first look raises InputError.
+    """
+    found, fault = look(), ""
+    while True:
+        for event, alarm in told.news(found):
+            line = message(event, alarm, datetime.now(UTC), sparql.get(alarm.rule))
+            for delivery in deliveries:
+                delivery.put(line)
+            write(line + b"\n")
+        if done.wait(EVERY):
+            return
+        try:
+            found, fault = look(), ""
+        except InputError as error:
+            if str(error) != fault:
+                announce(f"alarms are not known now: {error}")
+            fault = str(error)
+
+
+@contextmanager
+def told_in(workspace: Path) -> Iterator[Told]:
+    """Give what was told of a workspace's alarms. Raises InputError where another process tells them already."""
+    folder = workspace / _FOLDER
+    with files.told_when_full(workspace):
+        folder.mkdir(exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(handle)
+            raise InputError(
+                f"{workspace}: another `irtwin alarms --follow` tells its alarms; stop that first"
+            ) from None
+        try:
+            yield Told(folder / _TOLD)
+        finally:
+            os.close(handle)

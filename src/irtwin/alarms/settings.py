@@ -1,0 +1,141 @@
+"""Who is told of alarms: `alarms.toml` in a workspace. Secrets stand in the environment, the file names the variables.
+
+[[webhook]]
+url = "https://example.com/robots"      # or url_env, where the URL itself is a secret
+token_env = "IRTWIN_WEBHOOK_TOKEN"      # optional: sent as a bearer token
+timeout_s = 5                           # optional
+
+[[mqtt]]
+host = "broker.plant"
+port = 1883                             # optional; 8883 with tls
+topic = "plant/robots/alarms"
+user = "irtwin"                         # optional, as are the next
+password_env = "IRTWIN_MQTT_PASSWORD"
+tls = true
+timeout_s = 5
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from irtwin.alarms.delivery import Receiver
+from irtwin.errors import InputError
+from irtwin.signals.toml_file import Table, read_toml, shown
+
+NAME = "alarms.toml"
+_TIMEOUT = 5.0  # s
+_SHORTEST = 0.1  # s
+_KEYS = {
+    "webhook": ("url", "url_env", "token_env", "timeout_s"),
+    "mqtt": ("host", "port", "topic", "user", "password_env", "tls", "timeout_s"),
+}
+
+
+def read_receivers(file: Path, environment: Mapping[str, str] = os.environ) -> list[Receiver]:
+    """Return who is to be told by a file. Raises InputError, naming file, table and key, on all that is wrong."""
+    document = read_toml(file)
+    _check(file, "", document, tuple(_KEYS))
+    made: list[Receiver] = []
+    makers: dict[str, Callable[[Table, Mapping[str, str]], Receiver]] = {"webhook": _webhook, "mqtt": _mqtt}
+    for kind, make in makers.items():
+        tables = document.get(kind, [])
+        if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
+            raise InputError(f"{file}: {kind} should be tables; write [[{kind}]] above its keys")
+        for number, values in enumerate(tables, start=1):
+            table = Table(file, f"{kind} {number}:", values)
+            _check(file, table.name, values, _KEYS[kind])
+            made.append(make(table, environment))
+    if not made:
+        raise InputError(f"{file}: names nobody; write [[webhook]] with url, or [[mqtt]] with host and topic")
+    return made
+
+
+def _webhook(table: Table, environment: Mapping[str, str]) -> Receiver:
+    given = table.text("url"), _secret(table, "url_env", environment)
+    if (given[0] is None) == (given[1] is None):
+        raise InputError(f"{table.file}: {table.name} needs url, or url_env, one of them")
+    url = given[0] or given[1] or ""
+    _check_url(table, url)
+    token, timeout = _secret(table, "token_env", environment), _timeout(table)
+    try:
+        from irtwin.alarms.webhook import Webhook
+    except ModuleNotFoundError as error:
+        raise _missing(error) from None
+    return Webhook(url, token, timeout)
+
+
+def _mqtt(table: Table, environment: Mapping[str, str]) -> Receiver:
+    host, topic = (_needed(table, key) for key in ("host", "topic"))
+    if any(sign in topic for sign in "+#\0") or len(topic.encode()) > 65535:
+        raise InputError(f"{table.file}: {table.name} topic should be that of one place, without + and #")
+    tls = table.values.get("tls", False)
+    if not isinstance(tls, bool):
+        raise InputError(f"{table.file}: {table.name} tls should be true or false, not {shown(tls)}")
+    port = table.values.get("port", 8883 if tls else 1883)
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 < port < 65536:
+        raise InputError(f"{table.file}: {table.name} port should be a whole number of 1 to 65535, not {shown(port)}")
+    user, password = table.text("user"), _secret(table, "password_env", environment)
+    if password is not None and user is None:
+        raise InputError(f"{table.file}: {table.name} password_env goes with user")
+    timeout = _timeout(table)
+    try:
+        from irtwin.alarms.mqtt import Broker
+    except ModuleNotFoundError as error:
+        raise _missing(error) from None
+    return Broker(host, port, topic, user, password, tls, timeout)
+
+
+def _check_url(table: Table, url: str) -> None:
+    """Raise InputError, without the URL, unless it leads to a web server and holds no user or password."""
+    wrong = InputError(
+        f"{table.file}: {table.name} its URL should be http:// or https:// with a host and without user or password; "
+        "a token goes by token_env"
+    )
+    try:
+        parts = urlsplit(url)
+        _ = parts.port
+    except ValueError:
+        raise wrong from None
+    plain = url.isascii() and url.isprintable() and " " not in url
+    if parts.scheme not in ("http", "https") or not parts.hostname or "@" in parts.netloc or not plain:
+        raise wrong
+
+
+def _secret(table: Table, key: str, environment: Mapping[str, str]) -> str | None:
+    """Return the value of the variable that a key names. Raises InputError where it is not set."""
+    name = table.text(key)
+    if name is None:
+        return None
+    value = environment.get(name, "").strip()
+    if not (value and value.isascii() and value.isprintable()):
+        raise InputError(f"{table.file}: {table.name} {key}: the environment has no usable {shown(name)[1:-1]}")
+    return value
+
+
+def _timeout(table: Table) -> float:
+    return table.number("timeout_s", least=_SHORTEST) or _TIMEOUT
+
+
+def _needed(table: Table, key: str) -> str:
+    text = table.text(key)
+    if text is None:
+        raise InputError(f"{table.file}: {table.name} {key} is missing")
+    return text
+
+
+def _check(file: Path, name: str, values: Mapping[str, Any], known: tuple[str, ...]) -> None:
+    for key in values:
+        if key not in known:
+            near = get_close_matches(key, known, 1)
+            hint = f"did you mean {near[0]}?" if near else f"it may have {', '.join(known)}"
+            raise InputError(f"{file}: {f'{name} {shown(key)[1:-1]}'.strip()} is not known; {hint}")
+
+
+def _missing(error: ModuleNotFoundError) -> InputError:
+    return InputError(f"alarms cannot be sent without the package {error.name}; pip install 'irtwin[alarms]'")

@@ -1,0 +1,67 @@
+"""Alarms of a workspace, listed once, or told until a signal comes."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from irtwin.alarms.alarm import Alarm, active, alarms, sparql_of_rules
+from irtwin.alarms.delivery import Delivery
+from irtwin.alarms.follow import follow, told_in
+from irtwin.alarms.settings import NAME, read_receivers
+from irtwin.asking import checked, open_graph
+from irtwin.knowledge.store.table import Table
+
+
+def listed(workspace: Path, *, graph_url: str | None = None, robot: str | None = None) -> Table:
+    """Return the alarms that are active. Raises InputError where there is no graph, or no robot of the name."""
+    return active(_alarms(workspace, graph_url, robot))
+
+
+def tell(
+    workspace: Path,
+    *,
+    graph_url: str | None = None,
+    robot: str | None = None,
+    config: Path | None = None,
+    announce: Callable[[str], None] = lambda line: None,
+) -> None:
+    """Tell each alarm when it begins and when it is over, on standard output and to whom `config` names.
+
+    `config` is `alarms.toml` of the workspace by default, if that is there. `announce` is told what is amiss. Ends with
+    SIGINT or SIGTERM, and gives messages on their way some seconds.
+    """
+    done = threading.Event()
+    look = partial(_alarms, workspace, graph_url, robot)
+    file = config or workspace / NAME
+    found = look()  # before anything is made: there may be no workspace
+    sparql = sparql_of_rules(checked(workspace))
+    receivers = read_receivers(file) if config is not None or file.exists() else []
+    with told_in(workspace) as told:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: done.set())
+        deliveries = [Delivery(receiver, announce) for receiver in receivers]
+        names = ["standard output", *(receiver.name for receiver in receivers)]
+        announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in found)} active now")
+        try:
+            follow(look, told, _write, deliveries, done, announce, sparql)
+        finally:
+            for delivery in deliveries:
+                delivery.close()
+    lost = sum(delivery.lost for delivery in deliveries)
+    if lost:
+        announce(f"{lost} message{'s' * (lost != 1)} could not be delivered")
+
+
+def _alarms(workspace: Path, graph_url: str | None, robot: str | None) -> list[Alarm]:
+    with open_graph(workspace, graph_url) as graph:
+        return alarms(graph, robot)
+
+
+def _write(line: bytes) -> None:
+    sys.stdout.buffer.write(line)
+    sys.stdout.buffer.flush()

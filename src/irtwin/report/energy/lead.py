@@ -1,0 +1,104 @@
+"""What the energy report says first: what the robot takes, what a plant could save, and how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from irtwin.report import wording
+from irtwin.report.energy import verdict
+from irtwin.report.questions import Answers, Row
+
+_HOUR = 3600.0  # s
+_LEAST_OF_A_DAY = 4 * _HOUR  # that the logs cover: less tells nothing of a day
+
+
+@dataclass(frozen=True)
+class Saving:
+    """What switching off while waiting would save at most, J, with its 95 % interval, and as a share of the energy."""
+
+    energy_j: float
+    lower_j: float
+    upper_j: float
+    share: float
+    waiting_share: float  # of the time
+    standby_w: float
+
+
+def taken(answers: Answers) -> str:
+    """Return what the robot took, and how much that is an hour and a day."""
+    totals = answers["totals"].rows[0]
+    if not totals["runs"]:
+        return "No run of this robot is known yet."
+    runs = f"{totals['runs']} run{'s' * (totals['runs'] != 1)} of {wording.duration(totals['duration_s'])}"
+    if not totals["runs_with_energy"]:
+        return f"What this robot took in {runs} is not known: no power was measured and no twin models it."
+    if totals["runs_mechanical"] == totals["runs_with_energy"]:
+        worked = wording.energy(totals["energy_j"])
+        return (
+            f"The joints of this robot did {worked} of mechanical work in {runs}, by its twin. "
+            "What that took from the supply is not known: no electrical power was measured."
+        )
+    if totals["runs_mechanical"]:
+        some = totals["runs_mechanical"]
+        return f"This robot's energy has no sum over {runs}: of {some} only mechanical work is known, by its twin."
+    by = "measured" if totals["runs_with_power"] == totals["runs_with_energy"] else "in part by its twin"
+    by = by if totals["runs_with_power"] else "by its twin, as no power was measured"
+    said = f"This robot took {wording.kilowatt_hours(totals['energy_j'])} in {runs}, {by}"
+    if totals["runs_with_energy"] == totals["runs"] and totals["duration_s"]:
+        hour = totals["energy_j"] / totals["duration_s"] * _HOUR
+        said += f": {wording.kilowatt_hours(hour)} for each hour of such work"
+    days = answers["energy_per_day"].rows
+    logged = sum(day["duration_s"] for day in days)
+    if days and logged >= _LEAST_OF_A_DAY * len(days) and all(day["day_from"] == "log" for day in days):
+        mean = sum(day["energy_j"] for day in days) / len(days)
+        said += f", {wording.kilowatt_hours(mean)} on a day with runs"
+    return f"{said}."
+
+
+def saving(answers: Answers) -> Saving | None:
+    """Return what switching off while waiting would save; None where it is not known with an interval."""
+    rows = answers["waiting"].rows
+    if len(rows) != 1 or rows[0]["lower_w"] is None or not 0 < rows[0]["lower_w"] <= rows[0]["upper_w"]:
+        return None
+    row = rows[0]
+    waiting = row["waiting_s"]
+    if not waiting or row["energy_j"] <= 0:
+        return None
+    saved = row["standby_w"] * waiting
+    return Saving(
+        saved, row["lower_w"] * waiting, row["upper_w"] * waiting, saved / row["energy_j"], waiting / row["time_s"],
+        row["standby_w"],
+    )  # fmt: skip
+
+
+def could_save(answers: Answers) -> str | None:
+    """Return in words what switching off while waiting would save, None where that is not known."""
+    found = saving(answers)
+    if found is None:
+        return None
+    saved, lower, upper = map(wording.kilowatt_hours, (found.energy_j, found.lower_j, found.upper_j))
+    return (
+        f"It stood still for {wording.share(found.waiting_share)} of the time. Switched off while it waits, it would "
+        f"save up to {saved} (95 % interval {lower} to {upper}), {wording.share(found.share)} of the energy: its "
+        f"standby power is {wording.quantity(found.standby_w, 'W')}. What starting up again takes is not counted."
+    )
+
+
+def trust(answers: Answers) -> str:
+    """Return how far the twin can be trusted, beside a constant power."""
+    said = verdict.sentence(answers)
+    constant = constant_power(answers)
+    if constant is None:
+        return said
+    return (
+        f"{said} A constant power, the mean of the runs that the twin was fitted to, would miss the energy of the same "
+        f"runs by {wording.percent(constant['error_percent'])}."
+    )
+
+
+def constant_power(answers: Answers) -> Row | None:
+    """Return how a constant power does on the held-out runs that judge the twin; None where others judge it."""
+    judged, constant = verdict.energy(answers), answers["baseline"].first
+    if judged is None or constant is None or judged.row["part"] != "held_out":
+        return None
+    return constant if constant["runs"] == judged.row["runs"] else None

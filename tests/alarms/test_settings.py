@@ -1,0 +1,60 @@
+"""`alarms.toml`: who is told, and what is said of each mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from irtwin.alarms.settings import read_receivers
+from irtwin.errors import InputError
+
+ENVIRONMENT = {"HOOK": "https://example.com/secret", "TOKEN": "t0ken", "PASSWORD": "pa55", "EMPTY": " "}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "alarms.toml"
+
+
+def test_webhooks_and_brokers_are_read_and_their_names_hold_no_secret(file: Path) -> None:
+    file.write_text(
+        '[[webhook]]\nurl_env = "HOOK"\ntoken_env = "TOKEN"\ntimeout_s = 2\n'
+        '[[webhook]]\nurl = "http://127.0.0.1:8000/robots"\n'
+        '[[mqtt]]\nhost = "broker"\ntopic = "plant/alarms"\nuser = "me"\npassword_env = "PASSWORD"\ntls = true\n'
+    )
+    receivers = read_receivers(file, ENVIRONMENT)
+    names = ["webhook at example.com", "webhook at 127.0.0.1:8000", "MQTT broker at broker:8883"]
+    assert [receiver.name for receiver in receivers] == names
+    assert not any(secret in repr(receivers) for secret in ("pa55", "t0ken", "secret"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "names nobody; write"),
+        ('[[webhok]]\nurl = "http://a"', "webhok is not known; did you mean webhook?"),
+        ('[webhook]\nurl = "http://a"', r"webhook should be tables; write \[\[webhook\]\]"),
+        ('[[webhook]]\nadress = "http://a"', "webhook 1: adress is not known; it may have url, "),
+        ("[[webhook]]\ntimeout_s = 3", "webhook 1: needs url, or url_env, one of them"),
+        ('[[webhook]]\nurl = "http://a"\nurl_env = "HOOK"', "needs url, or url_env, one of them"),
+        ('[[webhook]]\nurl = "ftp://a/b"', "its URL should be http:// or https://"),
+        ('[[webhook]]\nurl = "https://me:pass@a/b"', "without user or password; a token goes by token_env"),
+        ('[[webhook]]\nurl = "http://a:b/"', "its URL should be"),
+        ('[[webhook]]\nurl_env = "NONE"', "url_env: the environment has no usable NONE"),
+        ('[[webhook]]\nurl = "http://a"\ntoken_env = "EMPTY"', "token_env: the environment has no usable EMPTY"),
+        ('[[webhook]]\nurl = "http://a"\ntimeout_s = 0', "timeout_s should be a number of at least 0.1, not 0"),
+        ('[[mqtt]]\nhost = "a"', "mqtt 1: topic is missing"),
+        ('[[mqtt]]\nhost = "a"\ntopic = "plant/#"', "topic should be that of one place"),
+        ('[[mqtt]]\nhost = "a"\ntopic = "b"\nport = "1883"', "port should be a whole number of 1 to 65535, not '1883'"),
+        ('[[mqtt]]\nhost = "a"\ntopic = "b"\ntls = 1', "tls should be true or false, not 1"),
+        ('[[mqtt]]\nhost = "a"\ntopic = "b"\npassword_env = "PASSWORD"', "password_env goes with user"),
+        ("[[mqtt]", "not valid TOML"),
+    ],
+)
+def test_mistakes_are_named(file: Path, text: str, message: str) -> None:
+    file.write_text(text)
+    with pytest.raises(InputError, match=message) as refused:
+        read_receivers(file, ENVIRONMENT)
+    assert str(refused.value).startswith(f"{file}: ")
+    assert "me:pass" not in str(refused.value)

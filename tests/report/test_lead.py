@@ -1,0 +1,76 @@
+"""The energy report speaks to the plant first; what it says was reckoned by hand."""
+
+from __future__ import annotations
+
+import pytest
+from tests.report.robots import Factory, answers, power_only, six_axis
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.energy import lead
+
+
+def plain(text: str | None) -> str | None:
+    return text and text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_what_was_taken_and_what_an_hour_takes(graph: KnowledgeGraph) -> None:
+    found = answers(graph, six_axis(graph))  # 6 runs of 20 s, 9 kJ modelled each, measured less by 2 to 5, 2 and 3 %
+    joules = sum(9000 / (1 + error / 100) for error in (2, 3, 4, 5, 2, 3))
+    said = f"This robot took {joules / 3600:.1f} Wh in 6 runs of 2 min 0 s, measured: {joules / 120 / 1000:.3f} kWh"
+    assert plain(lead.taken(found)) == f"{said} for each hour of such work."
+
+
+def test_a_constant_power_stands_beside_the_twin(graph: KnowledgeGraph) -> None:
+    found = answers(graph, six_axis(graph))
+    mean = sum(9000 / (1 + error / 100) for error in (2, 3, 4, 5)) / 4  # J, of runs equally long
+    misses = [100 * abs(mean * (1 + error / 100) / 9000 - 1) for error in (2, 3)]
+    constant = lead.constant_power(found)
+    assert constant is not None
+    assert constant["error_percent"] == pytest.approx(sum(misses) / 2, rel=1e-4)
+    assert constant["mean_power_w"] == pytest.approx(mean / 20, rel=1e-4)
+    assert (constant["runs"], constant["error_worst_percent"]) == (2, pytest.approx(max(misses), rel=1e-4))
+    assert "A constant power, the mean of the runs that the twin was fitted to, would miss" in lead.trust(found)
+
+
+def test_a_run_cut_in_time_has_no_constant_power_beside_it(graph: KnowledgeGraph) -> None:
+    found = answers(graph, power_only(graph))
+    assert lead.constant_power(found) is None
+    assert "constant" not in lead.trust(found)
+
+
+def test_switching_off_while_waiting_has_an_interval_or_is_not_said(graph: KnowledgeGraph) -> None:
+    factory = six_axis(graph)  # 150 W of standby, 0.1 W up or down; a quarter of 120 s at rest
+    found = lead.saving(answers(graph, factory))
+    assert found is not None
+    assert (found.energy_j, found.lower_j, found.upper_j) == pytest.approx((4500.0, 4497.0, 4503.0))
+    assert found.waiting_share == pytest.approx(0.25)
+    joules = sum(9000 / (1 + error / 100) for error in (2, 3, 4, 5, 2, 3))
+    assert found.share == pytest.approx(4500 / joules, rel=1e-4)
+    said = plain(lead.could_save(answers(graph, factory)))
+    assert said and "It stood still for 25 % of the time." in said
+    assert "up to 1.25 Wh (95 % interval 1.25 Wh to 1.25 Wh), 8.6 % of the energy" in said
+    factory.text = [text for text in factory.text if "of_Effect effect:standby_power" not in text]
+    factory.say(
+        f"[] a irt:Twin_Parameter ; irt:parameter_of {factory._twin} ; irt:of_Effect effect:standby_power ;"
+        ' irt:Parameter_Name "P0" ; irt:Parameter_Value 150.0e0 ; irt:Parameter_Unit "W" .'
+    )
+    assert lead.could_save(answers(graph, factory.into(graph))) is None
+
+
+def test_mechanical_energy_is_called_so_and_never_added(graph: KnowledgeGraph) -> None:
+    factory = Factory("M", "M", power=False).robot().run("a").run("b").twin(["a", "b"], [])
+    said = plain(lead.taken(answers(graph, factory.into(graph))))
+    assert said == (
+        "The joints of this robot did 18.0 kJ of mechanical work in 2 runs of 40.0 s, by its twin. "
+        "What that took from the supply is not known: no electrical power was measured."
+    )
+    electrical = [text.replace('"mechanical"', '"modelled"') if "/M.b>" in text else text for text in factory.text]
+    factory.text = electrical
+    assert "has no sum" in lead.taken(answers(graph, factory.into(graph)))
+
+
+def test_a_robot_of_which_little_is_known(graph: KnowledgeGraph) -> None:
+    empty = answers(graph, Factory("E", "E").robot().into(graph), twin=False)
+    assert lead.taken(empty) == "No run of this robot is known yet."
+    logged = answers(graph, Factory("L", "L").robot().run("a").into(graph), twin=False)
+    assert "is not known: no power was measured and no twin models it" in lead.taken(logged)

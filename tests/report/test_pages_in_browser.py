@@ -1,0 +1,112 @@
+"""Reports in headless Chromium, light and dark, wide and narrow: read by axe-core, and as a person uses them."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pyoxigraph import Literal, NamedNode, Quad
+from tests import gap_cases
+from tests.gap_pages import page_of as gap_page
+from tests.report.robots import PageOf, six_axis
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
+from irtwin.report.ontology.page import write_page
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+pytestmark = [pytest.mark.system, pytest.mark.skipif(not CHROMIUM, reason="no Chromium on this machine")]
+SCREENS = [(1440, "light"), (400, "dark")]
+LARGEST = 3_000_000  # bytes of a report
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as session:
+        chromium = session.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-quic"])
+        yield chromium
+        chromium.close()
+
+
+def opened(browser: Any, file: Path, width: int, scheme: str) -> Any:
+    page = browser.new_context(
+        viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True, bypass_csp=True
+    ).new_page()
+    page.goto(file.as_uri())
+    return page
+
+
+def faults(page: Any, *parts: str) -> list[tuple[str, list[Any]]]:
+    """Return what axe-core finds wrong, on the whole page or in parts of it."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    context = {"include": [[part] for part in parts]} if parts else None
+    found = axe.Axe().run(page, context=context).response["violations"]
+    return [(fault["id"], [node["target"] for node in fault["nodes"]]) for fault in found]
+
+
+def is_dark(page: Any) -> bool:
+    back, ink = (
+        [int(part) for part in page.evaluate(f"getComputedStyle(document.body).{of}").strip("rgb()").split(",")]
+        for of in ("backgroundColor", "color")
+    )
+    return sum(back) < sum(ink)
+
+
+@pytest.fixture
+def energy(graph: KnowledgeGraph, page_of: PageOf, tmp_path: Path) -> Path:
+    robot = six_axis(graph)
+    why = "prp-fp: two values of irt:IR_Weight, <50> and <60>"
+    said = Quad(NamedNode(robot.iri), NamedNode(term("Contradiction")), Literal(why), NamedNode(GRAPH_REASONED))
+    graph.replace([said], GRAPH_REASONED)
+    page_of(robot)
+    return tmp_path / "reports" / f"{robot.robot_id}.html"
+
+
+def test_the_energy_page(browser: Any, energy: Path) -> None:
+    assert energy.stat().st_size < LARGEST
+    for width, scheme in SCREENS:
+        page = opened(browser, energy, width, scheme)
+        page.wait_for_selector("#figure-torque .scatterlayer .trace")
+        assert is_dark(page) == (scheme == "dark")
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        assert faults(page) == [], (width, scheme)
+        buttons = page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
+        assert set(buttons) == {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
+        names = page.locator("#figure-torque .legendtext").all_text_contents()
+        assert names == ["measured", "modelled", "measured less modelled"]
+        banner = page.locator("#contradiction")
+        banner.scroll_into_view_if_needed()
+        assert banner.is_visible()
+        assert banner.inner_text().startswith(
+            "Nothing is concluded of this robot: prp-fp: two values of irt:IR_Weight, <50>"
+        )
+        page.emulate_media(media="print", color_scheme=scheme)
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert not page.locator(".modebar").first.is_visible() and not is_dark(page)
+        paper = page.locator("#figure-torque .main-svg").first.evaluate("one => one.style.background")
+        assert "255, 255, 255" in paper
+        page.context.close()
+
+
+def test_the_gap_page(browser: Any, tmp_path: Path) -> None:
+    gap_page(tmp_path, gap_cases.diagnosis("ambiguous"))
+    file = tmp_path / "p.html"
+    assert file.stat().st_size < LARGEST
+    for width, scheme in SCREENS:
+        page = opened(browser, file, width, scheme)
+        page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
+        assert is_dark(page) == (scheme == "dark")
+        assert faults(page) == [], (width, scheme)
+        page.context.close()
+
+
+def test_the_page_of_the_ontology(browser: Any, tmp_path: Path) -> None:
+    write_page(tmp_path / "ontology.html")
+    page = opened(browser, tmp_path / "ontology.html", 400, "dark")
+    assert is_dark(page)
+    assert faults(page, "nav", ".tree", "article:nth-of-type(-n+5)") == []  # of a thousand terms
+    page.context.close()
