@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 
 from irtwin.alarms import follow as following
-from irtwin.alarms.alarm import Alarm
+from irtwin.alarms.alarm import Alarm, sparql_of_rules
 from irtwin.alarms.follow import Told, follow, told_in
 from irtwin.errors import InputError
+from irtwin.resources import shipped
 
 GAP = Alarm("arm", "live_1", "gap_alarm", "2026-03-01T12:00:04+00:00", "torque", "j2", None, "active", "25 N m away")
 OVER = replace(GAP, state="cleared", until="2026-03-01T12:00:12+00:00")
@@ -86,7 +87,7 @@ def test_a_line_says_what_why_and_by_which_query(file: Path, monkeypatch: pytest
         return [GAP] if len(looks) < 4 else [OVER]
 
     looks: list[int] = []
-    follow(look, Told(file), lambda line: lines.append(json.loads(line)), [], done, said.append, {})
+    follow(look, Told(file), lambda line: lines.append(json.loads(line)), [], done, said.append, sparql_of_rules(shipped()))
     raised, cleared = lines
     assert (raised["event"], raised["robot"], raised["joint"], raised["reason"]) == (
         "raised",
