@@ -2,7 +2,7 @@
 
 revision = "0001"
 down_revision = None
-TABLES = "380ecfb67b8c2da8"  # of all columns, see tests/storage/test_migration.py
+TABLES = "7d840b3236023832"  # of all columns, see tests/storage/test_migration.py
 
 
 def upgrade() -> None:
