@@ -87,7 +87,8 @@ def test_a_line_says_what_why_and_by_which_query(file: Path, monkeypatch: pytest
         return [GAP] if len(looks) < 4 else [OVER]
 
     looks: list[int] = []
-    follow(look, Told(file), lambda line: lines.append(json.loads(line)), [], done, said.append, sparql_of_rules(shipped()))
+    sparql = sparql_of_rules(shipped())
+    follow(look, Told(file), lambda line: lines.append(json.loads(line)), [], done, said.append, sparql)
     raised, cleared = lines
     assert (raised["event"], raised["robot"], raised["joint"], raised["reason"]) == (
         "raised",

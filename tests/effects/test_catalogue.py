@@ -13,6 +13,8 @@ from irtwin.effects.drive import IronLoss
 SOURCE = Path(irtwin.__file__).parent
 # words that happen to be an effect's id as well
 OTHER_MEANINGS = {
+    "bring/data_set_text.py": {"rotor_inertia"},  # a key of the data sheet
+    "bring/rtde_names.py": {"payload"},  # a column of a recording
     "gap/experiment/programmes.py": {"payload"},  # a kind of programme
     "report/gap/experiment.py": {"payload"},
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows

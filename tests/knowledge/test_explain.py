@@ -141,7 +141,7 @@ def test_pattern_that_cannot_be_explained_is_refused(reasoned: KnowledgeGraph, p
 
 
 def test_a_conclusion_of_swrl_alone_has_its_premises(reasoned: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(explaining, "shipped_rules", lambda: ())
+    monkeypatch.setattr(explaining, "all_rules", lambda resources: ())
     found = only(reasoned, "id:twin/Arm_A.t1 a irt:Twin_To_Reidentify")
     assert found.by == 'the rule "twin to identify again", in SWRL'
     assert {each.what for each in found.because} == {

@@ -121,8 +121,8 @@ def test_no_file_outside_the_workspace_is_read(graph: KnowledgeGraph, tmp_path: 
     assert "leads outside the workspace" in "".join(table.faults)
 
 
-def test_every_function_is_described_in_the_ontology() -> None:
-    graph = KnowledgeGraph(workspace=Path())
+def test_every_function_is_described_in_the_ontology(tmp_path: Path) -> None:
+    graph = KnowledgeGraph(workspace=tmp_path)
     graph.load_ontology()
     told = graph.query("SELECT ?f { ?f a irt:Series_Function ; rdfs:label ?l ; skos:definition ?d ; skos:example ?e }")
     assert {row["f"] for row in told} == {name.value for name in graph._functions({})}

@@ -117,7 +117,7 @@ WRONG_LINES = {
 
 
 def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts: set())  # Pellet takes seconds to start
+    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts, files: set())  # Pellet takes seconds to start
     wrong = changed(untyped(untyped(two_robots, RUN), JOINT), SHARE, "of_Effect", NamedNode(MAGIC))
     wrong = changed(wrong, PARAMETER, "of_Effect", NamedNode(MAGIC + "2"))
     wrong += [typed(MAGIC + "2", "Effect"), typed(LUCK, "Effect_Family"), typed(FOUND, "Gap_Finding")]

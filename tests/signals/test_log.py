@@ -164,7 +164,10 @@ def test_bad_samples_are_named(tmp_path, signals, message):
         (lambda text: text.rstrip().rpartition(",")[0], "line 51, the last one: the file was cut off: 6 values"),
         (lambda text: text.replace("0.03,", "0.03,oops,", 1), "line 5: 8 values instead of 7"),
         (lambda text: text.replace("\n0.04,", "\nlate,", 1), "line 6, column time: is not a finite number"),
-        (lambda text: text.replace(",", ";"), "column time is missing"),
+        (
+            lambda text: text.replace(",", ";"),
+            "line 1: columns are separated by semicolons; separate them by commas",
+        ),
     ],
 )
 def test_broken_text_is_named(tmp_path, edit, message):

@@ -191,7 +191,8 @@ def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], se
     missing = sorted((name for name in robot.joint_names if name not in positions), key=lambda name: name in seen)
     timed = any(each.field == "time" for each in chosen.values())
     if missing or not timed:
-        what, column = (f"the position of {missing[0]}", f"q_{missing[0]}") if missing else ("the time", "time")
+        what = f"the position of {missing[0]}" if missing else "the time"
+        (column,) = CHANNELS["q" if missing else "time"].columns(missing[:1])
         held = f", or, where the joint stood still, --fixed {missing[0]}" if missing else ""
         times = [name for name in recording.texts if not timed and said_by(name).field == "time"]
         if times:

@@ -9,6 +9,7 @@ from datetime import datetime
 from typing import Any
 
 from irtwin.bring.taken import Taken
+from irtwin.effects.catalogue import BASELINE
 from irtwin.robot.description import Robot
 
 _WIDE = 34  # characters before a comment
@@ -64,7 +65,7 @@ def data_set_text(
     lines += [
         "",
         "# [twin]",
-        _line("effects", ["rigid_body", "coulomb_friction"], "what the twin models; without it, the baseline", False),
+        _line("effects", list(BASELINE), "what the twin models; without it, these", False),
         "",
         "# [topics]  # for runs that are ROS bags in which several topics would do",
         _line("joint_states", "/joint_states", "the topic of the joint states", False),
