@@ -37,10 +37,10 @@ def main(count: int) -> None:
             small_robots.data_set(source / f"robot_{k:04d}", f"Arm {k:04d}", seed=10 * k)
         print("| workers | robots a minute |\n| --- | --- |")
         for workers in WAYS:
-            print(f"| {workers} processes | {robots_a_minute(source, count, workers):.1f} |", flush=True)
+            print(f"| {workers}, processes | {robots_a_minute(source, count, workers):.1f} |", flush=True)
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
             speed = robots_a_minute(source, count, 2, cluster.scheduler_address)
-        print(f"| 2 of Dask | {speed:.1f} |")
+        print(f"| 2, Dask | {speed:.1f} |")
 
 
 if __name__ == "__main__":

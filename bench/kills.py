@@ -1,8 +1,9 @@
 """Commands killed at random moments: `python bench/kills.py [KILLS] [COMMAND ...]`; 30 kills of each by default.
 
-`migrate` has no place here: there is no such command, tables of another version are refused. After each kill a query
-must answer as before or as after, and the command done again must lead to the state of a workspace where nothing was
-killed: the same answers, as many triples, every file that the database names and no other.
+`migrate` has no place here: there is no such command. A workspace is migrated when it is opened, and
+`tests/storage/test_migration.py` kills that. After each kill a query must answer as before or as after, and the command
+done again must lead to the state of a workspace where nothing was killed: the same answers, as many triples, every file
+that the database names and no other.
 """
 
 from __future__ import annotations
