@@ -58,6 +58,15 @@ def test_no_page_is_wider_than_its_window(page: tuple[Any, list[str]], plant: Se
     assert complaints == []
 
 
+def test_a_long_name_of_a_file_is_broken(page: tuple[Any, list[str]], plant: Server) -> None:
+    page, complaints = page
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.goto(plant.url + next(path for path in PAGES if path.startswith("/run/")))
+    page.evaluate("document.querySelector('#files code').textContent = `series/${'a'.repeat(64)}.parquet`")
+    assert page.evaluate("document.documentElement.scrollWidth") == 400
+    assert complaints == []
+
+
 def test_from_the_plant_to_a_run_and_a_comparison(page: tuple[Any, list[str]], plant: Server) -> None:
     page, complaints = page
     page.goto(plant.url)
