@@ -10,9 +10,8 @@ import numpy as np
 from irtwin.bring.meaning import Meaning
 from irtwin.bring.recording import Recording
 from irtwin.errors import InputError
+from irtwin.signals.holes import known_at
 from irtwin.signals.samples import FEWEST
-
-_HOLE = 25.0  # of a column's own intervals: beyond, nobody knows its value
 
 
 @dataclass(frozen=True)
@@ -125,10 +124,4 @@ def _joined(raw: np.ndarray, values: np.ndarray, keep: np.ndarray) -> tuple[np.n
     order = there[np.argsort(time[there], kind="stable")]
     own = time[order]
     result = np.where(np.isfinite(values), values, np.interp(time, own, values[order]))
-    gaps = np.diff(own)
-    heard = (time >= own[0]) & (time <= own[-1])
-    if len(gaps):
-        before = np.clip(np.searchsorted(own, time, side="right") - 1, 0, len(gaps) - 1)
-        inside = (time > own[before]) & (time < own[before + 1])
-        heard &= ~(inside & (gaps[before] > _HOLE * np.median(gaps)))
-    return result, heard
+    return result, known_at(time, own)

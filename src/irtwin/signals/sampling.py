@@ -10,9 +10,9 @@ import numpy as np
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.finding import Finding
+from irtwin.signals.holes import HOLE
 from irtwin.signals.samples import FEWEST
 
-HOLE = 25.0  # intervals without a sample: nobody knows what the robot did meanwhile
 _MOST_PIECES = 100  # of one run; more, and it is not sampled but sprinkled
 _BURST = 4.0  # times the median: where a tenth of the samples lies farther apart, the stamps come in bursts
 _REGULAR = 0.9  # of the updates of held positions come at one pace, a sample more or less

@@ -17,10 +17,11 @@ import numpy as np
 from irtwin.signals.channels import Signals, from_columns
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.filter import kernel
+from irtwin.signals.holes import HOLE
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import FEWEST
-from irtwin.signals.sampling import HOLE, holes, interval
+from irtwin.signals.sampling import holes, interval
 from irtwin.twin.twin import Twin
 
 _SEAM = 16  # samples on either side for the splines that differentiate; their ends are forgotten by a third a sample

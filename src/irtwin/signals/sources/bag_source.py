@@ -13,12 +13,12 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.ros_names import ros_joints
 from irtwin.signals.channels import CHANNELS
+from irtwin.signals.holes import known_at
 from irtwin.signals.sources.bag_file import JOINT_STATE, NUMBERS, BagFile, Topic, open_bag
 from irtwin.signals.sources.source import MOST_VALUES, Source
 
 _LATEST = 1 << 62  # ns since 1970
 FIELDS = {"q": "position", "dq": "velocity", "torque": "effort"}  # of sensor_msgs/JointState
-_HOLE = 25.0  # sampling intervals of a topic: beyond, nobody knows its value
 
 
 def number_topics(robot: Robot) -> dict[str, str]:
@@ -226,13 +226,7 @@ class _Numbers:
         times, last = np.unique((np.array(self._recorded, dtype=np.int64) - recorded[0])[::-1], return_index=True)
         times = times.astype(float)
         values = np.interp(wanted, times, np.array(self._values)[::-1][last])
-        known = (wanted >= times[0]) & (wanted <= times[-1])
-        if len(times) > 1:
-            gaps = np.diff(times)
-            before = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(gaps) - 1)
-            inside = (wanted > times[before]) & (wanted < times[before + 1])
-            known &= ~(inside & (gaps[before] > _HOLE * np.median(gaps)))
-        return values, known
+        return values, known_at(wanted, times)
 
 
 def _there(topics: Sequence[str]) -> str:
