@@ -98,7 +98,7 @@ def try_case(case: Case, tried: Counter[str] | None = None) -> Fault | None:
                 tried[f"{command}: {'refused' if done.status else 'answered'}"] += 1
             if patience is not None and done.status == _STOPPED:
                 continue  # before there was a motion to keep
-            kind = fault_of(done, writes)
+            kind = fault_of(done, writes, checks=command == "check")
             if kind is not None:
                 return Fault(f"{place + 1}: {command}", f"{command}: {kind}", done.err[-6000:])
             if done.status:
@@ -253,8 +253,8 @@ def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
         os._exit(status)
 
 
-def fault_of(done: Done, writes: list[Path]) -> str | None:
-    """Say what is wrong with how a command ended; None where nothing is."""
+def fault_of(done: Done, writes: list[Path], *, checks: bool = False) -> str | None:
+    """Say what is wrong with how a command ended; None where nothing is. One that `checks` may say findings alone."""
     if done.status == -signal.SIGKILL:
         return f"hang of {SECONDS} s"
     if "Traceback (most recent call last)" in done.err:
@@ -265,7 +265,7 @@ def fault_of(done: Done, writes: list[Path]) -> str | None:
         return re.sub(r"^.*/(src|site-packages)/", "", found[0])[:200]
     if done.status:
         lines = [line for line in done.err.splitlines() if line.strip() and not _STEP.match(line)]
-        if len(lines) != 1 and (lines or not _CURE.search(done.err)):
+        if len(lines) != 1 and not (checks and not lines and _CURE.search(done.err)):
             return f"{len(lines)} lines of error"
         if max(map(len, lines), default=0) > LONGEST_LINE:
             return "an error of many characters"

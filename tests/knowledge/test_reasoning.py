@@ -52,6 +52,7 @@ ALARMS = {
         ("irt:raised_by_Rule", "https://w3id.org/irtwin/rules/twin_alarm"),
     )
 }
+REASON = "the twin misses the energy of this run by 12 %, more than 10 %; identify it again"
 
 
 def short(triples: set[Triple]) -> set[tuple[str, ...]]:
@@ -73,6 +74,12 @@ def test_swrl_and_shacl_rules_conclude_the_same(reasoned: KnowledgeGraph) -> Non
     assert short(reasoned.triples(GRAPH_SWRL)) == CONCLUSIONS
     links = short({one for one in reasoned.triples(GRAPH_SHACL) if not isinstance(one.object, Literal)})
     assert links == CONCLUSIONS | DOMINANT | ALARMS
+    said = {one for one in short(reasoned.triples(GRAPH_SHACL)) - links if "Arm_A" in one[0]}
+    assert said == {
+        ("id:twin_alarm/Arm_A.check_1", "irt:Alarm_Since", "2026-03-02T09:00:00Z"),
+        ("id:twin_alarm/Arm_A.check_1", "irt:Alarm_State", "active"),
+        ("id:twin_alarm/Arm_A.check_1", "irt:Alarm_Reason", REASON),
+    }
 
 
 def test_closure_types_what_rules_concluded(reasoned: KnowledgeGraph) -> None:
