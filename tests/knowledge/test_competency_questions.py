@@ -13,7 +13,7 @@ from tests import small_fleet
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Row
@@ -33,7 +33,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
         small_fleet.fill(workspace)
         documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    shacl_rules.infer(graph)
+    infer(graph)
     return graph
 
 
