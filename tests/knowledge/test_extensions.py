@@ -150,6 +150,23 @@ def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatc
     assert done.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("rules/my_rules.ttl", RULE.replace("BODY", "$this a")),
+        ("mappings/my.r2rml.ttl", MAPPING.replace("TABLE", "nothing_such").replace("GRAPH", GRAPH)),
+        ("questions/my.rq", QUESTION.replace("BODY", "FILTER(?s >")),
+    ],
+)
+def test_live_stops_at_a_fault_before_a_sample_is_read(name: str, text: str, tmp_path: Path) -> None:
+    Workspace(tmp_path).close()
+    file = put(tmp_path, name, text)
+    done = irtwin("live", "--workspace", tmp_path)
+    assert done.status == 2
+    assert done.err.startswith(f"irtwin: {file}, line ")
+    assert not (tmp_path / "graph").exists()
+
+
 def test_status_lists_what_extends_and_what_is_wrong(tmp_path: Path) -> None:
     Workspace(tmp_path).close()
     file = put(tmp_path, "rules/my_rules.ttl", RULE.replace("BODY", "$this a"))
