@@ -95,6 +95,9 @@ def test_report_and_export_hold_what_it_adds(done) -> None:
     assert export[0] == 0, export[2]
     owl = (place / "whole.owl").read_text(encoding="utf-8")
     assert "https://example.org/irtwin-co2#Heavy_Run" in owl
+    assert (
+        "swrl" in owl and 'The rule "heavy run"' not in owl
+    )  # it is there in SWRL, not among those that SWRL cannot say
     page = (place / "reports" / "Emitting.html").read_text(encoding="utf-8")
     assert "<h3>Heavy run</h3>" in page
     assert "What CO2 does each run stand for?" in page
