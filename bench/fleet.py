@@ -22,7 +22,7 @@ from typing import Any
 from pyoxigraph import DefaultGraph, Quad, Store
 
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.shacl.rules import all_rules
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, PREFIXES
 from irtwin.resources import folder, shipped
@@ -285,7 +285,7 @@ def make_database(place: Path, robots: int, runs: int) -> None:
 def make_graph(place: Path) -> int:
     """Map the database and infer by the rules, on disk; return the number of triples.
 
-    The rules are run on the store as it lies, once: `shacl_rules.infer` would copy it into memory.
+    The rules are run on the store as it lies, once: `rules.running.infer` would copy it into memory.
     """
     with KnowledgeGraph(place / "graph") as graph:
         graph.load_ontology()

@@ -26,19 +26,6 @@ def keep_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("irtwin.knowledge.store.no_network.leave_network", lambda: True)
 
 
-@pytest.fixture(scope="module")
-def without_java() -> Iterator[None]:
-    """Leave the SWRL rules out, as on a machine without Java: Pellet starts for two seconds each time.
-
-    For tests of other things that reason often. The SHACL rules of the same names run, and conclude the same
-    (`tests/knowledge/test_reasoning.py`).
-    """
-    with pytest.MonkeyPatch.context() as patched:
-        for module in ("engines", "reasoning", "owl_dl"):
-            patched.setattr(f"irtwin.knowledge.{module}.java", lambda: None)
-        yield
-
-
 @pytest.fixture(scope="session")
 def new_postgresql_database() -> Iterator[Callable[[], str]]:
     """Give a function that makes an empty database and returns its URL."""

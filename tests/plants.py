@@ -9,7 +9,7 @@ from sqlalchemy import update
 from sqlalchemy.orm import Session
 
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.shacl import rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, RDFS
 from irtwin.resources import folder
@@ -47,7 +47,7 @@ def tell(graph: KnowledgeGraph, quads: list[Quad], copies: int) -> None:
     """Tell a graph the ontology, so many copies of the quads, and what the rules conclude."""
     graph.load_ontology()
     graph.replace((quad for number in range(copies) for quad in _renamed(quads, number)), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    rules.infer(graph)
+    infer(graph)
 
 
 def make_plant(place: Path, copies: int = 1) -> Path:

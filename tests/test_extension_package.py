@@ -1,4 +1,4 @@
-"""The example package beside irtwin: its table, provider, rule, question and ontology work, no file edited."""
+"""Packages beside irtwin: table, provider, rule, question and ontology of one, and effect of another, just work."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 from sqlalchemy import text
 
 from irtwin.storage.database import Workspace
+from tests import bump_package
 from tests.small_robots import data_set
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "irtwin-co2"
@@ -20,11 +21,9 @@ LIMIT = "0.118"  # g; of the three runs one lies above it
 WORK = """
 import json, sys
 from pathlib import Path
-from irtwin.knowledge import owl_dl, reasoning
 from tests.data_sets import irtwin
 
-place, data = sys.argv[1:]
-reasoning.java = owl_dl.java = lambda: None  # Pellet takes seconds to start, for rules that are not tried here
+place, data, bumped = sys.argv[1:]
 heavy = "<https://example.org/irtwin-co2#Heavy_Run>"
 ask = f"SELECT ?run {{ ?run a {heavy} }} ORDER BY ?run"
 done = [irtwin("run", data, "--workspace", place)]
@@ -35,6 +34,9 @@ done.append(irtwin("explain", "?", "a", heavy, "--workspace", place))
 done.append(irtwin("explain", "?", "<https://example.org/irtwin-co2#Emission>", "?", "--workspace", place))
 done.append(irtwin("export", "--owl", place + "/whole.owl", "--workspace", place))
 done.append(irtwin("status", "--workspace", place))
+done.append(irtwin("diagnose", bumped, "--workspace", place, "--json", place + "/gap.json"))
+cause = "SELECT ?label { ?cause irt:caused_by_Effect ?effect . ?effect rdfs:label ?label }"
+done.append(irtwin("query", cause, "--workspace", place, "--format", "json"))
 print(json.dumps([[one.status, one.out, one.err] for one in done]))
 """
 
@@ -44,20 +46,21 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("packages")
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
     subprocess.run([*command, "--disable-pip-version-check", "--target", target, EXAMPLE], check=True)
+    bump_package.install(target)
     return target
 
 
 @pytest.fixture(scope="module")
 def done(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[list]]:
     place = tmp_path_factory.mktemp("emissions")
-    data = data_set(place / "data", "Emitting")
+    data, bumped = data_set(place / "data", "Emitting"), bump_package.data_set(place / "bumped")
     shipped = (EXAMPLE / "src/irtwin_co2/ontology/co2.ttl").read_text(encoding="utf-8")
     own = place / "workspace" / "ontology" / "co2.ttl"  # the workspace's own limit, in place of the package's
     own.parent.mkdir(parents=True)
     own.write_text(shipped.replace('"0.6"', f'"{LIMIT}"'), encoding="utf-8")
     path = os.pathsep.join([str(installed), *filter(None, sys.path)])
     said = subprocess.run(
-        [sys.executable, "-c", WORK, place / "workspace", data],
+        [sys.executable, "-c", WORK, place / "workspace", data, bumped],
         env={**os.environ, "PYTHONPATH": path},
         check=True,
         capture_output=True,
@@ -88,10 +91,13 @@ def test_its_rule_concludes_and_is_explained(done) -> None:
 
 @pytest.mark.slow
 def test_report_and_export_hold_what_it_adds(done) -> None:
-    place, (*_, export, status) = done
+    place, (*_, export, status, _, _) = done
     assert export[0] == 0, export[2]
     owl = (place / "whole.owl").read_text(encoding="utf-8")
     assert "https://example.org/irtwin-co2#Heavy_Run" in owl
+    assert (
+        "swrl" in owl and 'The rule "heavy run"' not in owl
+    )  # it is there in SWRL, not among those that SWRL cannot say
     page = (place / "reports" / "Emitting.html").read_text(encoding="utf-8")
     assert "<h3>Heavy run</h3>" in page
     assert "What CO2 does each run stand for?" in page
@@ -100,6 +106,19 @@ def test_report_and_export_hold_what_it_adds(done) -> None:
     assert "rules/co2_rules.ttl of irtwin-co2 0.1.0" in status[1]
     assert "ontology/co2.ttl of workspace, in place of " in status[1]
     assert "run_emission, of a package" in status[1]
+
+
+@pytest.mark.slow
+def test_a_diagnosis_names_the_effect_of_a_package(done) -> None:
+    place, (*_, status, diagnosis, cause) = done
+    assert "ontology/bump.ttl of bump-package 0.2" in status[1]
+    assert diagnosis[0] == 0, diagnosis[2]
+    said = json.loads((place / "gap.json").read_text(encoding="utf-8"))
+    assert [(one["effect"], one["joints"]) for one in said["causes"]] == [("bump", ["joint_1"])]
+    (found,) = said["causes"][0]["parameters"]
+    low, high = found["interval95"]
+    assert low < 8.0 < high
+    assert [row["label"] for row in json.loads(cause[1])] == ["bump"]
 
 
 @pytest.mark.slow

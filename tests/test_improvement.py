@@ -31,7 +31,7 @@ from tests.providers.test_gap_provider import NOTHING, diagnosis
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 from tests.test_next_experiment import experiment
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_java")]
+pytestmark = pytest.mark.slow
 
 CONSTANT = 1.5  # N m/A: copper loss is a fifth of the power
 ROBOT = with_constants(arm(2), CONSTANT)

@@ -29,7 +29,7 @@ from tests import data_sets
 from tests.data_sets import Said, irtwin
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_java")]
+pytestmark = pytest.mark.slow
 
 ROBOT = with_constants(arm(2))
 EFFECTS = '[twin]\neffects = ["rigid_body", "rotor_inertia", "coulomb_friction", "viscous_friction", "torque_offset", '

@@ -17,7 +17,7 @@ from irtwin.storage.database import Workspace
 from tests.data_sets import irtwin
 from tests.small_robots import data_set, with_signals
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_java")]
+pytestmark = pytest.mark.slow
 
 POISONS: dict[str, dict[str, Any]] = {  # what of `data_set` is other than of a good robot
     "one joint": {"joints": 1},

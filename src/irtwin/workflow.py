@@ -21,7 +21,6 @@ from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import explain_one
 from irtwin.knowledge.extensions import check_mappings
-from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
@@ -289,10 +288,7 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
     announce("Reasoning")
     inferred = reason(graph, engine)
     by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
-    announce(f"  {inferred.owl_rl} triples from {by}, {inferred.swrl} from SWRL, {inferred.shacl} from SHACL rules")
-    if inferred.not_run:
-        announce(f"  without Java, these SWRL rules did not run: {', '.join(inferred.not_run)}")
-        announce(f"  to get them: {HOW_TO_GET}, and run the data set again")
+    announce(f"  {inferred.owl_rl} triples from {by}, {inferred.by_rules} from rules")
     if inferred.joined_by:
         announce(
             f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"

@@ -8,17 +8,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+from sqlalchemy import select
+from sqlalchemy.orm import Session
 from tests import small_fleet
 
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.resources import folder
+from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 
 ANSWERS = Path(__file__).parent / "questions"
@@ -33,7 +36,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
         small_fleet.fill(workspace)
         documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    shacl_rules.infer(graph)
+    infer(graph)
     return graph
 
 
@@ -116,6 +119,31 @@ def test_a_total_is_what_the_runs_come_to(graph: KnowledgeGraph, total: str) -> 
     values = {row["arm"]: row["value"] for row in kept}
     assert values == pytest.approx({row["arm"]: row["value"] for row in added_up if row["arm"] in values})
     assert len(values) >= 3
+
+
+def test_a_robots_energies_are_sums_over_the_same_runs(tmp_path: Path) -> None:
+    """Shares of the total energy would be of other runs, were a run in one sum that only mechanics is known of."""
+    mechanical = "Arm_A.check_1"
+    with Workspace(tmp_path) as workspace:
+        small_fleet.fill(workspace)
+        with Session(workspace.engine) as session, session.begin():
+            one = session.get_one(schema.RunEnergy, mechanical)
+            one.energy_from = "mechanical"
+            of_robot = schema.RunEnergy.run_id.like("Arm_A.%")
+            rows = list(
+                session.scalars(select(schema.RunEnergy).where(of_robot, schema.RunEnergy.run_id != mechanical))
+            )
+            sums = {
+                "Total_Energy": sum(row.energy_consumption_j for row in rows),
+                "Total_Standby_Energy": sum(row.standby_energy_j for row in rows),
+                "Total_Returned_Energy": sum(row.returned_energy_j for row in rows),
+                "Total_Modelled_Energy": sum(row.modelled_energy_j for row in [*rows, one]),
+            }
+        graph = KnowledgeGraph()
+        graph.replace(map_database(workspace.engine, [folder("mappings") / "totals.r2rml.ttl"]), GRAPH_SOURCE)
+    for name, value in sums.items():
+        asked = f"SELECT ?value {{ <https://w3id.org/irtwin/id/robot_total/Arm_A> irt:{name} ?value }}"
+        assert graph.query(asked).rows[0]["value"] == pytest.approx(value)
 
 
 def per_robot(rows: Iterable[Row], column: str) -> dict[str, float]:

@@ -7,7 +7,7 @@ from pyoxigraph import Literal, NamedNode, Triple
 from tests.knowledge.test_owl_rl import triples
 
 from irtwin.errors import InputError
-from irtwin.knowledge import engines, java, owl_dl, reasoning
+from irtwin.knowledge import engines, owl_dl
 from irtwin.knowledge.engines import HERMIT, NATIVE, OWLRL
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.owl_rl import by_owlrl
@@ -15,7 +15,6 @@ from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.reasoning import asserted, engine_of, reason
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_OWL_RL, GRAPH_SOURCE, OWL, RDF, RDFS, XSD
-from irtwin.resources import shipped
 
 TYPE, SUBCLASS = NamedNode(RDF + "type"), NamedNode(RDFS + "subClassOf")
 # That ex:x belongs to ex:E needs an unnamed individual, of which OWL 2 RL knows nothing.
@@ -29,19 +28,12 @@ ex:C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty ex:p ; owl:someValuesF
 
 @pytest.fixture
 def no_java(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (engines, reasoning, owl_dl):
+    for module in (engines, owl_dl):
         monkeypatch.setattr(module, "java", lambda: None)
 
 
-@pytest.fixture
-def no_swrl(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts, files: set())  # Pellet takes seconds to start
-
-
 @pytest.mark.slow
-def test_owlrl_concludes_what_the_native_engine_does_and_the_graph_says_which(
-    graph: KnowledgeGraph, no_swrl: None
-) -> None:
+def test_owlrl_concludes_what_the_native_engine_does_and_the_graph_says_which(graph: KnowledgeGraph) -> None:
     reason(graph)
     native = graph.triples(GRAPH_OWL_RL)
     assert engine_of(graph) == NATIVE
@@ -82,7 +74,7 @@ def test_hermit_alone_finds_every_type_that_the_native_engine_finds(graph: Knowl
 
 
 @pytest.mark.system
-def test_hermit_finds_more_and_the_graph_says_who_did(no_swrl: None) -> None:
+def test_hermit_finds_more_and_the_graph_says_who_did() -> None:
     graph = KnowledgeGraph()
     graph.load_ontology()
     graph.replace(in_graph(triples(DL), GRAPH_SOURCE + "drawn"), GRAPH_SOURCE)
@@ -136,26 +128,3 @@ def test_without_java_hermit_is_refused_and_what_was_concluded_stays(graph: Know
     with pytest.raises(InputError, match=r'HermiT needs Java 25 or newer and finds none: `pip install "irtwin\[dl\]"`'):
         reason(graph, HERMIT)
     assert graph.triples(GRAPH_INFERRED) == before
-    with pytest.raises(java.NoJava, match="Pellet"):
-        files = shipped().of("rules", ".swrl.ttl")
-        fact = Triple(NamedNode("https://example.org/r"), next(iter(owl_dl._terms_of_rules(files))), Literal(1))
-        owl_dl.swrl_conclusions({fact}, files)
-
-
-@pytest.mark.slow
-def test_without_java_the_swrl_rules_are_named_until_there_is_one(
-    graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    names = ("idle-heavy run", "regenerating run", "twin to identify again")
-    text = "SELECT ?rule WHERE { reasoner:pellet irt:Rule_Not_Run ?rule } ORDER BY ?rule"
-    with monkeypatch.context() as patched:
-        for module in (engines, reasoning, owl_dl):
-            patched.setattr(module, "java", lambda: None)
-        done = reason(graph)
-        assert (done.swrl, done.not_run) == (0, names)
-        assert reason(graph).not_run == names
-        assert tuple(row["rule"] for row in graph.query(text)) == names
-    done = reason(graph)
-    assert done.swrl > 0
-    assert done.not_run == ()
-    assert graph.query(text).rows == ()

@@ -4,18 +4,15 @@ import json
 from collections.abc import Iterator
 
 import pytest
-from pyoxigraph import NamedNode, Quad, Triple
+from pyoxigraph import Quad
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain import explain as explaining
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.explain.explanation import Explanation, to_json, to_text
-from irtwin.knowledge.explain.rules import premises
-from irtwin.knowledge.explain.swrl import swrl_rules
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, RDF, term
-from irtwin.resources import shipped
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +39,7 @@ def all_within(explanation: Explanation) -> Iterator[Explanation]:
 
 def test_rules_conclusion_is_followed_down_to_files(reasoned: KnowledgeGraph) -> None:
     found = only(reasoned, "id:twin/Arm_A.t1 a irt:Twin_To_Reidentify")
-    assert found.by == 'the rule "twin to identify again", in SHACL and in SWRL'
+    assert found.by == 'the rule "twin to identify again", in SHACL'
     assert found.meaning is not None and "misses the energy" in found.meaning
     assert {each.what for each in found.because} == {
         'id:run/Arm_A.check_1 irt:Energy_Error "12"^^xsd:double',
@@ -138,26 +135,3 @@ def test_written_as_outline_and_as_json(reasoned: KnowledgeGraph) -> None:
 def test_pattern_that_cannot_be_explained_is_refused(reasoned: KnowledgeGraph, pattern: str, message: str) -> None:
     with pytest.raises(InputError, match=message.replace("?", r"\?")):
         explain(reasoned, pattern)
-
-
-def test_a_conclusion_of_swrl_alone_has_its_premises(reasoned: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(explaining, "all_rules", lambda resources: ())
-    found = only(reasoned, "id:twin/Arm_A.t1 a irt:Twin_To_Reidentify")
-    assert found.by == 'the rule "twin to identify again", in SWRL'
-    assert {each.what for each in found.because} == {
-        'id:run/Arm_A.check_1 irt:Energy_Error "12"^^xsd:double',
-        "id:run/Arm_A.check_1 irt:modelled_by id:twin/Arm_A.t1",
-        'irt:default_Limits irt:Energy_Error_Limit "10"^^xsd:double',
-    }
-
-
-def test_built_ins_of_swrl_are_reckoned() -> None:
-    (rule,) = [rule for rule in swrl_rules(shipped().of("rules", ".swrl.ttl")) if rule.label == "regenerating run"]
-    graph = KnowledgeGraph()
-    graph.update("""INSERT DATA { irt:default_Limits irt:Returned_Share_Limit 0.1e0 .
-        <urn:a> irt:Returned_Energy 2e1 ; irt:Energy_Consumption 1e2 ; a irt:Regenerating_Run .
-        <urn:b> irt:Returned_Energy 1e0 ; irt:Energy_Consumption 1e2 ; a irt:Regenerating_Run . }""")
-    regenerating = NamedNode(RDF + "type"), NamedNode(term("Regenerating_Run"))
-    found = premises(graph, rule, Triple(NamedNode("urn:a"), *regenerating))
-    assert found is not None and len(found) == 3
-    assert premises(graph, rule, Triple(NamedNode("urn:b"), *regenerating)) is None

@@ -3,13 +3,15 @@ from pathlib import Path
 import owlready2
 import pytest
 import rdflib
-from rdflib.namespace import OWL, RDF
+from rdflib.namespace import OWL, RDF, RDFS
 
 from irtwin.knowledge import owl_dl  # noqa: F401  tells owlready2 where Java is
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.export import export_owl
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.resources import shipped
 
 pytestmark = pytest.mark.slow
 
@@ -50,6 +52,21 @@ def test_everything_that_is_asserted_or_inferred_is_in_it(graph: KnowledgeGraph,
         f"https://w3id.org/irtwin/id/joint/Arm_{robot}/j{number}" for robot in "AB" for number in "12"
     }
     assert len(set(written.subjects(RDF.type, IRT.Effect))) == 38
+
+
+def test_each_individual_has_a_label_and_each_rule_is_there_or_named(exported: Path) -> None:
+    written = rdflib.Graph().parse(exported, format="xml")
+    individuals = set(written.subjects(RDF.type, OWL.NamedIndividual))
+    assert individuals - set(written.subjects(RDFS.label)) == set()
+    run = rdflib.URIRef("https://w3id.org/irtwin/id/run/Arm_A.idle_1")
+    assert str(written.value(run, RDFS.label)) == "run Arm_A.idle_1"
+    imp = rdflib.URIRef("http://www.w3.org/2003/11/swrl#Imp")
+    in_swrl = {str(written.value(rule, RDFS.label)) for rule in written.subjects(RDF.type, imp)}
+    assert in_swrl == {"twin to identify again", "idle-heavy run"}
+    comments = list(map(str, written.objects(rdflib.URIRef("https://w3id.org/irtwin"), RDFS.comment)))
+    (said,) = [each for each in comments if each.startswith('The rule "regenerating run"')]
+    assert said.endswith("it reckons, and HermiT takes no built-ins. What irtwin concluded by it is.")
+    assert sum(each.startswith("The rule ") for each in comments) + len(in_swrl) == len(all_rules(shipped()))
 
 
 def test_times_are_cut_to_what_hermit_reads(graph: KnowledgeGraph, exported: Path) -> None:

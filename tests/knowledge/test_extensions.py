@@ -11,7 +11,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check, check_mappings
 from irtwin.knowledge.locality import of_all_rules
 from irtwin.knowledge.questions.queries import named_questions
-from irtwin.knowledge.shacl.rules import all_rules
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.resources import Resources, resources_of
 from irtwin.storage.database import Workspace
 
@@ -78,6 +78,11 @@ FAULTS = [
     ("rules/my.swrl.ttl", SWRL.replace("BODY", "IR_RunProcess").replace("HEAD", "other"), r"line 11: .*\?other, which"),
     ("rules/my.swrl.ttl", SWRL.replace("BODY", "Nothing_Such").replace("HEAD", "run"), "line 12: .*irt:Nothing_Such"),
     ("rules/my.swrl.ttl", "my:a a my:b .", "has no swrl:Imp"),
+    (
+        "rules/my.swrl.ttl",
+        SWRL.replace("HEAD", "run").replace("swrl:ClassAtom ; swrl:classPredicate irt:BODY", "swrl:BuiltinAtom"),
+        "line 11: the rule 'odd' uses",
+    ),
     ("shapes/my.ttl", SHAPE.replace("WHAT", 'sh:minCount "one"'), "line 11: not well-formed SHACL: sh:minCount"),
     ("shapes/my.ttl", SHAPE.replace("WHAT", "sh:minCont 1"), "line 11: sh:minCont is no term of SHACL"),
     ("shapes/my.ttl", SHAPE.replace("sh:path irt:Run_Time ; WHAT", "sh:minCount 1"), "line 10: not well-formed"),
@@ -129,7 +134,7 @@ def test_what_is_sound_holds_beside_what_ships(tmp_path: Path) -> None:
     with Workspace(tmp_path) as place:
         check(place.resources)
         check_mappings(place.resources, place.engine)
-        assert "long run" in {rule.label for rule in all_rules(place.resources)}
+        assert {"long run", "odd"} <= {rule.label for rule in all_rules(place.resources)}
         assert "long_runs" in named_questions(place.resources)
         assert "long_runs" not in named_questions()
         assert not of_all_rules(Resources(place.resources.extensions)).unknown
@@ -143,6 +148,23 @@ def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatc
     assert done.status == 2
     assert done.err.startswith("irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL")
     assert done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("rules/my_rules.ttl", RULE.replace("BODY", "$this a")),
+        ("mappings/my.r2rml.ttl", MAPPING.replace("TABLE", "nothing_such").replace("GRAPH", GRAPH)),
+        ("questions/my.rq", QUESTION.replace("BODY", "FILTER(?s >")),
+    ],
+)
+def test_live_stops_at_a_fault_before_a_sample_is_read(name: str, text: str, tmp_path: Path) -> None:
+    Workspace(tmp_path).close()
+    file = put(tmp_path, name, text)
+    done = irtwin("live", "--workspace", tmp_path)
+    assert done.status == 2
+    assert done.err.startswith(f"irtwin: {file}, line ")
+    assert not (tmp_path / "graph").exists()
 
 
 def test_status_lists_what_extends_and_what_is_wrong(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.owl_dl import classify
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import asserted
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
@@ -39,7 +39,7 @@ def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
         mappings = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    shacl_rules.infer(graph)
+    infer(graph)
     return verdict, graph
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pyoxigraph import RdfFormat, parse
 
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
 SOURCE = "https://w3id.org/irtwin/graph/source/rules"
@@ -92,7 +92,7 @@ def actions() -> dict[str, set[str]]:
     graph = KnowledgeGraph()
     graph.load_ontology()
     graph.replace(parse(individuals(), format=RdfFormat.TRIG), SOURCE)
-    shacl_rules.infer(graph)
+    infer(graph)
     found: dict[str, set[str]] = {}
     rows = graph.query(
         """SELECT ?of ?label WHERE {

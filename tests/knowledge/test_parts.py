@@ -11,7 +11,7 @@ from tests import small_fleet
 from tests.individuals import individual
 
 from irtwin import workflow
-from irtwin.knowledge import owl_dl, parts, reasoning
+from irtwin.knowledge import parts, reasoning
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
@@ -28,31 +28,12 @@ from irtwin.knowledge.vocabulary import (
     XSD,
     term,
 )
-from irtwin.resources import Files, folder
+from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 
 SOURCE = GRAPH_SOURCE + "drawn"
 TYPE = RDF + "type"
 ROBOTS = ("r", "s")
-
-
-@pytest.fixture(autouse=True)
-def pellet(monkeypatch: pytest.MonkeyPatch) -> list[set[Triple]]:
-    """Pellet takes seconds to start; one rule in its stead keeps what it is asked."""
-    calls: list[set[Triple]] = []
-
-    def conclude(facts: set[Triple], files: Files) -> set[Triple]:
-        calls.append(facts)
-        by_predicate: dict[str, dict] = {}
-        for one in facts:
-            by_predicate.setdefault(one.predicate.value, {})[one.subject] = one.object
-        limits = [float(it.value) for it in by_predicate.get(term("Idle_Share_Limit"), {}).values()]
-        shares = by_predicate.get(term("Idle_Share"), {}).items()
-        idle = {run for run, share in shares for limit in limits if float(share.value) > limit}
-        return {Triple(run, NamedNode(TYPE), NamedNode(term("Idle_Heavy_Run"))) for run in idle}
-
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", conclude)
-    return calls
 
 
 def quad(subject: str, predicate: str, value, graph: str = SOURCE) -> Quad:
@@ -209,11 +190,8 @@ def test_what_joins_robots_is_seen(joining: Quad) -> None:
     assert inferred(graph) == inferred(anew(FACTS))
 
 
-def test_only_the_part_that_changed_is_reasoned_over(
-    monkeypatch: pytest.MonkeyPatch, pellet: list[set[Triple]]
-) -> None:
+def test_only_the_part_that_changed_is_reasoned_over(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = anew(FACTS)
-    pellet.clear()
     given: set[Triple] = set()
     add = Closure.add
     monkeypatch.setattr(Closure, "add", lambda self, triples: (given.update(triples), add(self, triples))[1])
@@ -222,18 +200,6 @@ def test_only_the_part_that_changed_is_reasoned_over(
     reason(graph)
     said_of = {it.subject.value for it in given if it.subject.value.startswith("https://w3id.org/irtwin/id/")}
     assert said_of == {one.subject.value for one in of_robot("r")}
-    assert [{it.subject.value for it in facts} & said_of for facts in pellet] == [
-        {individual("run", "r.1"), individual("run", "r.2")}
-    ]
-
-
-def test_pellet_rests_where_what_its_rules_speak_of_stays(pellet: list[set[Triple]]) -> None:
-    graph = anew(FACTS)
-    pellet.clear()
-    graph.change((), {quad(individual("run", "r.1"), term("Run_Name"), Literal("evening"))})
-    reason(graph)
-    assert pellet == []
-    assert inferred(graph)[f"{GRAPH_INFERRED}swrl"]
 
 
 def test_a_part_that_goes_takes_its_conclusions_along() -> None:

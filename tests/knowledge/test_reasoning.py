@@ -1,4 +1,4 @@
-"""SWRL by Pellet, SHACL rules by SPARQL, and HermiT: they agree with each other and with pySHACL."""
+"""Rules by SPARQL, as pySHACL runs them, and the graph before HermiT."""
 
 import pyshacl
 import pytest
@@ -9,7 +9,7 @@ from tests.individuals import individual
 from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import asserted, reason
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
@@ -17,7 +17,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_OWL_RL,
     GRAPH_SHACL,
     GRAPH_SOURCE,
-    GRAPH_SWRL,
     RDF,
     shorten,
     term,
@@ -70,8 +69,7 @@ def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
     return graph
 
 
-def test_swrl_and_shacl_rules_conclude_the_same(reasoned: KnowledgeGraph) -> None:
-    assert short(reasoned.triples(GRAPH_SWRL)) == CONCLUSIONS
+def test_rules_conclude_what_is_known_of_two_robots(reasoned: KnowledgeGraph) -> None:
     links = short({one for one in reasoned.triples(GRAPH_SHACL) if not isinstance(one.object, Literal)})
     assert links == CONCLUSIONS | DOMINANT | ALARMS
     said = {one for one in short(reasoned.triples(GRAPH_SHACL)) - links if "Arm_A" in one[0]}
@@ -108,9 +106,8 @@ def test_changed_limit_changes_the_conclusions(graph: KnowledgeGraph) -> None:
     ]
     graph.replace(ontology, GRAPH_ONTOLOGY)
     reason(graph)
-    for name in (GRAPH_SWRL, GRAPH_SHACL):
-        idle = {subject for subject, _, kind in short(graph.triples(name)) if kind == "irt:Idle_Heavy_Run"}
-        assert idle == {"id:run/Arm_A.idle_1", "id:run/Arm_A.check_1"}
+    idle = {subject for subject, _, kind in short(graph.triples(GRAPH_SHACL)) if kind == "irt:Idle_Heavy_Run"}
+    assert idle == {"id:run/Arm_A.idle_1", "id:run/Arm_A.check_1"}
 
 
 def test_conclusion_goes_with_its_premise(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
@@ -127,20 +124,12 @@ def test_set_wise_rules_give_what_pyshacl_gives(graph: KnowledgeGraph) -> None:
     pyshacl.validate(data, shacl_graph=rdflib.Graph().parse(folder("rules") / "rules.ttl"), advanced=True, inplace=True)
     text = "\n".join(line for line in data.serialize(format="nt").splitlines() if "_:" not in line)
     expected = {quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)} - before
-    shacl_rules.infer(graph)
+    infer(graph)
     ours = {one for one in graph.triples(GRAPH_SHACL) if one not in before}
     of_rules, of_pyshacl = (
         short({one for one in found if not isinstance(one.object, Literal)}) for found in (ours, expected)
     )
     assert of_rules == of_pyshacl == CONCLUSIONS | DOMINANT | ALARMS
-
-
-def test_rules_have_the_same_names_in_both_languages() -> None:
-    label = NamedNode("http://www.w3.org/2000/01/rdf-schema#label")
-    swrl = {one.object.value for one in read_turtle(folder("rules") / "judgement.swrl.ttl") if one.predicate == label}
-    shacl = {one.object.value for one in read_turtle(folder("rules") / "rules.ttl") if one.predicate == label}
-    assert shacl - swrl == {"dominant joint", "twin alarm"}  # SWRL makes no individuals
-    assert swrl <= shacl
 
 
 def test_hermit_finds_two_robots_consistent(graph: KnowledgeGraph) -> None:

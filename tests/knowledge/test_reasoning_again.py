@@ -3,10 +3,9 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyoxigraph import Literal, NamedNode, Quad, Triple
+from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
 
-from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
@@ -15,7 +14,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_REASONED,
     GRAPH_SHACL,
     GRAPH_SOURCE,
-    GRAPH_SWRL,
     RDF,
     RDFS,
     term,
@@ -25,20 +23,6 @@ SOURCE = GRAPH_SOURCE + "drawn"
 TYPE = RDF + "type"
 RUNS = [individual("run", name) for name in ("one", "two")]
 JOINTS = [individual("joint", name) for name in ("a", "b")]
-
-
-@pytest.fixture(autouse=True)
-def without_java(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Pellet takes seconds to start; one rule in its stead counts how often it was asked."""
-    calls: list[int] = []
-
-    def conclude(facts, files):
-        calls.append(len(facts))
-        idle = (one for one in facts if one.predicate.value == term("Idle_Share") and float(one.object.value) > 0.5)
-        return {Triple(one.subject, NamedNode(TYPE), NamedNode(term("Idle_Heavy_Run"))) for one in idle}
-
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", conclude)
-    return calls
 
 
 def quad(subject: str, predicate: str, value) -> Quad:
@@ -102,7 +86,7 @@ def test_graphs_of_rules_whose_premises_stay_are_not_rewritten() -> None:
     graph.replace(FACTS, GRAPH_SOURCE)
     reason(graph)
     graph.replace([one for one in FACTS if one.predicate.value != term("Idle_Share")], GRAPH_SOURCE)
-    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}/idle_heavy_run", GRAPH_SWRL)
+    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}/idle_heavy_run")
     assert graph.triples(f"{GRAPH_SHACL}/dominant_joint")
 
 
@@ -121,24 +105,13 @@ def test_only_what_differs_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
     assert kept == {(RUNS[0], term("dominant_Joint"))}
 
 
-def test_nothing_is_done_where_no_premise_changed(without_java: list[int]) -> None:
+def test_nothing_is_done_where_no_premise_changed() -> None:
     graph = KnowledgeGraph()
     graph.replace(FACTS, GRAPH_SOURCE)
     first = reason(graph)
-    assert len(without_java) == 1
     again = reason(graph)
     assert again.changed == ()
-    assert (again.owl_rl, again.swrl, again.shacl) == (first.owl_rl, first.swrl, first.shacl)
-    assert len(without_java) == 1
-
-
-def test_swrl_rules_rest_while_what_they_speak_of_stays(without_java: list[int]) -> None:
-    graph = KnowledgeGraph()
-    graph.replace(FACTS, GRAPH_SOURCE)
-    reason(graph)
-    graph.replace([one for one in FACTS if one.predicate.value != term("has_Joint")], GRAPH_SOURCE)
-    assert GRAPH_OWL_RL in reason(graph).changed
-    assert len(without_java) == 1
+    assert (again.owl_rl, again.by_rules) == (first.owl_rl, first.by_rules)
 
 
 def test_what_was_inferred_of_a_robot_is_dropped_where_the_premises_now_contradict() -> None:

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from pyoxigraph import RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
-from irtwin.knowledge.shacl.rules import conclusions, read_rules, rules_of
+from irtwin.knowledge.rules.files import read_rules
+from irtwin.knowledge.rules.running import conclusions
+from irtwin.knowledge.rules.shacl import rules_of
 from irtwin.knowledge.shacl.shapes import Shapes
 
 PREFIXES = """

@@ -3,7 +3,6 @@ import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
 
-from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -116,8 +115,7 @@ WRONG_LINES = {
 }
 
 
-def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts, files: set())  # Pellet takes seconds to start
+def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad]) -> None:
     wrong = changed(untyped(untyped(two_robots, RUN), JOINT), SHARE, "of_Effect", NamedNode(MAGIC))
     wrong = changed(wrong, PARAMETER, "of_Effect", NamedNode(MAGIC + "2"))
     wrong += [typed(MAGIC + "2", "Effect"), typed(LUCK, "Effect_Family"), typed(FOUND, "Gap_Finding")]
@@ -171,7 +169,7 @@ def violations_anew(quads: list[Quad]) -> tuple[str, ...]:
 
 @pytest.fixture
 def checked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
-    """Return the individuals that pySHACL is given, call by call; no rule of SWRL, as Pellet takes seconds."""
+    """Return the individuals that pySHACL is given, call by call."""
     calls: list[set[str]] = []
     shacl = pyshacl.validate
 
@@ -180,7 +178,6 @@ def checked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
         return shacl(data, **options)
 
     monkeypatch.setattr(pyshacl, "validate", spy)
-    monkeypatch.setattr(owl_dl, "swrl_conclusions", lambda facts, files: set())
     return calls
 
 

@@ -10,8 +10,10 @@ from tests import rows
 
 from irtwin import resources
 from irtwin.cli.graph import explain
+from irtwin.knowledge.explain.provenance import told_in
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import term
 from irtwin.providers.records import inputs, run_iri, twin_iri
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import SourceFile
@@ -53,9 +55,9 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def asked(place: Path, property: str) -> tuple[int, list[str], str]:
+def asked(place: Path, property: str, subject: str = f"id:run/{RUN}") -> tuple[int, list[str], str]:
     """Return the exit status of `irtwin explain --verify`, its lines on files, and what it explains."""
-    done = CliRunner().invoke(explain, [f"id:run/{RUN}", property, "--verify", "--workspace", str(place / "w")])
+    done = CliRunner().invoke(explain, [subject, property, "--verify", "--workspace", str(place / "w")])
     outline, _, files = done.output.rpartition("\n\n")
     return done.exit_code, sorted(line.replace(str(place) + "/", "") for line in files.splitlines()), outline
 
@@ -99,6 +101,17 @@ def test_what_a_data_set_says_cites_it(filled: Path) -> None:
         _, files, _ = asked(filled, f"irt:{name}")
         assert files == ["whole: data/dataset.toml"]
     assert asked(filled, "irt:Sample_Count")[1] == ["whole: data/runs/work.csv"]
+
+
+def test_a_joints_limits_cite_the_file_that_describes_the_robot(filled: Path) -> None:
+    joint = f"id:joint/{rows.ROBOT}/joint_a1"
+    for name in ("Lower_Limit", "Upper_Limit", "Speed_Limit"):
+        assert asked(filled, f"irt:{name}", joint)[1] == ["whole: data/robot.urdf"]
+    graph = KnowledgeGraph()  # of a robot that a table of its data set describes
+    graph.update("""INSERT DATA { irt:Lower_Limit irt:told_in "URDF" . <urn:r> irt:has_Joint <urn:j> .
+        <urn:s> irt:source_of <urn:r> ; irt:Source_Kind "data set" ; irt:File "dataset.toml" ; irt:Checksum "1" ;
+        irt:Data_Folder "/data" }""")
+    assert told_in(graph, "urn:j", term("Lower_Limit")).file == "dataset.toml"
 
 
 @pytest.mark.parametrize("kind", ["data/runs/work.csv", "data/dataset.toml", "data/robot.urdf", "twin", "series"])

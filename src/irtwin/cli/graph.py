@@ -219,9 +219,16 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float) -> Non
     show_default=True,
     help="HTML file to write.",
 )
-def docs(out: Path) -> None:
-    """Write the ontology's documentation as one HTML page."""
+@click.option(
+    "--workspace",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    help="Folder whose ontology/ is documented too.",
+)
+def docs(out: Path, workspace: Path | None) -> None:
+    """Write the ontology's documentation as one HTML page, with what installed packages add."""
+    from irtwin import asking
     from irtwin.report.ontology.page import write_page
+    from irtwin.resources import resources_of
 
-    write_page(out)
+    write_page(out, resources_of() if workspace is None else asking.checked(workspace))
     click.echo(out)

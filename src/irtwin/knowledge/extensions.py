@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
 import rdflib
-from pyoxigraph import NamedNode, QuerySolutions, Store, Triple
+from pyoxigraph import NamedNode, QuerySolutions, Store
 from pyshacl.entrypoints import meta_validate
 from rdflib.namespace import SH
 from rdflib.plugins.sparql.algebra import translateQuery
@@ -20,17 +20,18 @@ from irtwin.knowledge.mapping.document import TermMap, TriplesMap
 from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.questions.queries import read_question
-from irtwin.knowledge.shacl.rules import ShaclRule, graph_of, read_rules
+from irtwin.knowledge.rules import swrl
+from irtwin.knowledge.rules.files import read_rules
+from irtwin.knowledge.rules.rule import SHACL, Rule
 from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.store.keywords import refuse_service
 from irtwin.knowledge.store.syntax_error import in_words
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL, PREFIXES, RDF, shorten
-from irtwin.knowledge.vocabulary import SH as SHACL
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL, PREFIXES, shorten
+from irtwin.knowledge.vocabulary import SH as SHACL_TERMS
 from irtwin.resources import Files, Resource, Resources
 
-_SWRL = "http://www.w3.org/2003/11/swrl#"
-_SWRL_BUILT_IN = "http://www.w3.org/2003/11/swrlb#"
 _TEXTS = (SH.select, SH.ask, SH.construct)
+_NAMES_A_TERM = [swrl.NAMESPACE + name for name in ("classPredicate", "propertyPredicate")]
 _LONGEST = 60.0  # s that a look at the columns of a mapping's SQL may take
 _AT = re.compile(r"error at (\d+):(\d+): (.*)", re.DOTALL)
 
@@ -47,7 +48,7 @@ def _check(files: Files) -> None:
         if file.kind in _CHECKS:
             _CHECKS[file.kind](file)
     if any(file.is_extension for file in resources.of("rules")):
-        _check_names(resources.of("rules", "rules.ttl"))
+        _check_names(resources.of("rules"))
         _check_terms(resources)
 
 
@@ -89,21 +90,20 @@ def _check_ontology(file: Resource) -> None:
 
 
 def _check_rules(file: Resource) -> None:
-    if file.name.endswith(".swrl.ttl"):
-        _check_swrl(file)
-        return
     try:
         rules = read_rules(file.path)
     except InputError as error:
         raise InputError(_with_line(file, str(error))) from error
     if not rules:
-        raise InputError(f"{file.path}: has no sh:rule; constraints belong into shapes/")
+        is_swrl = file.name.endswith(".swrl.ttl")
+        what = "swrl:Imp; a rule is one" if is_swrl else "sh:rule; constraints belong into shapes/"
+        raise InputError(f"{file.path}: has no {what}")
     for rule in rules:
         _check_rule(file, rule)
 
 
-def _check_rule(file: Resource, rule: ShaclRule) -> None:
-    if not rule.name.startswith(("http:", "https:", "urn:")):
+def _check_rule(file: Resource, rule: Rule) -> None:
+    if rule.language == SHACL and not rule.name.startswith(("http:", "https:", "urn:")):
         raise InputError(f"{file.path}: a rule has no IRI; give its shape one, for conclusions to name it")
     line = _line_of(file, _end(rule.name))
     fault = sparql_fault(rule.construct)
@@ -129,7 +129,7 @@ def _check_names(files: Files) -> None:
     known: dict[str, tuple[Resource, str]] = {}
     for file in files:
         for rule in read_rules(file.path):
-            other, name = known.setdefault(graph_of(rule.name), (file, rule.name))
+            other, name = known.setdefault(rule.graph, (file, rule.name))
             if (other, name) != (file, rule.name):
                 extension = file if file.is_extension else other
                 raise InputError(
@@ -138,63 +138,16 @@ def _check_names(files: Files) -> None:
                 )
 
 
-def _check_swrl(file: Resource) -> None:
-    said = _by_subject(read_turtle(file.path))
-    rules = [node for node, of in said.items() if of.get(RDF + "type") == NamedNode(_SWRL + "Imp")]
-    if not rules:
-        raise InputError(f"{file.path}: has no swrl:Imp; a rule is one")
-    for rule in rules:
-        label = getattr(said[rule].get("http://www.w3.org/2000/01/rdf-schema#label"), "value", "")
-        if not label:
-            raise InputError(f"{file.path}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
-        where = f"{file.path}, line {_line_of(file, label)}: the rule {label!r}"
-        body, head = (_atoms(said, said[rule].get(_SWRL + part), where, part) for part in ("body", "head"))
-        for atom in (*body, *head):
-            built_in = atom.get(_SWRL + "builtin")
-            if built_in is not None and not built_in.value.startswith(_SWRL_BUILT_IN):
-                raise InputError(f"{where} uses {shorten(built_in.value)}, which is no built-in of SWRL")
-        bound = {name for atom in body for name in _arguments(said, atom)}
-        free = sorted(name for atom in head for name in _arguments(said, atom) if name not in bound)
-        if free:
-            raise InputError(f"{where} concludes ?{_end(free[0])}, which its body does not bind")
-
-
-def _atoms(said: Mapping[Any, Mapping[str, Any]], cell: Any, where: str, part: str) -> list[Mapping[str, Any]]:
-    atoms, seen = [], set()
-    while cell in said and cell not in seen:
-        seen.add(cell)
-        atom = said.get(said[cell].get(RDF + "first"))
-        if atom is None:
-            break
-        atoms.append(atom)
-        cell = said[cell].get(RDF + "rest")
-    if not atoms or cell != NamedNode(RDF + "nil"):
-        raise InputError(f"{where} has no list of atoms for its swrl:{part}")
-    return atoms
-
-
-def _arguments(said: Mapping[Any, Mapping[str, Any]], atom: Mapping[str, Any]) -> set[str]:
-    """Return the variables of an atom."""
-    terms = [atom.get(_SWRL + "argument1"), atom.get(_SWRL + "argument2")]
-    cell, seen = atom.get(_SWRL + "arguments"), set[Any]()
-    while cell in said and cell not in seen:
-        seen.add(cell)
-        terms.append(said[cell].get(RDF + "first"))
-        cell = said[cell].get(RDF + "rest")
-    kind = NamedNode(_SWRL + "Variable")
-    return {term.value for term in terms if term is not None and said.get(term, {}).get(RDF + "type") == kind}
-
-
 def _check_terms(resources: Resources) -> None:
-    """Pellet takes no class or property that no module declares."""
+    """A name in SWRL that no module declares is misspelt: no tool of OWL knows what it is."""
     declared: set[Any] = set()
     kinds = {NamedNode(OWL + kind) for kind in ("Class", "ObjectProperty", "DatatypeProperty")}
     for module in resources.of("ontology"):
         declared |= {it.subject for it in read_turtle(module.path) if it.object in kinds}
     for file in resources.of("rules", ".swrl.ttl"):
         for triple in read_turtle(file.path) if file.is_extension else ():
-            names = triple.predicate.value in (_SWRL + "classPredicate", _SWRL + "propertyPredicate")
-            if names and triple.object not in declared:
+            names = triple.predicate.value in _NAMES_A_TERM
+            if names and isinstance(triple.object, NamedNode) and triple.object not in declared:
                 iri = str(getattr(triple.object, "value", triple.object))
                 line = _line_of(file, _end(iri))
                 raise InputError(f"{file.path}, line {line}: no module of the ontology declares {shorten(iri)}")
@@ -207,7 +160,7 @@ def _check_shapes(file: Resource) -> None:
     if not {SH.NodeShape, SH.PropertyShape} & set(shapes.objects(None, rdflib.RDF.type)):
         raise InputError(f"{file.path}: has no sh:NodeShape; a constraint is one")
     for term in sorted(map(str, {*shapes.predicates(), *shapes.objects(None, rdflib.RDF.type)})):
-        if term.startswith(SHACL) and _end(term) not in SH:
+        if term.startswith(SHACL_TERMS) and _end(term) not in SH:
             line = _line_of(file, f"sh:{_end(term)}")
             raise InputError(f"{file.path}, line {line}: sh:{_end(term)} is no term of SHACL; correct it")
     for kind in _TEXTS:
@@ -285,13 +238,6 @@ _CHECKS: dict[str, Callable[[Resource], None]] = {
 }
 
 
-def _by_subject(triples: Iterable[Triple]) -> dict[Any, dict[str, Any]]:
-    said: dict[Any, dict[str, Any]] = {}
-    for triple in triples:
-        said.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
-    return said
-
-
 def _prefixed(shapes: rdflib.Graph, text: str) -> str:
     found = [
         (shapes.value(one, SH.prefix), shapes.value(one, SH.namespace)) for one in shapes.objects(None, SH.declare)
@@ -304,7 +250,7 @@ def _with_line(file: Resource, message: str) -> str:
     rest = message.removeprefix(str(file.path))
     if not rest.startswith((":", " ")) or re.match(r", line ", rest):
         return message if message.startswith(str(file.path)) else f"{file.path}: {message}"
-    named = re.search(r"[#/:<]([\w-]+)>?(?=[:, ])", rest)
+    named = re.match(r": the rule '(.+?)' ", rest) or re.search(r"[#/:<]([\w-]+)>?(?=[:, ])", rest)
     line = _line_of(file, named[1]) if named else 1
     return f"{file.path}, line {line}{rest}"
 

@@ -20,12 +20,11 @@ from rdflib.plugins.sparql import prepareQuery
 from rdflib.plugins.sparql.algebra import traverse
 from rdflib.plugins.sparql.parserutils import CompValue
 
-from irtwin.knowledge.shacl.rules import all_rules
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import read_turtle
-from irtwin.knowledge.vocabulary import PREFIXES, RDF, SH
+from irtwin.knowledge.vocabulary import PREFIXES, SH
 from irtwin.resources import Files, Resources
 
-_SWRL = "http://www.w3.org/2003/11/swrl#"
 _TYPE = rdflib.RDF.type
 _THIS = rdflib.Variable("this")
 _TEXTS = {SH + name for name in ("select", "ask", "construct")}
@@ -57,7 +56,7 @@ class Reach:
 
 
 def of_all_rules(resources: Resources) -> Reach:
-    """Return how far the SHACL rules, the SWRL rules and the constraints look."""
+    """Return how far the rules and the constraints look."""
     return _of_files(resources.of("rules"), resources.of("shapes"))
 
 
@@ -66,8 +65,6 @@ def _of_files(rules: Files, shapes: Files) -> Reach:
     reach = Reach()
     for rule in all_rules(Resources(rules)):
         reach |= of_query(rule.construct)
-    for file in Resources(rules).of("rules", ".swrl.ttl"):
-        reach |= of_swrl(read_turtle(file.path))
     for file in shapes:
         reach |= of_shapes(read_turtle(file.path))
     return reach
@@ -98,19 +95,6 @@ def of_query(text: str) -> Reach:
     return _reach(patterns, named) | Reach(unknown=frozenset(unknown), terms=frozenset(terms))
 
 
-def of_swrl(triples: Iterable[Triple]) -> Reach:
-    """Return how far SWRL rules look from the first individual of their bodies."""
-    said: dict[Any, dict[str, Any]] = {}
-    for triple in triples:
-        said.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
-    reach = Reach()
-    for rule in said.values():
-        if _SWRL + "body" in rule:
-            patterns = [pattern for atom in _items(said, rule[_SWRL + "body"]) for pattern in _pattern(said[atom])]
-            reach |= _reach(patterns, {patterns[0][0]} if patterns else set())
-    return reach
-
-
 def of_shapes(triples: Iterable[Triple]) -> Reach:
     """Return how far the constraints of a shapes graph look from their focus nodes."""
     reach = Reach()
@@ -121,26 +105,6 @@ def of_shapes(triples: Iterable[Triple]) -> Reach:
         elif triple.predicate.value in _TEXTS:
             reach |= of_query(str(getattr(triple.object, "value", "")))
     return reach
-
-
-def _items(said: dict[Any, dict[str, Any]], cell: Any) -> Iterator[Any]:
-    while cell in said:
-        yield said[cell][RDF + "first"]
-        cell = said[cell][RDF + "rest"]
-
-
-def _pattern(atom: dict[str, Any]) -> Iterator[Pattern]:
-    """Yield an atom of individuals as a triple pattern; built-ins are none."""
-    subject = atom.get(_SWRL + "argument1")
-    if _SWRL + "classPredicate" in atom:
-        yield (_variable(subject), _TYPE, rdflib.URIRef(atom[_SWRL + "classPredicate"].value))
-    elif _SWRL + "propertyPredicate" in atom:
-        predicate = rdflib.URIRef(atom[_SWRL + "propertyPredicate"].value)
-        yield (_variable(subject), predicate, _variable(atom[_SWRL + "argument2"]))
-
-
-def _variable(term: Any) -> rdflib.Variable:
-    return rdflib.Variable(str(term))
 
 
 def _reach(patterns: Iterable[Pattern], start: set[Any]) -> Reach:

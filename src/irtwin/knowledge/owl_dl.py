@@ -1,4 +1,4 @@
-"""Description-logic reasoning by HermiT and Pellet, which owlready2 brings. They need Java."""
+"""Description-logic reasoning by HermiT, and clashes as Pellet explains them; owlready2 brings both. They need Java."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterable
-from functools import lru_cache
-from typing import Any
 
 import owlready2
 import owlready2.reasoning as reasoning
@@ -18,16 +16,9 @@ from irtwin.errors import InputError
 from irtwin.knowledge.java import NoJava, java
 from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.owl_rl.closure import Contradiction
-from irtwin.knowledge.store.graph import read_turtle
-from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS
-from irtwin.resources import Files
+from irtwin.knowledge.vocabulary import ONTOLOGY, OWL
 
-_SWRL = "http://www.w3.org/2003/11/swrl#"
-_TYPE = NamedNode(RDF + "type")
-_LABEL = NamedNode(RDFS + "label")
 _IMPORTS = NamedNode(OWL + "imports")
-_KINDS = [NamedNode(OWL + kind) for kind in ("Class", "ObjectProperty", "DatatypeProperty")]
-_NAMES_A_TERM = [NamedNode(_SWRL + name) for name in ("classPredicate", "propertyPredicate")]
 _LONGEST_SEARCH = 120  # seconds
 _INFERRED = "http://inferrences/"  # the ontology that owlready2 puts a reasoner's results into
 _RESULTS = NamedNode("http://inferrences")
@@ -76,61 +67,11 @@ def _clash(world: owlready2.World) -> str:
     return f"These statements cannot all be true: {' '.join(statements.replace('1)', '', 1).split())}"
 
 
-def facts_of_rules(triples: Iterable[Triple], files: Files) -> set[Triple]:
-    """Return those triples that the SWRL rules of the files, `rules/*.swrl.ttl`, speak of."""
-    terms = _terms_of_rules(files)
-    return {triple for triple in triples if _speaks_of(triple, terms) or _declares(triple, terms)}
-
-
-def swrl_conclusions(facts: set[Triple], files: Files) -> set[Triple]:
-    """Return what the SWRL rules of the files conclude from `facts_of_rules`, by Pellet.
-
-    Pellet is given only what the rules speak of: with whole individuals it would take minutes. NoJava where there is
-    none.
-    """
-    terms = _terms_of_rules(files)
-    if not any(_speaks_of(fact, terms) for fact in facts):
-        return set()
-    owlready2.JAVA_EXE = _java("Pellet")
-    world = _world([*_swrl_rules(files), *facts])
-    try:
-        owlready2.sync_reasoner_pellet(world, infer_property_values=True, debug=0)
-    except owlready2.OwlReadyInconsistentOntologyError as error:
-        raise Contradiction(f"the graph contradicts the SWRL rules, Pellet finds. {_clash(world)}") from error
-    inferred = _triples(world.get_ontology(_INFERRED))
-    return {triple for triple in inferred - facts if _speaks_of(triple, terms)}
-
-
-def rules(files: Files) -> tuple[str, ...]:
-    """Return the names of the SWRL rules of the files."""
-    return tuple(
-        sorted(str(rule.object.value) for rule in _swrl_rules(files) if rule.predicate == _LABEL)  # type: ignore[union-attr]
-    )
-
-
 def _java(reasoner: str) -> str:
     program = java()
     if program is None:
         raise NoJava(reasoner)
     return program
-
-
-@lru_cache(maxsize=16)
-def _swrl_rules(files: Files) -> tuple[Triple, ...]:
-    return tuple(triple for file in files for triple in read_turtle(file.path))
-
-
-@lru_cache(maxsize=16)
-def _terms_of_rules(files: Files) -> frozenset[Any]:
-    return frozenset(rule.object for rule in _swrl_rules(files) if rule.predicate in _NAMES_A_TERM)
-
-
-def _speaks_of(triple: Triple, terms: frozenset[Any]) -> bool:
-    return triple.predicate in terms or (triple.predicate == _TYPE and triple.object in terms)
-
-
-def _declares(triple: Triple, terms: frozenset[Any]) -> bool:
-    return triple.subject in terms and triple.predicate == _TYPE and triple.object in _KINDS
 
 
 def _world(triples: Iterable[Triple]) -> owlready2.World:

@@ -1,16 +1,16 @@
-"""What follows from the graph: OWL 2 RL, SWRL and SHACL rules, each into a named graph of its own.
+"""What follows from the graph: OWL 2 RL and rules, each into a named graph of its own.
 
 What is concluded of one robot bears on no other (see `parts`), so after a change only those parts of the graph that it
 touched are reasoned over again, beside the ontology. Where that cannot be, the whole graph is. What the conclusions
 were made of stands beside them, as the name that the premises' content has (RFC 6920): the ontology and the rules, or
-everything where the graph is one part; and of each part what the SWRL rules speak of, as Pellet is slow to start.
+everything where the graph is one part.
 """
 
 from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -18,10 +18,10 @@ from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
 from irtwin.knowledge import engines, parts
 from irtwin.knowledge.engines import NATIVE
-from irtwin.knowledge.java import java
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.parts import Ontology
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.files import all_rules
+from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -34,18 +34,17 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SWRL,
     GRAPH_VALIDATION,
     PROV,
-    REASONER,
     term,
 )
 from irtwin.resources import Files, Resources, folder
 
 _COUNT = f"""
-SELECT ?owl_rl ?swrl ?shacl
+SELECT ?owl_rl ?by_rules
 WHERE {{
   {{ SELECT (COUNT(*) AS ?owl_rl) {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }} }}
-  {{ SELECT (COUNT(*) AS ?swrl) {{ GRAPH <{GRAPH_SWRL}> {{ ?s ?p ?o }} }} }}
-  {{ SELECT (COUNT(*) AS ?shacl) {{
-    {{ SELECT DISTINCT ?s ?p ?o {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }} }} }}
+  {{ SELECT (COUNT(*) AS ?by_rules) {{
+    {{ SELECT DISTINCT ?s ?p ?o {{ GRAPH ?g {{ ?s ?p ?o }}
+       FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}") || STRSTARTS(STR(?g), "{GRAPH_SWRL}")) }} }} }} }}
 }}"""
 
 _SET_ASIDE = f"""
@@ -53,8 +52,6 @@ SELECT ?robot ?why WHERE {{ GRAPH <{GRAPH_REASONED}> {{ ?robot <{term("Contradic
 
 _OWL_RL = NamedNode(GRAPH_OWL_RL)
 _ATTRIBUTED_TO = NamedNode(PROV + "wasAttributedTo")
-_PELLET = NamedNode(REASONER + "pellet")
-_RULE_NOT_RUN = NamedNode(term("Rule_Not_Run"))
 _CONTRADICTION = NamedNode(term("Contradiction"))
 
 _NOT_CLOSED = (GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
@@ -69,18 +66,16 @@ WHERE {{
 
 @dataclass(frozen=True)
 class Inferences:
-    """How many triples each kind of reasoning holds, and the IRIs of the named graphs that changed.
+    """How many triples OWL 2 RL and the rules concluded, and the IRIs of the named graphs that changed.
 
-    `not_run` are the names of the SWRL rules that did not run for want of Java. `joined_by` is a statement that makes
-    the graph one part, so that all of it was reasoned over; None where none is. `set_aside` are the IRIs of the robots
-    of which nothing is concluded, as statements about them contradict each other, and which these are.
+    `joined_by` is a statement that makes the graph one part, so that all of it was reasoned over; None where none is.
+    `set_aside` are the IRIs of the robots of which nothing is concluded, as statements about them contradict each
+    other, and which these are.
     """
 
     owl_rl: int
-    swrl: int
-    shacl: int
+    by_rules: int
     changed: tuple[str, ...]
-    not_run: tuple[str, ...] = ()
     joined_by: str | None = None
     set_aside: tuple[tuple[str, str], ...] = ()
 
@@ -111,10 +106,9 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
     The closure comes first, so that rules see types and inverses that nobody wrote; then the rules; then the
-    closure of what they concluded. SWRL rules are left out where there is no Java. A robot of which statements
-    contradict each other is set aside. InputError names a contradiction that is no robot's, and what was inferred
-    before is dropped. Engines other than the native one close the graph as one part, take no contradiction, and leave
-    what was inferred before as it is where they fail.
+    closure of what they concluded. A robot of which statements contradict each other is set aside. InputError names a
+    contradiction that is no robot's, and what was inferred before is dropped. Engines other than the native one close
+    the graph as one part, take no contradiction, and leave what was inferred before as it is where they fail.
     """
     ontology = Ontology(graph)
     changed = graph.changed(GRAPH_INFERRED)
@@ -157,7 +151,7 @@ def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad])
     if region is None:
         return None
     try:
-        found = _infer(ontology, region.asserted, region.concluded)
+        found = _infer(ontology, region.asserted)
     except Contradiction:
         return None
     old = region.concluded
@@ -181,12 +175,12 @@ def _reason_over_all(
         quad for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED) for quad in in_graph(graph.triples(name), name)
     }
     if engine == NATIVE:
-        found = _infer_without_contradiction(ontology, premises - ontology.triples, old)
+        found = _infer_without_contradiction(ontology, premises - ontology.triples)
     else:
-        found = _infer_by(engine, ontology, premises, old)
+        found = _infer_by(engine, ontology, premises)
     in_parts = engine == NATIVE and changed is not None and not found.joined_by
     found.made_of[_OWL_RL] = content_name(ontology.triples, ontology.resources) if in_parts else everything
-    found.made_by |= _made_by(engine, ontology.resources)
+    found.made_by.add(Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)))
     new = found.quads()
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
@@ -196,49 +190,34 @@ def _reason_over_all(
     return _count(graph, new ^ old, found.joined_by)
 
 
-def _made_by(engine: str, resources: Resources) -> set[Triple]:
-    """Say which engine drew the conclusions, and which rules could not run."""
-    left_out = {Triple(_PELLET, _RULE_NOT_RUN, Literal(name)) for name in _not_run(resources)}
-    return {Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)), *left_out}
-
-
-def _not_run(resources: Resources) -> tuple[str, ...]:
-    from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
-
-    return () if java() else owl_dl.rules(resources.of("rules", ".swrl.ttl"))
-
-
-def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_by: str | None = None) -> _Conclusions:
-    """Conclude from the ontology and some parts; `before` is what was concluded of them when it was last done."""
+def _infer(ontology: Ontology, premises: set[Triple]) -> _Conclusions:
+    """Conclude from the ontology and some parts."""
     closure = Closure(ontology.triples)
     count = len(closure)
     closure.add(premises)
-    joined_by = joined_by or parts.join(ontology, closure, count)
     known = ontology.triples | premises | closure.worth_keeping()
-    found = _by_rules(ontology, known, before, joined_by is not None)
+    found = _Conclusions(conclusions(known, all_rules(ontology.resources)))
     closure.add(found.concluded())
-    if joined_by is None and (joined_by := parts.join(ontology, closure, count)):
-        return _infer(ontology, premises, before, joined_by)
+    found.joined_by = parts.join(ontology, closure, count)
     found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
-    found.joined_by = joined_by
     return found
 
 
-def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
+def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> _Conclusions:
     """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
     try:
-        return _infer(ontology, premises, before)
+        return _infer(ontology, premises)
     except Contradiction as clash:
         common, of_parts = parts.groups(ontology, premises)
-        bad = _contradictory(ontology, common, of_parts, before, clash)
-        found = _infer(ontology, premises.difference(*(part for part, _ in bad)), before)
+        bad = _contradictory(ontology, common, of_parts, clash)
+        found = _infer(ontology, premises.difference(*(part for part, _ in bad)))
         said = ((robot, reason) for part, reason in bad for robot in parts.spoken_for(ontology, part))
         found.made_by = {Triple(robot, _CONTRADICTION, Literal(reason)) for robot, reason in said}
         return found
 
 
 def _contradictory(
-    ontology: Ontology, common: set[Triple], of_parts: list[set[Triple]], before: set[Quad], clash: Contradiction
+    ontology: Ontology, common: set[Triple], of_parts: list[set[Triple]], clash: Contradiction
 ) -> list[tuple[set[Triple], str]]:
     """Return which of the parts, that show a `clash` together, contradict themselves, and how: by halves."""
     if not of_parts:
@@ -248,66 +227,18 @@ def _contradictory(
     found, half = [], len(of_parts) // 2
     for some in (of_parts[:half], of_parts[half:]):
         try:
-            _infer(ontology, common.union(*some), before)
+            _infer(ontology, common.union(*some))
         except Contradiction as own:
-            found += _contradictory(ontology, common, some, before, own)
+            found += _contradictory(ontology, common, some, own)
     return found
 
 
-def _infer_by(engine: str, ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
+def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> _Conclusions:
     """Conclude from all of the graph by an engine that is not the native one."""
     known = premises | engines.worth_keeping(engine, premises)
-    found = _by_rules(ontology, known, before, joined=True)
+    found = _Conclusions(conclusions(known, all_rules(ontology.resources)))
     found.contents[GRAPH_OWL_RL] = engines.worth_keeping(engine, premises | found.concluded())
     return found
-
-
-def _by_rules(ontology: Ontology, known: set[Triple], before: set[Quad], joined: bool) -> _Conclusions:
-    """Return what the SWRL and SHACL rules conclude."""
-    facts = _facts_of_swrl(ontology, known, joined)
-    swrl = _by_swrl(ontology, facts, before)
-    made = shacl_rules.conclusions(known | swrl, shacl_rules.all_rules(ontology.resources))
-    shacl = {shacl_rules.graph_of(name): triples for name, triples in made.items()}
-    made_of: dict[object, NamedNode] = {node: content_name(some, ontology.resources) for node, some in facts.items()}
-    return _Conclusions({GRAPH_SWRL: swrl, **shacl}, made_of)
-
-
-def _facts_of_swrl(ontology: Ontology, known: set[Triple], joined: bool) -> dict[parts.Name, set[Triple]]:
-    """Return what the SWRL rules speak of, part by part, each by the first node that it speaks of."""
-    from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
-
-    facts = owl_dl.facts_of_rules(known, ontology.resources.of("rules", ".swrl.ttl"))
-    if joined:
-        return {NamedNode(GRAPH_SWRL): facts}
-    part_of = parts.parted(ontology, known)
-    common, of_parts = set[Triple](), dict[parts.Name, set[Triple]]()
-    for fact in facts:
-        nodes = ontology.nodes(fact)
-        (of_parts.setdefault(part_of(nodes[0]), set()) if nodes else common).add(fact)
-    return {
-        min((node for fact in some for node in ontology.nodes(fact)), key=str): some | common
-        for some in of_parts.values()
-    }
-
-
-def _by_swrl(ontology: Ontology, facts: Mapping[parts.Name, set[Triple]], before: set[Quad]) -> set[Triple]:
-    """Return what the SWRL rules conclude: by Pellet where facts are not those of before; nothing without Java."""
-    from irtwin.knowledge import owl_dl
-
-    if java() is None:
-        return set()
-
-    old = {quad.triple for quad in before if _graph(quad) == GRAPH_SWRL}
-    noted = {(quad.subject, quad.object) for quad in before if _graph(quad) == GRAPH_REASONED}
-    changed = {node for node, some in facts.items() if (node, content_name(some, ontology.resources)) not in noted}
-    if not changed and NamedNode(GRAPH_SWRL) in facts:
-        return old
-    new = set[Triple]()
-    if changed:
-        files = ontology.resources.of("rules", ".swrl.ttl")
-        new = owl_dl.swrl_conclusions(set().union(*(facts[node] for node in changed)), files)
-    spoken_of = {node for some in facts.keys() - changed for fact in facts[some] for node in ontology.nodes(fact)}
-    return new | {triple for triple in old if spoken_of.intersection(ontology.nodes(triple))}
 
 
 def _graph(quad: Quad) -> str:
@@ -329,9 +260,7 @@ def engine_of(graph: KnowledgeGraph) -> str:
 
 def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:
     """Return the name that triples, the rules and those who run them have by their content."""
-    digest = hashlib.sha256(
-        _rules(resources.of("rules") + resources.of("shapes")) + engine.encode() + (b"" if java() else b" without Java")
-    )
+    digest = hashlib.sha256(_rules(resources.of("rules") + resources.of("shapes")) + engine.encode())
     for line in sorted(map(str, triples)):
         digest.update(line.encode())
     return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
@@ -350,10 +279,8 @@ def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
     return Inferences(
         counts["owl_rl"],
-        counts["swrl"],
-        counts["shacl"],
+        counts["by_rules"],
         tuple(sorted(names)),
-        _not_run(graph.resources),
         joined_by,
         tuple(aside),
     )

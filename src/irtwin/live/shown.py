@@ -8,7 +8,9 @@ from typing import cast
 from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
 
 from irtwin.knowledge.mapping import RowMapper, refresh
-from irtwin.knowledge.shacl.rules import ShaclRule, conclusions, graph_of, read_rules
+from irtwin.knowledge.rules.files import read_rules
+from irtwin.knowledge.rules.rule import Rule
+from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SHACL, GRAPH_SOURCE, term
 from irtwin.live.live_run import Tables, activities
@@ -54,11 +56,11 @@ class ShownRuns:
         """Return what the rules of `rules/live_rules.ttl` conclude from a run's excursions or state among the quads."""
         return self._conclusions(quads, self._rules)
 
-    def _conclusions(self, quads: Iterable[Quad], rules: tuple[ShaclRule, ...]) -> set[Quad]:
+    def _conclusions(self, quads: Iterable[Quad], rules: tuple[Rule, ...]) -> set[Quad]:
         if self._beside is None:
             self._beside = self._graph.construct(_BESIDE)
         found = conclusions(self._beside | {quad.triple for quad in quads}, rules)
-        return {quad for name, triples in found.items() for quad in in_graph(triples, graph_of(name))}
+        return {quad for name, triples in found.items() for quad in in_graph(triples, name)}
 
     def refresh(self) -> None:
         """Bring the graph up to date with the database."""

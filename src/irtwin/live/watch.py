@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from irtwin.errors import InputError
+from irtwin.knowledge.extensions import check, check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
@@ -47,6 +48,8 @@ def watch(
     With `replayed`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
     With `rtde`: what the controller there says of the robot of this name, until a signal comes.
     With `performs`: the first run of that robot carries out the plan of this name.
+
+    Raises InputError for a fault in what extends the workspace, before a sample is read.
     """
     sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
@@ -62,7 +65,7 @@ def watch(
     with (
         told_when_full(workspace),
         Workspace.existing(workspace, database) as place,
-        KnowledgeGraph.of_workspace(place, graph_url) as graph,
+        KnowledgeGraph.of_workspace(_checked(place), graph_url) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
         LiveTwin(place, graph, announce, broadcast) as twin,
     ):
@@ -86,6 +89,13 @@ def watch(
             _read(take, port, twin, done, announce)
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
+
+
+def _checked(place: Workspace) -> Workspace:
+    """Look through what extends the workspace: a fault is said now, not when a run ends."""
+    check(place.resources)
+    check_mappings(place.resources, place.engine)
+    return place
 
 
 def _read(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Cause, Change, Document, Finding, Location, NotRepeating
-from irtwin.gap.document.experiment import Experiment, Programme
-from irtwin.storage import experiment_schema, gap_schema
-from irtwin.storage.schema import Base
+from irtwin.providers.experiment_rows import rows_of_experiment
+from irtwin.storage import gap_schema
+from irtwin.storage.gap_schema import OfDiagnosis
 
 ALL = "all"  # stands for every cause where a row's key needs one
 
@@ -28,55 +28,66 @@ class Place:
     linear: frozenset[str]
 
 
-def rows(said: Document, at: Place) -> Iterator[Base]:
+def rows(said: Document, at: Place) -> Iterator[OfDiagnosis]:
     """Yield all rows of a diagnosis but its own."""
-    yield from _sizes(said, at)
+    return _owned(_rows(said, at), at)
+
+
+def _owned(rows: Iterable[OfDiagnosis], at: Place) -> Iterator[OfDiagnosis]:
+    """Say in each row which diagnosis it is of; and of which robot, where it names a joint."""
+    owner = {"diagnosis_id": at.diagnosis_id, "robot_id": at.robot_id}
+    for row in rows:
+        for column in owner.keys() & row.__table__.columns.keys():
+            setattr(row, column, owner[column])
+        yield row
+
+
+def _rows(said: Document, at: Place) -> Iterator[OfDiagnosis]:
+    yield from _sizes(said)
     yield from _locations(said, at)
     for rank, finding in enumerate(said.findings, start=1):
-        yield from _finding(finding, rank, at)
+        yield from _finding(finding, rank)
     for rank, disturbance in enumerate(said.not_repeating or (), start=1):
-        yield from _disturbance(disturbance, rank, at)
+        yield from _disturbance(disturbance, rank)
     for rank, cause in enumerate(said.causes, start=1):
         yield from _cause(cause, rank, at)
-    yield from _changes(said, at)
-    yield from _closing(said, at)
+    yield from _changes(said)
+    yield from _closing(said)
     for name in dict.fromkeys(said.shrink.held_out_runs):
-        yield gap_schema.GapHeldOut(diagnosis_id=at.diagnosis_id, run_id=at.run_id(name))
+        yield gap_schema.GapHeldOut(run_id=at.run_id(name))
     for number, one in enumerate(said.not_testable, start=1):
-        yield gap_schema.GapNotTestable(diagnosis_id=at.diagnosis_id, number=number, effect=one.effect, why=one.why)
+        yield gap_schema.GapNotTestable(number=number, effect=one.effect, why=one.why)
     for number, refused in enumerate(said.refused or (), start=1):
         joint = next(iter(refused.joints), None)
         yield gap_schema.GapRefused(
-            diagnosis_id=at.diagnosis_id,
             number=number,
-            robot_id=at.robot_id,
             effect=refused.effect,
             joint=joint,
             why=refused.why,
         )
     if said.next_experiment is not None:
-        yield from _experiment(said.next_experiment, at)
+        yield from rows_of_experiment(said.next_experiment, at.linear)
 
 
-def rows_of_curves(drawn: Curves, at: Place) -> Iterator[Base]:
+def rows_of_curves(drawn: Curves, at: Place) -> Iterator[OfDiagnosis]:
     """Yield the rows of what a page says in numbers of the evidence; curves stay in its file."""
+    return _owned(_rows_of_curves(drawn, at), at)
+
+
+def _rows_of_curves(drawn: Curves, at: Place) -> Iterator[OfDiagnosis]:
     if drawn.heat_map is not None:
         for joint, values in zip(drawn.heat_map.joints, drawn.heat_map.excess, strict=True):
             for rank, (regime, excess) in enumerate(zip(drawn.heat_map.regimes, values, strict=True), start=1):
                 yield gap_schema.GapRegimeExcess(
-                    diagnosis_id=at.diagnosis_id,
                     joint=joint,
                     regime=regime,
                     rank=rank,
-                    robot_id=at.robot_id,
                     excess=_finite(excess),
                 )
     for number, one in enumerate(drawn.runs, start=1):
         yield gap_schema.GapRunChange(
-            diagnosis_id=at.diagnosis_id,
             number=number,
             run_id=at.run_id(one.run),
-            robot_id=at.robot_id,
             measure="power_rmse" if one.joint is None else "torque_rmse",
             joint=one.joint,
             before=_finite(one.before),
@@ -90,16 +101,14 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _sizes(said: Document, at: Place) -> Iterator[Base]:
+def _sizes(said: Document) -> Iterator[OfDiagnosis]:
     sizes = [("torque", joint, size) for joint, size in (said.gap.torque or {}).items()]
     power = [("power", None, said.gap.power)] if said.gap.power is not None else []
     for channel, joint, size in [*sizes, *power]:
         yield gap_schema.GapSize(
-            diagnosis_id=at.diagnosis_id,
             channel=channel,
             place=joint or "robot",
             joint=joint,
-            robot_id=at.robot_id,
             rmse=size.rmse,
             noise_floor=size.noise_floor,
             excess=size.excess,
@@ -108,13 +117,12 @@ def _sizes(said: Document, at: Place) -> Iterator[Base]:
         )
 
 
-def _locations(said: Document, at: Place) -> Iterator[Base]:
+def _locations(said: Document, at: Place) -> Iterator[OfDiagnosis]:
     for rank, one in enumerate(said.locations, start=1):
-        key = {"diagnosis_id": at.diagnosis_id, "location_id": _location_id(one)}
+        key = {"location_id": _location_id(one)}
         yield gap_schema.GapLocation(
             **key,
             rank=rank,
-            robot_id=at.robot_id,
             channel=one.channel,
             joint=one.joint,
             regime=one.regime,
@@ -138,12 +146,11 @@ def _location_id(one: Location) -> str:
     return f"{one.channel}{joint}" + ("" if one.regime is None else f":{one.regime}")
 
 
-def _finding(said: Finding, rank: int, at: Place) -> Iterator[Base]:
-    key = {"diagnosis_id": at.diagnosis_id, "finding_id": said.id}
+def _finding(said: Finding, rank: int) -> Iterator[OfDiagnosis]:
+    key = {"finding_id": said.id}
     yield gap_schema.GapFinding(
         **key,
         rank=rank,
-        robot_id=at.robot_id,
         family=said.family,
         scope=said.scope,
         channel=said.channel,
@@ -155,19 +162,18 @@ def _finding(said: Finding, rank: int, at: Place) -> Iterator[Base]:
         matters=said.matters,
     )
     for joint in dict.fromkeys(said.joints):
-        yield gap_schema.GapFindingJoint(**key, joint=joint, robot_id=at.robot_id)
+        yield gap_schema.GapFindingJoint(**key, joint=joint)
     for number, one in enumerate(said.members, start=1):
         yield gap_schema.GapFindingMember(
             **key, number=number, cause_id=one.cause, effect=one.effect, confidence=one.confidence
         )
 
 
-def _disturbance(said: NotRepeating, rank: int, at: Place) -> Iterator[Base]:
-    key = {"diagnosis_id": at.diagnosis_id, "disturbance_id": said.id}
+def _disturbance(said: NotRepeating, rank: int) -> Iterator[OfDiagnosis]:
+    key = {"disturbance_id": said.id}
     yield gap_schema.GapDisturbance(
         **key,
         rank=rank,
-        robot_id=at.robot_id,
         channel=said.channel,
         joint=said.joint,
         kind=said.kind,
@@ -183,13 +189,12 @@ def _disturbance(said: NotRepeating, rank: int, at: Place) -> Iterator[Base]:
         )
 
 
-def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:
-    why, key = said.evidence, {"diagnosis_id": at.diagnosis_id, "cause_id": said.id}
+def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
+    why, key = said.evidence, {"cause_id": said.id}
     start, stop = why.window or (None, None)
     yield gap_schema.GapCause(
         **key,
         rank=rank,
-        robot_id=at.robot_id,
         effect=said.effect,
         scope=said.scope,
         confidence=said.confidence,
@@ -207,7 +212,7 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:
         acts_until_s=stop,
     )
     for joint in dict.fromkeys(said.joints):
-        yield gap_schema.GapCauseJoint(**key, joint=joint, robot_id=at.robot_id)
+        yield gap_schema.GapCauseJoint(**key, joint=joint)
     for rival in dict.fromkeys(said.indistinguishable_from):
         yield gap_schema.GapCauseRival(**key, effect=rival)
     gains, correlations = why.gain_of_rivals, why.correlation_with_rivals
@@ -222,7 +227,6 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:
         yield gap_schema.GapCauseParameter(
             **key,
             number=number,
-            robot_id=at.robot_id,
             joint=one.joint,
             name=one.name,
             value=one.value,
@@ -232,7 +236,7 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[Base]:
         )
 
 
-def _changes(said: Document, at: Place) -> Iterator[Base]:
+def _changes(said: Document) -> Iterator[OfDiagnosis]:
     """What all causes change together; and each alone, and all without it."""
     shrink = said.shrink
     measures = {
@@ -242,19 +246,18 @@ def _changes(said: Document, at: Place) -> Iterator[Base]:
     }
     for measure, (change, unit) in measures.items():
         if change is not None:
-            yield _change(measure, "together", None, change, unit, at)
+            yield _change(measure, "together", None, change, unit)
     for one in shrink.by_cause:
         measure = f"{one.channel}_rmse"
         for part, left in (("alone", one.rmse_alone), ("without", one.rmse_when_left_out)):
             before, after = _pooled(one.rmse_before), _pooled(left)
             change = Change(before=before, after=after, noise_floor=None, interval95_after=None)
-            yield _change(measure, part, one.cause, change, measures[measure][1], at)
+            yield _change(measure, part, one.cause, change, measures[measure][1])
 
 
-def _change(measure: str, part: str, cause: str | None, change: Change, unit: str, at: Place) -> Base:
+def _change(measure: str, part: str, cause: str | None, change: Change, unit: str) -> OfDiagnosis:
     lower, upper = change.interval95_after or (None, None)
     return gap_schema.GapChange(
-        diagnosis_id=at.diagnosis_id,
         measure=measure,
         part=part,
         place=cause or ALL,
@@ -273,16 +276,13 @@ def _pooled(values: Sequence[float]) -> float:
     return math.sqrt(sum(value**2 for value in values) / len(values))
 
 
-def _closing(said: Document, at: Place) -> Iterator[Base]:
+def _closing(said: Document) -> Iterator[OfDiagnosis]:
     closed = said.shrink.closed_fraction
     if closed is not None:
         lower, upper = closed.interval95
-        yield gap_schema.GapShrinkage(
-            diagnosis_id=at.diagnosis_id, closed_fraction=closed.value, lower=lower, upper=upper
-        )
+        yield gap_schema.GapShrinkage(closed_fraction=closed.value, lower=lower, upper=upper)
     for channel, one in said.shrink.yardstick.items():
         yield gap_schema.GapCloseable(
-            diagnosis_id=at.diagnosis_id,
             channel=channel,
             of_what=one.of,
             closed=one.closed,
@@ -290,78 +290,3 @@ def _closing(said: Document, at: Place) -> Iterator[Base]:
             by_regression=one.by_regression,
             nameless=one.nameless,
         )
-
-
-def _experiment(said: Experiment, at: Place) -> Iterator[Base]:
-    key, programme = {"diagnosis_id": at.diagnosis_id}, said.programme
-    yield experiment_schema.GapExperiment(
-        **key,
-        purpose=said.purpose,
-        note=said.note,
-        separation_now=said.separation_now,
-        expected_separation=said.expected_separation,
-        enough=said.separation_that_is_enough,
-        kind=programme and programme.kind,
-        motion_s=programme and programme.seconds,
-        set_up_s=programme and programme.set_up_seconds,
-        hold_s=programme and programme.hold_seconds,
-        command=programme and programme.command,
-    )
-    for effect in dict.fromkeys(said.effects):
-        yield experiment_schema.GapExperimentEffect(**key, effect=effect)
-    for number, text in enumerate(said.motions, start=1):
-        yield experiment_schema.GapExperimentInstruction(**key, number=number, text=text)
-    for number, asked in enumerate(said.questions, start=1):
-        effect, *rivals = asked.effects
-        yield experiment_schema.GapExperimentQuestion(
-            **key,
-            number=number,
-            effect=effect,
-            rival=next(iter(rivals), None),
-            separation_now=asked.separation_now,
-            expected_separation=asked.expected_separation,
-            not_imitated_now=asked.not_imitated_now,
-            expected_not_imitated=asked.expected_not_imitated,
-            visibility_now=asked.visibility_now,
-            expected_visibility=asked.expected_visibility,
-        )
-    for number, one in enumerate(said.considered, start=1):
-        yield experiment_schema.GapExperimentConsidered(
-            **key,
-            number=number,
-            kind=one.kind,
-            chosen=programme is not None and one.kind == programme.kind,
-            whole_s=60.0 * one.minutes,
-            expected_separation=one.expected_separation,
-        )
-    if programme is not None:
-        yield from _programme(programme, at)
-
-
-def _programme(said: Programme, at: Place) -> Iterator[Base]:
-    for joint in dict.fromkeys(said.joints):
-        yield experiment_schema.GapExperimentJoint(diagnosis_id=at.diagnosis_id, joint=joint, robot_id=at.robot_id)
-    temperatures = said.temperatures or (None,) * len(said.payload_mass)
-    for number, (mass, temperature) in enumerate(zip(said.payload_mass, temperatures, strict=True), start=1):
-        yield experiment_schema.GapExperimentRun(
-            diagnosis_id=at.diagnosis_id, number=number, payload_mass_kg=mass, temperature_degc=temperature
-        )
-    yield from _settings("pose", {joint: (value,) for joint, value in (said.pose or {}).items()}, "", at)
-    yield from _settings("speed", said.speeds, "/s", at)
-    yield from _settings("amplitude", said.amplitudes, "", at)
-    yield from _settings("acceleration", said.accelerations, "/s^2", at)
-    yield from _settings("held_pose", said.poses, "", at)
-
-
-def _settings(kind: str, given: Mapping[str, Sequence[float]] | None, per: str, at: Place) -> Iterator[Base]:
-    for joint, values in (given or {}).items():
-        for number, value in enumerate(values, start=1):
-            yield experiment_schema.GapExperimentSetting(
-                diagnosis_id=at.diagnosis_id,
-                kind=kind,
-                joint=joint,
-                number=number,
-                robot_id=at.robot_id,
-                value=value,
-                unit=f"{'m' if joint in at.linear else 'rad'}{per}",
-            )

@@ -13,6 +13,7 @@ from starlette.responses import Response
 from irtwin.knowledge.vocabulary import ID, ONTOLOGY
 from irtwin.report.plant import individual, page
 from irtwin.report.questions import Answers
+from irtwin.resources import Resources
 from irtwin.serve import negotiation, ontology
 from irtwin.serve.asking import Asking
 from irtwin.serve.plant_pages import html
@@ -26,13 +27,13 @@ _NOT_ASCII = re.compile(r"(?:%[89A-Fa-f][0-9A-Fa-f])+")
 _KNOWN = "{ ?individual ?property ?value } UNION { ?subject ?leads ?individual }"
 
 
-async def respond(asking: Asking, request: Request) -> Response:
+async def respond(asking: Asking, known: Resources, request: Request) -> Response:
     """Return what has the request's path for its IRI's, as a page or as RDF: a module of the ontology, an individual.
 
     Raises Refusal, where the graph does not know it too.
     """
     if request.url.path in ontology.paths():
-        return await asyncio.to_thread(ontology.module, request)
+        return await asyncio.to_thread(ontology.module, request, known)
     iri = _iri(request)
     accept = _FORMS.get(request.query_params.get("as", ""), request.headers.get("accept", ""))
     if not await asking.holds(request, _KNOWN, {"individual": iri}):

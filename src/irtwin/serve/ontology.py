@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF
-from irtwin.resources import folder
+from irtwin.resources import Resources, folder
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
 
@@ -26,12 +26,15 @@ def paths() -> list[str]:
     return sorted(_modules())
 
 
-def module(request: Request) -> Response:
-    """Return the module whose IRI or version IRI has the request's path; to a browser, the documentation of all."""
+def module(request: Request, known: Resources) -> Response:
+    """Return the module whose IRI or version IRI has the request's path; to a browser, the documentation of all.
+
+    `known`: what holds for the workspace; the documentation is of that.
+    """
     file = _modules()[request.url.path]
     accept = request.headers.get("accept", "")
     if negotiation.wants_page(accept):
-        return Response(_documentation(), media_type="text/html", headers=_PAGE_HEADERS)
+        return Response(_documentation(known), media_type="text/html", headers=_PAGE_HEADERS)
     media_type = negotiation.best(accept, negotiation.TRIPLES)
     if media_type is None:
         raise Refusal(406, f"the ontology comes as {', '.join(negotiation.TRIPLES)}; none of them is in Accept")
@@ -39,10 +42,10 @@ def module(request: Request) -> Response:
 
 
 @cache
-def _documentation() -> str:
+def _documentation(known: Resources) -> str:
     from irtwin.report.ontology.page import page, read_modules  # a second to import, for browsers only
 
-    return page(read_modules(folder("ontology")))
+    return page(read_modules(known))
 
 
 @cache

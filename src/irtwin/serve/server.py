@@ -150,7 +150,7 @@ def application(
             *reports.routes(),
             *live.routes(),
             Route("/assets/{name}", page.asset, methods=["GET"]),
-            Route("/irtwin{rest:path}", partial(individuals.respond, asking), methods=["GET"]),
+            Route("/irtwin{rest:path}", partial(individuals.respond, asking, resources), methods=["GET"]),
         ],
         middleware=[Middleware(Guard, local=_is_loopback(host))],
         exception_handlers={Refusal: _refused},

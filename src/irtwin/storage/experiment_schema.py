@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey
 from sqlalchemy.orm import Mapped, mapped_column
 
-from irtwin.storage.schema import Base
+from irtwin.storage.gap_schema import OfDiagnosis
 
 
-class GapExperiment(Base):
+class GapExperiment(OfDiagnosis):
     """What to measure next, so that rivals come apart; what is said of a programme is none where none is proposed.
 
     Separations are in standard deviations of the residual.
@@ -16,7 +15,6 @@ class GapExperiment(Base):
 
     __tablename__ = "gap_experiment"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     purpose: Mapped[str]  # effects by their ids
     note: Mapped[str | None]
     separation_now: Mapped[float | None]
@@ -27,74 +25,62 @@ class GapExperiment(Base):
     set_up_s: Mapped[float | None]
     hold_s: Mapped[float | None]  # of each pose, where poses are held
     command: Mapped[str | None]  # that computes the motion
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentEffect(Base):
+class GapExperimentEffect(OfDiagnosis):
     """An effect that the experiment is about."""
 
     __tablename__ = "gap_experiment_effect"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentJoint(Base):
+class GapExperimentJoint(OfDiagnosis):
     """A joint that the programme moves."""
 
     __tablename__ = "gap_experiment_joint"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentInstruction(Base):
+class GapExperimentInstruction(OfDiagnosis):
     """A motion or a test by hand, in words."""
 
     __tablename__ = "gap_experiment_instruction"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     text: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentRun(Base):
+class GapExperimentRun(OfDiagnosis):
     """A run that the programme asks for."""
 
     __tablename__ = "gap_experiment_run"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     payload_mass_kg: Mapped[float]
     temperature_degc: Mapped[float | None]  # of the joints, where it matters
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentSetting(Base):
+class GapExperimentSetting(OfDiagnosis):
     """A number to enter at the controller for a joint."""
 
     __tablename__ = "gap_experiment_setting"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     kind: Mapped[str] = mapped_column(primary_key=True)  # "pose", "speed", "amplitude", "acceleration", "held_pose"
     joint: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)  # of the step
     robot_id: Mapped[str]
     value: Mapped[float]
     unit: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentQuestion(Base):
+class GapExperimentQuestion(OfDiagnosis):
     """Which of two effects it is, or whether one is there (rival none); how far the experiment answers that."""
 
     __tablename__ = "gap_experiment_question"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     effect: Mapped[str]
     rival: Mapped[str | None]
@@ -104,18 +90,15 @@ class GapExperimentQuestion(Base):
     expected_not_imitated: Mapped[float | None]
     visibility_now: Mapped[float | None]  # of one effect: its mean square in units of the noise's
     expected_visibility: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExperimentConsidered(Base):
+class GapExperimentConsidered(OfDiagnosis):
     """A programme that was weighed."""
 
     __tablename__ = "gap_experiment_considered"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     kind: Mapped[str]
     chosen: Mapped[bool]
     whole_s: Mapped[float]  # with the set-up
     expected_separation: Mapped[float]  # the smallest over its questions
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

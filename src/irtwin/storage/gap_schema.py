@@ -38,12 +38,52 @@ class GapDiagnosis(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapSize(Base):
+class OfDiagnosis(Base):
+    """What each further table begins and ends with."""
+
+    __abstract__ = True
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True, sort_order=-2)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), sort_order=100)
+
+
+class OfLocation(OfDiagnosis):
+    """Of a location, which is unique within the diagnosis; the same below."""
+
+    __abstract__ = True
+
+    location_id: Mapped[str] = mapped_column(primary_key=True, sort_order=-1)
+
+
+class OfFinding(OfDiagnosis):
+    """Of a finding."""
+
+    __abstract__ = True
+
+    finding_id: Mapped[str] = mapped_column(primary_key=True, sort_order=-1)
+
+
+class OfDisturbance(OfDiagnosis):
+    """Of what does not repeat."""
+
+    __abstract__ = True
+
+    disturbance_id: Mapped[str] = mapped_column(primary_key=True, sort_order=-1)
+
+
+class OfCause(OfDiagnosis):
+    """Of a cause."""
+
+    __abstract__ = True
+
+    cause_id: Mapped[str] = mapped_column(primary_key=True, sort_order=-1)
+
+
+class GapSize(OfDiagnosis):
     """The gap of one channel before anything is added: torque of a joint, or power."""
 
     __tablename__ = "gap_size"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     channel: Mapped[str] = mapped_column(primary_key=True)  # "torque" or "power"
     place: Mapped[str] = mapped_column(primary_key=True)  # the joint's name, "robot" for power
     joint: Mapped[str | None]
@@ -53,29 +93,25 @@ class GapSize(Base):
     excess: Mapped[float | None]  # mean square over that of the floor, less 1
     sensor_noise: Mapped[float | None]
     unit: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapRegimeExcess(Base):
+class GapRegimeExcess(OfDiagnosis):
     """The excess of one joint in one regime; none where it did not move so, or no floor is known."""
 
     __tablename__ = "gap_regime_excess"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
     regime: Mapped[str] = mapped_column(primary_key=True)
     rank: Mapped[int]  # of the regime
     robot_id: Mapped[str]
     excess: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapRunChange(Base):
+class GapRunChange(OfDiagnosis):
     """What all causes together change in one run, or in one stretch of it, while it is held out of the fit."""
 
     __tablename__ = "gap_run_change"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"))
     robot_id: Mapped[str]
@@ -85,16 +121,13 @@ class GapRunChange(Base):
     after: Mapped[float | None]
     noise_floor: Mapped[float | None]
     unit: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapLocation(Base):
+class GapLocation(OfLocation):
     """A place where part of the gap lies."""
 
     __tablename__ = "gap_location"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    location_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
     rank: Mapped[int]
     robot_id: Mapped[str]
     channel: Mapped[str]
@@ -109,27 +142,21 @@ class GapLocation(Base):
     excess_upper: Mapped[float]
     concentration: Mapped[float]  # share of its joint's excess over its share of the samples
     false_discovery_rate: Mapped[float]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapLocationRun(Base):
+class GapLocationRun(OfLocation):
     """A run in which a location was seen; none where all runs show it."""
 
     __tablename__ = "gap_location_run"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    location_id: Mapped[str] = mapped_column(primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapFinding(Base):
+class GapFinding(OfFinding):
     """Causes of one family and scope whose joints overlap: the answer one level above the effects."""
 
     __tablename__ = "gap_finding"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    finding_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
     rank: Mapped[int]
     robot_id: Mapped[str]
     family: Mapped[str]  # "friction", "load", ...
@@ -141,42 +168,33 @@ class GapFinding(Base):
     share_upper: Mapped[float]
     share_of: Mapped[str]  # in words: what the share is of
     matters: Mapped[bool]  # whether it is worth a word of its own
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapFindingJoint(Base):
+class GapFindingJoint(OfFinding):
     """A joint of a finding; none for the whole robot."""
 
     __tablename__ = "gap_finding_joint"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    finding_id: Mapped[str] = mapped_column(primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapFindingMember(Base):
+class GapFindingMember(OfFinding):
     """An effect that a finding may be: that of a cause, or one that the data cannot tell from it."""
 
     __tablename__ = "gap_finding_member"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    finding_id: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     cause_id: Mapped[str]
     effect: Mapped[str]
     confidence: Mapped[float]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapDisturbance(Base):
+class GapDisturbance(OfDisturbance):
     """What differs between repeats of a motion, beyond noise."""
 
     __tablename__ = "gap_disturbance"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    disturbance_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
     rank: Mapped[int]
     robot_id: Mapped[str]
     channel: Mapped[str]
@@ -186,32 +204,26 @@ class GapDisturbance(Base):
     unit: Mapped[str]
     share: Mapped[float]  # of what differs in its channel and joint, 0 to 1
     cause_id: Mapped[str | None]  # the cause that explains it
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapDisturbanceQuantity(Base):
+class GapDisturbanceQuantity(OfDisturbance):
     """A number that describes a disturbance, with its 95 % interval."""
 
     __tablename__ = "gap_disturbance_quantity"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    disturbance_id: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
     value: Mapped[float]
     unit: Mapped[str]
     lower: Mapped[float | None]
     upper: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCause(Base):
+class GapCause(OfCause):
     """An effect held responsible for part of the gap."""
 
     __tablename__ = "gap_cause"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    cause_id: Mapped[str] = mapped_column(primary_key=True)  # unique within the diagnosis
     rank: Mapped[int]
     robot_id: Mapped[str]
     effect: Mapped[str]
@@ -229,63 +241,48 @@ class GapCause(Base):
     t_in_power: Mapped[float | None]
     acts_from_s: Mapped[float | None]  # of the run's clock, where it acts for a while only
     acts_until_s: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCauseJoint(Base):
+class GapCauseJoint(OfCause):
     """A joint that a cause acts on; none for an effect of the whole robot."""
 
     __tablename__ = "gap_cause_joint"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    cause_id: Mapped[str] = mapped_column(primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCauseRival(Base):
+class GapCauseRival(OfCause):
     """An effect that explains the data as well as a cause does."""
 
     __tablename__ = "gap_cause_rival"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    cause_id: Mapped[str] = mapped_column(primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCauseCompetitor(Base):
+class GapCauseCompetitor(OfCause):
     """An effect that was weighed against a cause, whether it explains the data as well or not."""
 
     __tablename__ = "gap_cause_competitor"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    cause_id: Mapped[str] = mapped_column(primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
     gain: Mapped[float | None]  # on groups left out, as the cause's
     correlation: Mapped[float | None]  # with the cause, 0 to 1
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCauseRun(Base):
+class GapCauseRun(OfCause):
     """A run in which a cause acts; none where it acts in all of them."""
 
     __tablename__ = "gap_cause_run"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    cause_id: Mapped[str] = mapped_column(primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCauseParameter(Base):
+class GapCauseParameter(OfCause):
     """A parameter of a cause with its 95 % interval."""
 
     __tablename__ = "gap_cause_parameter"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
-    cause_id: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
     joint: Mapped[str | None]
@@ -294,15 +291,13 @@ class GapCauseParameter(Base):
     unit: Mapped[str]
     lower: Mapped[float | None]
     upper: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapChange(Base):
+class GapChange(OfDiagnosis):
     """What changes on runs outside the fit: by all causes, by one alone, or by all but one."""
 
     __tablename__ = "gap_change"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     measure: Mapped[str] = mapped_column(primary_key=True)  # "torque_rmse", "power_rmse" or "energy_error_percent"
     part: Mapped[str] = mapped_column(primary_key=True)  # "together", "alone" or "without"
     place: Mapped[str] = mapped_column(primary_key=True)  # the cause's id, "all" for all of them
@@ -313,67 +308,56 @@ class GapChange(Base):
     lower: Mapped[float | None]  # of what is left
     upper: Mapped[float | None]
     unit: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapShrinkage(Base):
+class GapShrinkage(OfDiagnosis):
     """Share of the gap above the floor that closes with all causes added."""
 
     __tablename__ = "gap_shrinkage"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     closed_fraction: Mapped[float]
     lower: Mapped[float | None]
     upper: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapCloseable(Base):
+class GapCloseable(OfDiagnosis):
     """How much of a channel's gap could be closed at all, as shares 0 to 1; none where there is no gap."""
 
     __tablename__ = "gap_closeable"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     channel: Mapped[str] = mapped_column(primary_key=True)
     of_what: Mapped[str]  # in words: what the shares are of
     closed: Mapped[float | None]  # by the causes, refitted to all runs
     closeable: Mapped[float | None]  # by the causes or a flexible regression, the better of the two
     by_regression: Mapped[float | None]  # by a flexible regression alone
     nameless: Mapped[float | None]  # by a flexible regression of what the causes leave
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapHeldOut(Base):
+class GapHeldOut(OfDiagnosis):
     """A run on which the shrinkage was judged."""
 
     __tablename__ = "gap_held_out"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapNotTestable(Base):
+class GapNotTestable(OfDiagnosis):
     """An effect that the data cannot show, and why."""
 
     __tablename__ = "gap_not_testable"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     effect: Mapped[str]
     why: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapRefused(Base):
+class GapRefused(OfDiagnosis):
     """An effect that would explain the data, but by a number that cannot be true; joint NULL: of the whole robot."""
 
     __tablename__ = "gap_refused"
 
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
     effect: Mapped[str]
     joint: Mapped[str | None]
     why: Mapped[str]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

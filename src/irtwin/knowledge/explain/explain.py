@@ -15,10 +15,9 @@ from irtwin.knowledge.explain import provenance
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.explain.mapping import mapping_of
 from irtwin.knowledge.explain.rules import premises
-from irtwin.knowledge.explain.swrl import swrl_rules
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
-from irtwin.knowledge.shacl.rules import ShaclRule, all_rules, graph_of
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
@@ -26,7 +25,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_ONTOLOGY,
     GRAPH_OWL_RL,
     GRAPH_SOURCE,
-    GRAPH_SWRL,
     ID,
     PREFIXES,
     shorten,
@@ -82,15 +80,10 @@ class Explainer:
         if stated:
             return self._stated(triple, stated[0])
         for rule in all_rules(self._graph.resources):
-            found = premises(self._graph, rule, triple) if graph_of(rule.name) in graphs else None
+            found = premises(self._graph, rule, triple) if rule.graph in graphs else None
             if found is not None:
-                return self._by_rule(triple, rule, found, swrl=GRAPH_SWRL in graphs)
-        for rule in swrl_rules(self._graph.resources.of("rules", ".swrl.ttl")) if GRAPH_SWRL in graphs else ():
-            found = premises(self._graph, rule, triple)
-            if found is not None:
-                return self._because(triple, f'the rule "{rule.label}", in SWRL', rule, found)
-        if GRAPH_SWRL in graphs:
-            return Explanation(what, "the SWRL rules of rules/, run by Pellet")
+                by = f'the rule "{rule.label}", in {rule.language}'
+                return Explanation(what, by, tuple(map(self.triple, found)), rule.comment or None)
         return self._inferred(tuple(triple))
 
     def individual(self, iri: str) -> Explanation:
@@ -135,13 +128,6 @@ class Explainer:
         if name == GRAPH_ONTOLOGY:
             return Explanation(what, "the ontology", file=_module(triple, self._graph.resources.of("ontology")))
         return Explanation(what, f"what was written into {shorten(name)}")
-
-    def _by_rule(self, triple: Triple, rule: ShaclRule, found: Iterable[Triple], *, swrl: bool) -> Explanation:
-        by = f'the rule "{rule.label}", in SHACL' + (" and in SWRL" if swrl else "")
-        return self._because(triple, by, rule, found)
-
-    def _because(self, triple: Triple, by: str, rule: ShaclRule, found: Iterable[Triple]) -> Explanation:
-        return Explanation(_show(triple), by, tuple(map(self.triple, found)), rule.comment or None)
 
     def _inferred(self, statement: Statement) -> Explanation:
         """Explain what OWL 2 RL inferred; steps that are the rules' own way to walk a list are left out."""

@@ -37,8 +37,9 @@ SELECT ?file ?checksum ?folder
 WHERE {
   ?property irt:told_in ?kind .
   ?thing (irt:run_of | ^irt:has_Joint | ^irt:has_Information) ?robot .
-  ?source irt:source_of ?robot ; irt:Source_Kind ?kind ; irt:File ?file ; irt:Checksum ?checksum ;
+  ?source irt:source_of ?robot ; irt:Source_Kind ?one ; irt:File ?file ; irt:Checksum ?checksum ;
     irt:Data_Folder ?folder .
+  FILTER(?one = ?kind || (?kind = "URDF" && NOT EXISTS { ?other irt:source_of ?robot ; irt:Source_Kind ?kind }))
   FILTER NOT EXISTS { ?thing irt:run_of ?robot FILTER NOT EXISTS { ?thing irt:Run_Role ?role } }
 }
 ORDER BY ?file"""

@@ -1,4 +1,4 @@
-"""What a SHACL rule drew a conclusion from: its body asked again, for that conclusion alone."""
+"""What a rule drew a conclusion from: its body asked again, for that conclusion alone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rdflib.plugins.sparql.algebra import translateQuery
 from rdflib.plugins.sparql.parser import parseQuery
 from rdflib.plugins.sparql.parserutils import CompValue
 
-from irtwin.knowledge.shacl.rules import ShaclRule, group_of
+from irtwin.knowledge.rules.rule import Rule, group_of
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import PREFIXES
 
@@ -20,7 +20,7 @@ _Term = NamedNode | BlankNode | Literal | Triple
 _Bound = dict[str, _Term]
 
 
-def premises(graph: KnowledgeGraph, rule: ShaclRule, conclusion: Triple) -> tuple[Triple, ...] | None:
+def premises(graph: KnowledgeGraph, rule: Rule, conclusion: Triple) -> tuple[Triple, ...] | None:
     """Return the facts that a rule drew a conclusion from, for the first way that is found; None where it did not.
 
     What must be absent for the rule to hold is not among them, nor what lies between the ends of a property path.
@@ -35,9 +35,9 @@ def premises(graph: KnowledgeGraph, rule: ShaclRule, conclusion: Triple) -> tupl
     return None
 
 
-def _matches(graph: KnowledgeGraph, rule: ShaclRule, bound: _Bound) -> Iterator[_Bound]:
+def _matches(graph: KnowledgeGraph, rule: Rule, bound: _Bound) -> Iterator[_Bound]:
     """Yield the values of the rule's variables for which it concludes what binds some of them."""
-    prologue, body = group_of(rule.construct)
+    prologue, body = group_of(rule)
     made = {name for name in bound if re.search(rf"\bAS\s+[?$]{name}\b", body, re.IGNORECASE)}
     before = " ".join(f"VALUES ?{name} {{ {value} }}" for name, value in bound.items() if name not in made)
     after = " ".join(f"FILTER(sameTerm(?{name}, {bound[name]}))" for name in made)

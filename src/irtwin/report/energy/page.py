@@ -15,7 +15,6 @@ from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
 
 from irtwin.errors import InputError
-from irtwin.knowledge.java import HOW_TO_GET
 from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.report import colours, wording
 from irtwin.report.energy import lead, tables, verdict
@@ -91,7 +90,6 @@ def _page(
         run_fits=tables.run_fits(answers["torque_fit"].rows),
         fits=tables.fits(answers["torque_fit_per_joint"].rows),
         conclusions=tables.conclusions(answers["conclusions"].rows, explain),
-        java=HOW_TO_GET.replace("`", ""),
         drawn=drawn,
         curves=curves,
         data=page_data({name: figure for name, figure in drawn.items() if figure}, curves),

@@ -13,7 +13,7 @@ from irtwin.errors import InputError
 from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.shacl import rules as shacl_rules
+from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
@@ -68,7 +68,7 @@ def render_alone(
         graph.load_ontology()
         mapped = map_database(workspace.engine, graph.resources.paths("mappings"))
         graph.replace(mapped, GRAPH_SOURCE, GRAPH_ACTIVITY)
-        shacl_rules.infer(graph)
+        infer(graph)
         render_gap(graph, robot_iri(robot_id), workspace.read_document, out, graph.resources)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -9,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
-from pyoxigraph import NamedNode, RdfFormat, Store
+from pyoxigraph import NamedNode, RdfFormat, Store, parse
 
-from irtwin import resources
 from irtwin.knowledge.store.table import to_python
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS, shorten
 from irtwin.report.energy.page import content_policy, environment, style
 from irtwin.report.ontology.class_tree import Node, class_tree
+from irtwin.resources import Resource, Resources, folder, shipped
 from irtwin.storage.files import check_place, write
 
 KINDS = {
@@ -60,6 +61,7 @@ class Term:
     unit: str | None
     unit_symbol: str | None
     unit_given_by: str | None
+    extends: str | None = None  # the module that it is of, where that does not ship
     characteristics: list[str] = field(default_factory=list)
     links: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     values: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
@@ -67,46 +69,65 @@ class Term:
     @property
     def anchor(self) -> str:
         """What stands after `#` in the term's address on the page; for a model's term, as in its IRI."""
+        if self.extends is not None:
+            return f"{self.extends}/{re.split('[/#]', self.iri)[-1]}"
         return self.iri.removeprefix(f"{ONTOLOGY}#").removeprefix(f"{ONTOLOGY}/") if self.own else short(self.iri)
 
     @property
     def own(self) -> bool:
         """Whether it is a term of the model, not one of another vocabulary."""
-        return self.iri.startswith(ONTOLOGY)
+        return self.extends is not None or self.iri.startswith(ONTOLOGY)
 
 
 @dataclass(frozen=True)
 class Module:
-    """A module of the ontology: its header, and its terms by kind."""
+    """A module of the ontology: its header, its terms by kind, and who brings it where it does not ship."""
 
     name: str
+    origin: str
     header: Mapping[str, Any]
     terms: Mapping[str, list[Term]]
 
 
-def write_page(out: Path) -> None:
-    """Write the documentation of the ontology that irtwin ships to `out`. Raises InputError where it cannot be."""
+def write_page(out: Path, known: Resources | None = None) -> None:
+    """Write the documentation of the ontology that is `known`, or else ships. Raises InputError where it cannot."""
     check_place(out)
-    write(out, page(read_modules(resources.folder("ontology"))).encode())
+    write(out, page(read_modules(known or shipped())).encode())
 
 
-def read_modules(folder: Path) -> list[Module]:
-    """Read the modules of a folder, in the order in which they build on each other."""
-    store, names = Store(), {}
-    for file in sorted(folder.glob("*.ttl")):
-        iri = ONTOLOGY if file.stem == "irtwin" else f"{ONTOLOGY}/{file.stem}"
-        store.load(path=str(file), format=RdfFormat.TURTLE, to_graph=NamedNode(iri))
-        names[iri] = file.stem
+def read_modules(known: Resources) -> list[Module]:
+    """Read the modules of the ontology, in the order in which they build on each other; what extends it comes last."""
+    store, files = Store(), dict[str, Resource]()
+    for file in known.of("ontology"):
+        iri = _module_iri(file)
+        store.load(path=str(file.path), format=RdfFormat.TURTLE, to_graph=NamedNode(iri))
+        files[iri] = file
     headers = {row["module"]: row for row in _ask(store, "modules")}
-    terms = _terms(store)
+    terms = _terms(store, {iri: file for iri, file in files.items() if not iri.startswith(ONTOLOGY)})
     order = [ONTOLOGY, *_imported(store)]
-    return [Module(names[iri], headers[iri], terms.get(iri, {})) for iri in order]
+    return [
+        Module(_stem(files[iri]), files[iri].origin, headers.get(iri, {"module": iri}), terms.get(iri, {}))
+        for iri in [*order, *sorted(files.keys() - order)]
+    ]
+
+
+def _module_iri(file: Resource) -> str:
+    """Return the IRI of a module: that of the file of this name which ships, or what the file says that it is."""
+    name = _stem(file)
+    if not file.is_extension or file.replaces:
+        return ONTOLOGY if name == "irtwin" else f"{ONTOLOGY}/{name}"
+    said = (quad.subject for quad in parse(path=str(file.path)) if quad.object == NamedNode(f"{OWL}Ontology"))
+    return next((it.value for it in said if isinstance(it, NamedNode)), f"urn:module:{name}")
+
+
+def _stem(file: Resource) -> str:
+    return file.name.removesuffix(".ttl")
 
 
 def page(modules: list[Module]) -> str:
     """Return the page."""
     known = {term.iri: term for module in modules for group in module.terms.values() for term in group}
-    templates = environment(resources.shipped())
+    templates = environment(shipped())
     templates.filters["link"] = lambda iri: _link(iri, known)
     templates.filters["short"] = short
     return templates.get_template("ontology/page.html.jinja").render(
@@ -115,8 +136,8 @@ def page(modules: list[Module]) -> str:
         tree=Markup(class_tree(_forests(modules, known))),
         count=sum(term.own for term in known.values()),
         policy=content_policy([]),
-        style=style(resources.shipped()),
-        page_style=style(resources.shipped(), "ontology/style.css"),
+        style=style(shipped()),
+        page_style=style(shipped(), "ontology/style.css"),
     )
 
 
@@ -128,14 +149,14 @@ def short(iri: str) -> str:
     return shorten(iri)
 
 
-def _terms(store: Store) -> dict[str, dict[str, list[Term]]]:
+def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[str, list[Term]]]:
     found: dict[str, dict[str, list[Term]]] = {}
     known: dict[str, Term] = {}
     for row in _ask(store, "terms"):
-        kind = row["kind"].removeprefix(OWL)
+        kind, extension = row["kind"].removeprefix(OWL), extensions.get(row["module"])
         term = Term(
             row["term"], kind, row["label"], row["definition"], row["example"], row["source"], row["unit"],
-            row["symbol"], row["beside"],
+            row["symbol"], row["beside"], None if extension is None else _stem(extension),
         )  # fmt: skip
         known[term.iri] = term
         found.setdefault(row["module"], {}).setdefault(kind, []).append(term)
@@ -166,7 +187,7 @@ def _add_links(known: Mapping[str, Term], rows: Iterable[Mapping[str, Any]]) -> 
 
 def _imported(store: Store) -> list[str]:
     """Return the modules that the whole imports, in its order."""
-    text = (resources.folder("ontology") / "irtwin.ttl").read_text(encoding="utf-8")
+    text = (folder("ontology") / "irtwin.ttl").read_text(encoding="utf-8")
     imports = {
         quad.object.value
         for quad in store.quads_for_pattern(None, NamedNode(f"{OWL}imports"), None, NamedNode(ONTOLOGY))
@@ -191,7 +212,7 @@ def _nodes(classes: list[Term], above: str | None, known: Mapping[str, Term]) ->
         inside = [parent for parent in term.links["subclass of"] if parent in names]
         outside = [parent for parent in term.links["subclass of"] if parent not in names]
         if (inside[0] if inside else None) == above:
-            beside = [known[parent].label if parent.startswith(ONTOLOGY) else short(parent) for parent in outside]
+            beside = [known[it].label if it in known and known[it].own else short(it) for it in outside]
             yield Node(term.label, term.anchor, beside, list(_nodes(classes, term.iri, known)))
 
 
@@ -204,7 +225,7 @@ def _link(iri: Any, known: Mapping[str, Term]) -> Markup:
 
 
 def _ask(store: Store, name: str) -> list[dict[str, Any]]:
-    text = (resources.folder("reports") / "ontology" / f"{name}.rq").read_text(encoding="utf-8")
+    text = (folder("reports") / "ontology" / f"{name}.rq").read_text(encoding="utf-8")
     solutions: Any = store.query(text, use_default_graph_as_union=True)
     columns = [variable.value for variable in solutions.variables]
     return [{name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in solutions]

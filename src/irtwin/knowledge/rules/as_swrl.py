@@ -1,0 +1,258 @@
+"""Rules written in SWRL, for Protégé and the reasoners of OWL 2 DL: without built-ins, as HermiT takes none.
+
+`FILTER(?share > ?limit)` becomes the class of all that has some share above the limit, with the limit's value in the
+graph, as a class holds no variable. What SWRL has no words for is told with its reason: OPTIONAL, BIND, sums, absence,
+arithmetic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from decimal import Decimal
+from itertools import product
+from typing import Any, cast
+
+import rdflib
+from pyoxigraph import BlankNode, Literal, NamedNode, QuerySolutions, Triple
+from rdflib.namespace import OWL, RDF, RDFS, XSD
+from rdflib.paths import MulPath, SequencePath
+
+from irtwin.knowledge.rules.conjunction import TURNED, Comparison, NoConjunction, Pattern, conjunction, joined_to
+from irtwin.knowledge.rules.rule import Rule
+from irtwin.knowledge.rules.swrl import FACETS, NAMESPACE
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, shorten
+
+MOST_VALUES = 10  # of what a rule looks up in all of the graph: each makes a SWRL rule of its own
+
+VARIABLE = "urn:swrl:var#"  # as Protégé calls them
+
+_DOUBLES = (XSD.double, XSD.float)
+_WHOLE = (XSD.integer, XSD.int, XSD.long, XSD.nonNegativeInteger, XSD.positiveInteger)
+_FACET_OF = {sign: name for name, sign in FACETS.items()}
+
+
+@dataclass
+class Written:
+    """Rules in SWRL: `triples`; and those that are none, each with the reason."""
+
+    triples: set[Triple] = field(default_factory=set)
+    left_out: list[tuple[Rule, str]] = field(default_factory=list)
+
+
+def as_swrl(graph: KnowledgeGraph, rules: Iterable[Rule]) -> Written:
+    """Write the rules of a graph in SWRL, with the limits that the graph holds."""
+    written, model = Written(), _Model(graph)
+    for rule in rules:
+        try:
+            for imp in _imps(rule, model):
+                written.triples |= imp
+        except NoConjunction as why:
+            written.left_out.append((rule, str(why)))
+    return written
+
+
+class _Model:
+    """What the ontology says of properties, and the values that the graph holds."""
+
+    def __init__(self, graph: KnowledgeGraph):
+        self._graph = graph
+        self.kinds: dict[str, set[str]] = {}
+        self.ranges: dict[str, str] = {}
+        for triple in graph.triples(GRAPH_ONTOLOGY):
+            if isinstance(triple.subject, NamedNode) and isinstance(triple.object, NamedNode):
+                if triple.predicate.value == str(RDF.type):
+                    self.kinds.setdefault(triple.subject.value, set()).add(triple.object.value)
+                elif triple.predicate.value == str(RDFS.range):
+                    self.ranges[triple.subject.value] = triple.object.value
+
+    def is_a(self, term: Any, kind: rdflib.URIRef) -> bool:
+        return str(kind) in self.kinds.get(str(term), ())
+
+    def values(self, patterns: list[Pattern]) -> list[dict[str, Any]]:
+        """Return what patterns of no individual of the rule match; an empty row where there are no patterns."""
+        if not patterns:
+            return [{}]
+        text = " . ".join(" ".join(term.n3() for term in pattern) for pattern in patterns)
+        answer = cast(
+            QuerySolutions, self._graph.answer(f"SELECT DISTINCT * WHERE {{ {text} }} LIMIT {MOST_VALUES + 1}")
+        )
+        names = [variable.value for variable in answer.variables]
+        return [dict(zip(names, map(_of_rdflib, row), strict=True)) for row in answer]
+
+
+def _imps(rule: Rule, model: _Model) -> Iterator[set[Triple]]:
+    """Yield a rule as triples, once for each value that it looks up in all of the graph and each conclusion.
+
+    SWRL lets a rule conclude several things, but Openllet then draws one of them.
+    """
+    said = conjunction(rule.construct)
+    own = joined_to(rdflib.Variable("this"), said.patterns)
+    rows = model.values([it for it in said.patterns if it not in own])
+    if not rows or len(rows) > MOST_VALUES:
+        raise NoConjunction(f"what it looks up has {f'more than {MOST_VALUES}' if rows else 'no'} values in the graph")
+    for row, conclusion in product(rows, said.template):
+        imp = _Imp(model)
+        body = imp.body(_bound(own, row), _bound(said.comparisons, row))
+        yield imp.written(rule, body, imp.head(*_bound([conclusion], row)))
+
+
+def _bound(patterns: Iterable[Pattern], row: dict[str, Any]) -> list[Pattern]:
+    """Put values in the place of variables."""
+
+    def value(term: Any) -> Any:
+        return row.get(str(term), term) if isinstance(term, rdflib.Variable) else term
+
+    return [(value(one), value(two), value(three)) for one, two, three in patterns]
+
+
+class _Imp:
+    """One SWRL rule in the making."""
+
+    def __init__(self, model: _Model):
+        self._model = model
+        self._made = set[Triple]()
+        self._variables = set[str]()
+
+    def body(self, patterns: list[Pattern], comparisons: list[Comparison]) -> list[Any]:
+        """Return the atoms of patterns, each with what its value is compared to."""
+        values = [object for _, predicate, object in patterns if self._model.is_a(predicate, OWL.DatatypeProperty)]
+        limits: dict[Any, list[tuple[str, rdflib.Literal]]] = {}
+        for left, sign, right in comparisons:
+            value, sign, limit = (
+                (right, TURNED[sign], left) if isinstance(left, rdflib.Literal) else (left, sign, right)
+            )
+            if value not in values or not isinstance(limit, rdflib.Literal):
+                raise NoConjunction("it compares two values, and HermiT takes no built-ins")
+            limits.setdefault(value, []).append((sign, limit))
+        for value in values:
+            if isinstance(value, rdflib.Variable) and sum(value in pattern for pattern in patterns) > 1:
+                raise NoConjunction("it looks for one value twice, and no class does")
+        return [self._atom(pattern, limits) for pattern in patterns]
+
+    def head(self, pattern: Pattern) -> BlankNode:
+        """Return the atom of what a rule concludes: a class or link of individuals that it knows."""
+        subject, predicate, object = pattern
+        variables = {str(it) for it in (subject, object) if isinstance(it, rdflib.Variable)}
+        if not variables <= self._variables or not (predicate == RDF.type or self._is_object_property(predicate)):
+            raise NoConjunction("it concludes values, or what has no name before")
+        return self._atom(pattern, {})
+
+    def written(self, rule: Rule, body: list[Any], head: BlankNode) -> set[Triple]:
+        """Return the rule with its label and comment."""
+        imp = self._node("Imp", {"body": self._atoms(body), "head": self._atoms([head])})
+        self._made.add(Triple(imp, _iri(RDFS.label), Literal(rule.label, language="en")))
+        if rule.comment:
+            self._made.add(Triple(imp, _iri(RDFS.comment), Literal(rule.comment, language="en")))
+        for name in self._variables:
+            self._made.add(Triple(NamedNode(VARIABLE + name), _iri(RDF.type), NamedNode(NAMESPACE + "Variable")))
+        return self._made
+
+    def _atom(self, pattern: Pattern, limits: dict[Any, list[tuple[str, rdflib.Literal]]]) -> BlankNode:
+        subject, predicate, object = pattern
+        if _is_type(predicate) and isinstance(object, rdflib.URIRef):
+            return self._class_atom(subject, _iri(object))
+        if self._is_object_property(predicate):
+            ends = {"argument1": self._term(subject), "argument2": self._term(object)}
+            return self._node("IndividualPropertyAtom", {"propertyPredicate": _iri(predicate), **ends})
+        if not self._model.is_a(predicate, OWL.DatatypeProperty):
+            name = shorten(str(predicate)) if isinstance(predicate, rdflib.URIRef) else "a path"
+            raise NoConjunction(f"{name} is no property of individuals or of data in OWL")
+        restriction = BlankNode()
+        self._say(restriction, RDF.type, _iri(OWL.Restriction))
+        self._say(restriction, OWL.onProperty, _iri(predicate))
+        if isinstance(object, rdflib.Literal):
+            self._say(restriction, OWL.hasValue, _literal(object))
+        else:
+            self._say(restriction, OWL.someValuesFrom, self._range(predicate, limits.get(object, [])))
+        return self._class_atom(subject, restriction)
+
+    def _range(self, predicate: Any, limits: list[tuple[str, rdflib.Literal]]) -> NamedNode | BlankNode:
+        """Return the values of a property's datatype within limits."""
+        if not limits:
+            return _iri(RDFS.Literal)
+        datatype = rdflib.URIRef(self._model.ranges.get(str(predicate), ""))
+        facets: list[Any] = []
+        for sign, limit in limits:
+            datatype, value = _comparable(datatype, limit)
+            facet = BlankNode()
+            self._say(facet, XSD[_FACET_OF[sign]], value)
+            facets.append(facet)
+        node = BlankNode()
+        self._say(node, RDF.type, _iri(RDFS.Datatype))
+        self._say(node, OWL.onDatatype, _iri(datatype))
+        self._say(node, OWL.withRestrictions, self._list(facets))
+        return node
+
+    def _class_atom(self, subject: Any, kind: NamedNode | BlankNode) -> BlankNode:
+        return self._node("ClassAtom", {"classPredicate": kind, "argument1": self._term(subject)})
+
+    def _is_object_property(self, predicate: Any) -> bool:
+        return self._model.is_a(predicate, OWL.ObjectProperty)
+
+    def _term(self, term: Any) -> NamedNode:
+        if isinstance(term, rdflib.Variable):
+            self._variables.add(str(term))
+            return NamedNode(VARIABLE + str(term))
+        if isinstance(term, rdflib.URIRef):
+            return _iri(term)
+        raise NoConjunction("it speaks of an individual without a name")
+
+    def _atoms(self, atoms: list[Any]) -> NamedNode | BlankNode:
+        return self._list(atoms, kind=NamedNode(NAMESPACE + "AtomList"))
+
+    def _list(self, items: list[Any], kind: NamedNode | None = None) -> NamedNode | BlankNode:
+        rest: NamedNode | BlankNode = _iri(RDF.nil)
+        for item in reversed(items):
+            cell = BlankNode()
+            if kind is not None:
+                self._say(cell, RDF.type, kind)
+            self._say(cell, RDF.first, item)
+            self._say(cell, RDF.rest, rest)
+            rest = cell
+        return rest
+
+    def _node(self, kind: str, said: dict[str, Any]) -> BlankNode:
+        node = BlankNode()
+        self._say(node, RDF.type, NamedNode(NAMESPACE + kind))
+        for name, value in said.items():
+            self._made.add(Triple(node, NamedNode(NAMESPACE + name), value))
+        return node
+
+    def _say(self, subject: BlankNode, predicate: rdflib.URIRef, object: Any) -> None:
+        self._made.add(Triple(subject, _iri(predicate), object))
+
+
+def _is_type(predicate: Any) -> bool:
+    """Whether a predicate is rdf:type, or that of a class or one below it, as SHACL's targets are written."""
+    if isinstance(predicate, SequencePath):
+        first, *rest = predicate.args
+        return first == RDF.type and all(isinstance(it, MulPath) and it.path == RDFS.subClassOf for it in rest)
+    return bool(predicate == RDF.type)
+
+
+def _comparable(datatype: rdflib.URIRef, limit: rdflib.Literal) -> tuple[rdflib.URIRef, Literal]:
+    """Return the datatype and limit that OWL compares as SPARQL does: of numbers, doubles are apart from the others."""
+    if datatype in _DOUBLES:
+        return datatype, Literal(str(float(limit)), datatype=_iri(datatype))
+    if datatype in (*_WHOLE, XSD.decimal):
+        return XSD.decimal, Literal(f"{Decimal(str(limit)):f}", datatype=_iri(XSD.decimal))
+    if datatype == XSD.dateTime == limit.datatype:
+        return datatype, _literal(limit)
+    raise NoConjunction(f"no data range compares {shorten(str(datatype)) or 'values of no datatype'} with {limit.n3()}")
+
+
+def _iri(term: rdflib.URIRef) -> NamedNode:
+    return NamedNode(str(term))
+
+
+def _literal(term: rdflib.Literal) -> Literal:
+    datatype = None if term.datatype is None else _iri(term.datatype)
+    return Literal(str(term), language=term.language) if term.language else Literal(str(term), datatype=datatype)
+
+
+def _of_rdflib(term: Any) -> Any:
+    if isinstance(term, Literal):
+        return rdflib.Literal(term.value, datatype=rdflib.URIRef(term.datatype.value), normalize=False)
+    return rdflib.URIRef(term.value) if isinstance(term, NamedNode) else rdflib.BNode(term.value)

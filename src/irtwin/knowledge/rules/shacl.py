@@ -1,0 +1,90 @@
+"""SHACL rules: each becomes one CONSTRUCT whose `$this` is tied to the shape's targets."""
+
+from __future__ import annotations
+
+from decimal import Decimal, InvalidOperation
+
+from pyoxigraph import BlankNode, Literal, NamedNode
+
+from irtwin.knowledge.rules.rule import SHACL, Rule, start_of_body
+from irtwin.knowledge.shacl.shapes import Node, Shapes
+from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
+
+_TARGETS = {
+    "targetClass": "{{ $this rdf:type/rdfs:subClassOf* {} }}",
+    "targetNode": "{{ VALUES $this {{ {} }} }}",
+    "targetSubjectsOf": "{{ $this {} ?_any }}",
+    "targetObjectsOf": "{{ ?_any {} $this }}",
+}
+
+
+def rules_of(shapes: Shapes) -> tuple[Rule, ...]:
+    """Return the rules of a shapes graph that are not switched off; InputError for one that cannot be understood."""
+    return tuple(
+        _rule(shapes, shape, rule)
+        for shape in shapes.having(SH + "rule")
+        if not shapes.is_deactivated(shape)
+        for rule in shapes.values(shape, "rule")
+        if not shapes.is_deactivated(rule)
+    )
+
+
+def _rule(shapes: Shapes, shape: Node, rule: Node) -> Rule:
+    named = rule if isinstance(rule, NamedNode) else shape
+    name = named.value if isinstance(named, NamedNode | BlankNode) else str(named)
+    focus = " UNION ".join(_targets(shapes, shape))
+    constructs = shapes.values(rule, "construct")
+    if len(constructs) != 1 or not isinstance(constructs[0], Literal) or shapes.values(rule, "condition"):
+        raise shapes.fault(
+            shape, "a rule is a sh:SPARQLRule with one sh:construct and no sh:condition: write that in SPARQL"
+        )
+    construct = _set_wise(shapes, rule, constructs[0].value, focus)
+    return Rule(
+        name=name,
+        label=_text(shapes, named, "label") or shorten(name),
+        comment=_text(shapes, named, "comment"),
+        order=(_number(shapes, shape), _number(shapes, rule)),
+        construct=construct,
+        language=SHACL,
+    )
+
+
+def _targets(shapes: Shapes, shape: Node) -> list[str]:
+    found = [form.format(value) for name, form in _TARGETS.items() for value in shapes.values(shape, name)]
+    if {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")} & set(shapes.values(shape, RDF + "type")):
+        found.append(_TARGETS["targetClass"].format(shape))
+    if not found or shapes.values(shape, "target"):
+        raise shapes.fault(
+            shape, "its rule needs sh:targetClass, sh:targetNode, sh:targetSubjectsOf or sh:targetObjectsOf"
+        )
+    return found
+
+
+def _set_wise(shapes: Shapes, rule: Node, construct: str, focus: str) -> str:
+    body = start_of_body(construct)
+    if body is None:
+        raise shapes.fault(rule, "its sh:construct is no CONSTRUCT { ... } WHERE { ... }")
+    prefixes = "".join(
+        f"PREFIX {_value(shapes, it, 'prefix')}: <{_value(shapes, it, 'namespace')}>\n"
+        for ontology in shapes.values(rule, "prefixes")
+        for it in shapes.values(ontology, "declare")
+    )
+    return f"{prefixes}{construct[:body]} {focus} {construct[body:]}"
+
+
+def _number(shapes: Shapes, node: Node) -> Decimal:
+    order = shapes.value(node, "order")
+    try:
+        return Decimal(order.value) if isinstance(order, Literal) else Decimal(0)
+    except InvalidOperation as error:
+        raise shapes.fault(node, f"sh:order {order} is no number") from error
+
+
+def _text(shapes: Shapes, node: Node, name: str) -> str:
+    found = shapes.value(node, RDFS + name)
+    return found.value if isinstance(found, Literal) else ""
+
+
+def _value(shapes: Shapes, node: Node, name: str) -> str:
+    found = shapes.value(node, name)
+    return found.value if isinstance(found, NamedNode | Literal) else ""

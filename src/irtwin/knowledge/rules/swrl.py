@@ -1,0 +1,163 @@
+"""SWRL rules: each becomes one CONSTRUCT, so that it is run and explained as those of SHACL are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from decimal import Decimal
+from typing import Any
+
+from pyoxigraph import Literal, NamedNode, Triple
+
+from irtwin.errors import InputError
+from irtwin.knowledge.rules.rule import SWRL, Rule
+from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, XSD, shorten
+
+NAMESPACE = "http://www.w3.org/2003/11/swrl#"
+BUILT_INS = "http://www.w3.org/2003/11/swrlb#"
+
+FACETS = {"minExclusive": ">", "minInclusive": ">=", "maxExclusive": "<", "maxInclusive": "<="}  # of XSD
+
+_COMPARED = {
+    "equal": "=", "notEqual": "!=", "lessThan": "<", "lessThanOrEqual": "<=", "greaterThan": ">",
+    "greaterThanOrEqual": ">=",
+}  # fmt: skip
+_RECKONED = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}  # the first argument is the result
+_SAME = {"SameIndividualAtom": "=", "DifferentIndividualsAtom": "!="}
+
+_Node = dict[str, Any]
+
+
+def rules_of(triples: Iterable[Triple], source: str) -> Iterator[Rule]:
+    """Yield the SWRL rules among triples; `source` names them in messages. InputError for one that is not understood.
+
+    Class atoms name a class, or a restriction to values; built-ins compare, add, subtract, multiply or divide.
+    """
+    said: dict[Any, _Node] = {}
+    for triple in triples:
+        said.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
+    for node, of in said.items():
+        if of.get(RDF + "type") == NamedNode(NAMESPACE + "Imp"):
+            label, comment = (getattr(of.get(RDFS + name), "value", "") for name in ("label", "comment"))
+            if not label:
+                raise InputError(f"{source}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
+            construct = _Imp(said, f"{source}: the rule {label!r}").construct(of)
+            name = node.value if isinstance(node, NamedNode) else label
+            yield Rule(name, label, comment, (Decimal(0), Decimal(0)), construct, SWRL)
+
+
+class _Imp:
+    """One rule in the making: the triples of its file, and what its variables are called."""
+
+    def __init__(self, said: dict[Any, _Node], where: str):
+        self._said, self._where = said, where
+        self._names: dict[str, str] = {}
+
+    def construct(self, rule: _Node) -> str:
+        body, head = (self._atoms(rule, part) for part in ("body", "head"))
+        self._name_focus(body)
+        where = [line for atom in body for line in self._lines(atom)]
+        made = [line for atom in head for line in self._lines(atom)]
+        if any(line.startswith(("BIND", "FILTER")) for line in made):
+            raise self._fault("concludes more than classes and properties; do that in its swrl:body")
+        return f"CONSTRUCT {{ {' '.join(made)} }} WHERE {{ {' '.join(sorted(where, key=_turn))} }}"
+
+    def _atoms(self, rule: _Node, part: str) -> list[_Node]:
+        found = [self._said.get(atom) for atom in self._items(rule.get(NAMESPACE + part))]
+        atoms = [atom for atom in found if atom is not None]
+        if not atoms or len(atoms) < len(found):
+            raise self._fault(f"has no list of atoms for its swrl:{part}")
+        return atoms
+
+    def _items(self, cell: Any) -> list[Any]:
+        items, seen = [], set[Any]()
+        while cell in self._said and cell not in seen:
+            seen.add(cell)
+            items.append(self._said[cell].get(RDF + "first"))
+            cell = self._said[cell].get(RDF + "rest")
+        return items if cell == NamedNode(RDF + "nil") else []
+
+    def _name_focus(self, body: list[_Node]) -> None:
+        """Call the individual that the rule begins with `$this`, as SHACL does."""
+        firsts = (atom.get(NAMESPACE + "argument1") for atom in body)
+        focus = next((it for it in firsts if self._is_variable(it)), None)
+        if focus is not None:
+            self._names[focus.value] = "this"
+
+    def _lines(self, atom: _Node) -> list[str]:
+        kind = getattr(atom.get(RDF + "type"), "value", "").removeprefix(NAMESPACE)
+        first, second = (atom.get(NAMESPACE + name) for name in ("argument1", "argument2"))
+        if kind == "BuiltinAtom":
+            return [self._built_in(atom)]
+        if kind == "ClassAtom" and first is not None:
+            return self._class(self._term(first), atom.get(NAMESPACE + "classPredicate"))
+        if kind == "DataRangeAtom" and first is not None:
+            return self._range(self._term(first), atom.get(NAMESPACE + "dataRange"))
+        if first is None or second is None:
+            raise self._fault(f"has a swrl:{kind or 'Atom'} that lacks an argument, or is none of SWRL's")
+        if kind in _SAME:
+            return [f"FILTER({self._term(first)} {_SAME[kind]} {self._term(second)})"]
+        return [f"{self._term(first)} {atom.get(NAMESPACE + 'propertyPredicate')} {self._term(second)} ."]
+
+    def _class(self, subject: str, kind: Any) -> list[str]:
+        """Return an atom of a class, or of a restriction to some value."""
+        if isinstance(kind, NamedNode):
+            return [f"{subject} <{RDF}type> {kind} ."]
+        of = self._said.get(kind, {})
+        of_property, value, some = (of.get(OWL + name) for name in ("onProperty", "hasValue", "someValuesFrom"))
+        if isinstance(of_property, NamedNode) and value is not None:
+            return [f"{subject} {of_property} {self._term(value)} ."]
+        if isinstance(of_property, NamedNode) and some is not None:
+            found = f"?value{len(self._names)}"
+            self._names[found] = found[1:]
+            within = [] if some == NamedNode(RDFS + "Literal") else self._range(found, some)
+            return [f"{subject} {of_property} {found} .", *within]
+        raise self._fault("has a class expression that irtwin does not run; name a class for it in ontology/")
+
+    def _range(self, value: str, kind: Any) -> list[str]:
+        if isinstance(kind, NamedNode):
+            return [f"FILTER(DATATYPE({value}) = {kind})"]
+        facets = [
+            (name.removeprefix(XSD), limit)
+            for facet in self._items(self._said.get(kind, {}).get(OWL + "withRestrictions"))
+            for name, limit in self._said.get(facet, {}).items()
+        ]
+        if not facets or any(name not in FACETS for name, _ in facets):
+            raise self._fault(f"has a data range that is none of {', '.join(FACETS)}; write it as a built-in")
+        return [f"FILTER({value} {FACETS[name]} {self._term(limit)})" for name, limit in facets]
+
+    def _built_in(self, atom: _Node) -> str:
+        built_in = atom.get(NAMESPACE + "builtin")
+        iri = getattr(built_in, "value", "")
+        name = iri.removeprefix(BUILT_INS)
+        arguments = [self._term(each) for each in self._items(atom.get(NAMESPACE + "arguments"))]
+        if name in _COMPARED and len(arguments) == 2:
+            return f"FILTER({arguments[0]} {_COMPARED[name]} {arguments[1]})"
+        if name in _RECKONED and len(arguments) > 2:
+            return f"BIND({f' {_RECKONED[name]} '.join(arguments[1:])} AS {arguments[0]})"
+        if iri.startswith(BUILT_INS):
+            known = ", ".join([*_COMPARED, *_RECKONED])
+            raise self._fault(f"uses swrlb:{name} as irtwin does not run it: it runs {known}; write the rule in SHACL")
+        raise self._fault(f"uses {shorten(iri)}, which is no built-in of SWRL")
+
+    def _term(self, term: Any) -> str:
+        if not self._is_variable(term):
+            return str(term)
+        if term.value not in self._names:
+            name = re.sub(r"\W", "_", re.split("[/#]", term.value)[-1])
+            taken = name in self._names.values()
+            self._names[term.value] = f"{name}{len(self._names)}" if taken else name
+        return f"?{self._names[term.value]}"
+
+    def _is_variable(self, term: Any) -> bool:
+        if isinstance(term, Literal) or term is None:
+            return False
+        return bool(self._said.get(term, {}).get(RDF + "type") == NamedNode(NAMESPACE + "Variable"))
+
+    def _fault(self, what: str) -> InputError:
+        return InputError(f"{self._where} {what}")
+
+
+def _turn(line: str) -> int:
+    """Triples first, then what is reckoned from them, then what is compared."""
+    return line.startswith("BIND") + 2 * line.startswith("FILTER")
