@@ -20,11 +20,11 @@ LIMIT = "0.118"  # g; of the three runs one lies above it
 WORK = """
 import json, sys
 from pathlib import Path
-from irtwin.knowledge import owl_dl, reasoning
+from irtwin.knowledge import conclusions, owl_dl, reasoning
 from tests.data_sets import irtwin
 
 place, data = sys.argv[1:]
-reasoning.java = owl_dl.java = lambda: None  # Pellet takes seconds to start, for rules that are not tried here
+conclusions.java = reasoning.java = owl_dl.java = lambda: None  # Pellet takes seconds to start, for other rules
 heavy = "<https://example.org/irtwin-co2#Heavy_Run>"
 ask = f"SELECT ?run {{ ?run a {heavy} }} ORDER BY ?run"
 done = [irtwin("run", data, "--workspace", place)]

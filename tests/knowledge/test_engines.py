@@ -7,7 +7,7 @@ from pyoxigraph import Literal, NamedNode, Triple
 from tests.knowledge.test_owl_rl import triples
 
 from irtwin.errors import InputError
-from irtwin.knowledge import engines, java, owl_dl, reasoning
+from irtwin.knowledge import conclusions, engines, java, owl_dl, reasoning
 from irtwin.knowledge.engines import HERMIT, NATIVE, OWLRL
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.owl_rl import by_owlrl
@@ -29,7 +29,7 @@ ex:C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty ex:p ; owl:someValuesF
 
 @pytest.fixture
 def no_java(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (engines, reasoning, owl_dl):
+    for module in (conclusions, engines, reasoning, owl_dl):
         monkeypatch.setattr(module, "java", lambda: None)
 
 
@@ -149,7 +149,7 @@ def test_without_java_the_swrl_rules_are_named_until_there_is_one(
     names = ("idle-heavy run", "regenerating run", "twin to identify again")
     text = "SELECT ?rule WHERE { reasoner:pellet irt:Rule_Not_Run ?rule } ORDER BY ?rule"
     with monkeypatch.context() as patched:
-        for module in (engines, reasoning, owl_dl):
+        for module in (conclusions, engines, reasoning, owl_dl):
             patched.setattr(module, "java", lambda: None)
         done = reason(graph)
         assert (done.swrl, done.not_run) == (0, names)

@@ -8,20 +8,19 @@ everything where the graph is one part; and of each part what the SWRL rules spe
 
 from __future__ import annotations
 
-import base64
-import hashlib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass
 
-from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
+from pyoxigraph import Literal, NamedNode, Quad, Triple
 
-from irtwin.knowledge import engines, parts
+from irtwin.knowledge import by_parts, engines, parts
+from irtwin.knowledge.by_parts import Joined
+from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.java import java
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.parts import Ontology
-from irtwin.knowledge.shacl import rules as shacl_rules
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -37,7 +36,7 @@ from irtwin.knowledge.vocabulary import (
     REASONER,
     term,
 )
-from irtwin.resources import Files, Resources, folder
+from irtwin.resources import Resources
 
 _COUNT = f"""
 SELECT ?owl_rl ?swrl ?shacl
@@ -85,28 +84,6 @@ class Inferences:
     set_aside: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass
-class _Conclusions:
-    """What was concluded, by the IRIs of named graphs; what it was made of; by whom; what makes the graph one part."""
-
-    contents: dict[str, set[Triple]] = field(default_factory=dict)
-    made_of: dict[object, NamedNode] = field(default_factory=dict)
-    made_by: set[Triple] = field(default_factory=set)
-    joined_by: str | None = None
-
-    def concluded(self) -> set[Triple]:
-        """Return the triples of all the named graphs."""
-        return set().union(*self.contents.values())
-
-    def quads(self) -> set[Quad]:
-        """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
-        store = Store()
-        derivations = {Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items()}  # type: ignore[arg-type]
-        for name, triples in {**self.contents, GRAPH_REASONED: derivations | self.made_by}.items():
-            store.extend(in_graph(triples, name))
-        return set(store)
-
-
 def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
@@ -121,10 +98,9 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     if engine != NATIVE:
         return _reason_over_all(graph, ontology, changed, engine)
     try:
-        if changed is not None and made_of(graph) == content_name(ontology.triples, ontology.resources):
-            done = _reason_again(graph, ontology, changed)
-            if done is not None:
-                return done
+        if changed is not None:
+            with suppress(Joined):
+                return _by_parts(graph, ontology, changed)
         return _reason_over_all(graph, ontology, changed)
     except Exception:
         graph.replace([], GRAPH_INFERRED, GRAPH_REASONED)
@@ -149,24 +125,21 @@ def around(graph: KnowledgeGraph, nodes: Iterable[NamedNode]) -> set[Triple]:
     return graph.construct(_AROUND.replace("?nodes", values))
 
 
-def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences | None:
-    """Reason over the parts that changed; None where that would not do."""
-    if not changed:
+def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences:
+    """Reason over the parts that changed, or over all parts where ontology or rules did. Raises Joined."""
+    name = content_name(ontology.triples, ontology.resources)
+    whole = made_of(graph) != name
+    if whole:
+        notes = set(in_graph(graph.triples(GRAPH_REASONED), GRAPH_REASONED))
+        changes = by_parts.conclude(graph, ontology, parts.each(graph, ontology), whole)
+        base = Conclusions(made_of={_OWL_RL: name}, made_by=_made_by(NATIVE, ontology.resources)).quads()
+        changes.write(changed | notes - changes.noted - base, base - notes)
+    elif changed:
+        changes = by_parts.conclude(graph, ontology, parts.some(graph, ontology, nodes_of(changed)), whole)
+        changes.write(changed)
+    else:
         return _count(graph, ())
-    region = parts.around(graph, ontology, nodes_of(changed))
-    if region is None:
-        return None
-    try:
-        found = _infer(ontology, region.asserted, region.concluded)
-    except Contradiction:
-        return None
-    old = region.concluded
-    new = {quad for quad in found.quads() if ontology.nodes(quad.triple)}
-    nodes = {node for quad in new if _graph(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
-    if found.joined_by or has_blank_node(new ^ old) or any(graph.about(node) for node in nodes - region.nodes):
-        return None
-    graph.change((old - new) | changed, new - old)
-    return _count(graph, new ^ old)
+    return _count(graph, changes.names)
 
 
 def _reason_over_all(
@@ -193,7 +166,7 @@ def _reason_over_all(
         graph.change(changed or (), ())
     else:
         graph.change((old - new) | (changed or set()), new - old)
-    return _count(graph, new ^ old, found.joined_by)
+    return _count(graph, map(graph_of, new ^ old), found.joined_by)
 
 
 def _made_by(engine: str, resources: Resources) -> set[Triple]:
@@ -208,14 +181,14 @@ def _not_run(resources: Resources) -> tuple[str, ...]:
     return () if java() else owl_dl.rules(resources.of("rules", ".swrl.ttl"))
 
 
-def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_by: str | None = None) -> _Conclusions:
+def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_by: str | None = None) -> Conclusions:
     """Conclude from the ontology and some parts; `before` is what was concluded of them when it was last done."""
     closure = Closure(ontology.triples)
     count = len(closure)
     closure.add(premises)
     joined_by = joined_by or parts.join(ontology, closure, count)
     known = ontology.triples | premises | closure.worth_keeping()
-    found = _by_rules(ontology, known, before, joined_by is not None)
+    found = by_rules(ontology, known, before, joined_by is not None)
     closure.add(found.concluded())
     if joined_by is None and (joined_by := parts.join(ontology, closure, count)):
         return _infer(ontology, premises, before, joined_by)
@@ -224,7 +197,7 @@ def _infer(ontology: Ontology, premises: set[Triple], before: set[Quad], joined_
     return found
 
 
-def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
+def _infer_without_contradiction(ontology: Ontology, premises: set[Triple], before: set[Quad]) -> Conclusions:
     """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
     try:
         return _infer(ontology, premises, before)
@@ -254,64 +227,12 @@ def _contradictory(
     return found
 
 
-def _infer_by(engine: str, ontology: Ontology, premises: set[Triple], before: set[Quad]) -> _Conclusions:
+def _infer_by(engine: str, ontology: Ontology, premises: set[Triple], before: set[Quad]) -> Conclusions:
     """Conclude from all of the graph by an engine that is not the native one."""
     known = premises | engines.worth_keeping(engine, premises)
-    found = _by_rules(ontology, known, before, joined=True)
+    found = by_rules(ontology, known, before, joined=True)
     found.contents[GRAPH_OWL_RL] = engines.worth_keeping(engine, premises | found.concluded())
     return found
-
-
-def _by_rules(ontology: Ontology, known: set[Triple], before: set[Quad], joined: bool) -> _Conclusions:
-    """Return what the SWRL and SHACL rules conclude."""
-    facts = _facts_of_swrl(ontology, known, joined)
-    swrl = _by_swrl(ontology, facts, before)
-    made = shacl_rules.conclusions(known | swrl, shacl_rules.all_rules(ontology.resources))
-    shacl = {shacl_rules.graph_of(name): triples for name, triples in made.items()}
-    made_of: dict[object, NamedNode] = {node: content_name(some, ontology.resources) for node, some in facts.items()}
-    return _Conclusions({GRAPH_SWRL: swrl, **shacl}, made_of)
-
-
-def _facts_of_swrl(ontology: Ontology, known: set[Triple], joined: bool) -> dict[parts.Name, set[Triple]]:
-    """Return what the SWRL rules speak of, part by part, each by the first node that it speaks of."""
-    from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
-
-    facts = owl_dl.facts_of_rules(known, ontology.resources.of("rules", ".swrl.ttl"))
-    if joined:
-        return {NamedNode(GRAPH_SWRL): facts}
-    part_of = parts.parted(ontology, known)
-    common, of_parts = set[Triple](), dict[parts.Name, set[Triple]]()
-    for fact in facts:
-        nodes = ontology.nodes(fact)
-        (of_parts.setdefault(part_of(nodes[0]), set()) if nodes else common).add(fact)
-    return {
-        min((node for fact in some for node in ontology.nodes(fact)), key=str): some | common
-        for some in of_parts.values()
-    }
-
-
-def _by_swrl(ontology: Ontology, facts: Mapping[parts.Name, set[Triple]], before: set[Quad]) -> set[Triple]:
-    """Return what the SWRL rules conclude: by Pellet where facts are not those of before; nothing without Java."""
-    from irtwin.knowledge import owl_dl
-
-    if java() is None:
-        return set()
-
-    old = {quad.triple for quad in before if _graph(quad) == GRAPH_SWRL}
-    noted = {(quad.subject, quad.object) for quad in before if _graph(quad) == GRAPH_REASONED}
-    changed = {node for node, some in facts.items() if (node, content_name(some, ontology.resources)) not in noted}
-    if not changed and NamedNode(GRAPH_SWRL) in facts:
-        return old
-    new = set[Triple]()
-    if changed:
-        files = ontology.resources.of("rules", ".swrl.ttl")
-        new = owl_dl.swrl_conclusions(set().union(*(facts[node] for node in changed)), files)
-    spoken_of = {node for some in facts.keys() - changed for fact in facts[some] for node in ontology.nodes(fact)}
-    return new | {triple for triple in old if spoken_of.intersection(ontology.nodes(triple))}
-
-
-def _graph(quad: Quad) -> str:
-    return quad.graph_name.value if isinstance(quad.graph_name, NamedNode) else ""
 
 
 def made_of(graph: KnowledgeGraph) -> object:
@@ -327,26 +248,9 @@ def engine_of(graph: KnowledgeGraph) -> str:
     return next((it for it in engines.ENGINES if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(it)) in said), NATIVE)
 
 
-def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:
-    """Return the name that triples, the rules and those who run them have by their content."""
-    digest = hashlib.sha256(
-        _rules(resources.of("rules") + resources.of("shapes")) + engine.encode() + (b"" if java() else b" without Java")
-    )
-    for line in sorted(map(str, triples)):
-        digest.update(line.encode())
-    return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
-
-
-@lru_cache(maxsize=16)
-def _rules(files: Files) -> bytes:
-    """Return rules and shapes as they are written, and those of OWL 2 RL."""
-    paths = [*sorted(folder("rules").glob("owl2_rl*")), *(file.path for file in files)]
-    return b"".join(path.read_bytes() for path in paths)
-
-
-def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
+def _count(graph: KnowledgeGraph, changed: Iterable[str], joined_by: str | None = None) -> Inferences:
     counts = graph.query(_COUNT).rows[0]
-    names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
+    names = set(changed) - {GRAPH_REASONED, GRAPH_CHANGED}
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
     return Inferences(
         counts["owl_rl"],
