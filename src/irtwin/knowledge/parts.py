@@ -126,13 +126,16 @@ def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> 
 
 def some(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Iterator[Region | None]:
     """Yield the parts that the seeds belong to, one by one, like `around`."""
-    left = set(seeds)
-    while left:
-        region = around(graph, ontology, [min(left, key=str)])
-        yield region
-        if region is None:
-            return
-        left -= region.nodes | ontology.terms
+    wanted, done = set(seeds), set[Name]()
+    for seed in sorted(wanted, key=str):
+        if seed not in done:
+            region = around(graph, ontology, [seed])
+            if region is None:
+                yield None
+                return
+            done |= region.nodes & wanted
+            if region.nodes:  # none are around a term of the ontology
+                yield region
 
 
 def each(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
