@@ -27,7 +27,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, PREFIXES
 from irtwin.resources import folder, shipped
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Base
+from irtwin.storage.schema import METER, Base
 
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
 EFFECTS = {  # of a twin: share of the modelled energy, parameter, unit
@@ -126,7 +126,7 @@ def _run(
     part = "fit" if k % 3 else "held_out"
     payload = draw.choice([0.0, 2.0, 4.0])
     series = [f"{draw.getrandbits(256):064x}" for _ in range(2)]
-    state, energy = f"run_state.{run_id}", f"energy.{run_id}"
+    state, energy, meter = (f"{provider}.{run_id}" for provider in ("run_state", "energy", "energy_meter"))
     yield "run", {
         "run_id": run_id, "robot_id": robot_id, "name": run_id.split(".")[1],
         "kind": "Measured_Run",
@@ -157,6 +157,7 @@ def _run(
         }  # fmt: skip
     yield "twin_run", {"twin_id": twin_id, "run_id": run_id, "part": part, "activity_id": fitted_by}
     yield from _activity(energy, robot_id, "energy", f"{ID}run/{run_id}", [f"{ID}run/{run_id}", f"{ID}twin/{twin_id}"])
+    yield from _activity(meter, robot_id, METER, f"{ID}run/{run_id}", [f"{ID}series/{series[0]}"])
     ledger = _ledger(draw, standby * seconds, burns)
     modelled = sum(ledger.values())
     measured = modelled * (1.0 + drift + draw.gauss(0.0, 0.02))
@@ -167,6 +168,7 @@ def _run(
         "modelled_energy_j": modelled, "energy_error_percent": 100.0 * abs(modelled - measured) / measured,
         "power_rmse_w": draw.uniform(5.0, 30.0), "standby_energy_j": standby * seconds,
         "standby_share": standby * seconds / modelled, "returned_energy_j": returned, "activity_id": energy,
+        "taken_activity_id": meter,
     }  # fmt: skip
     for (effect, joint), value in ledger.items():
         yield "energy_share", {

@@ -11,7 +11,7 @@ from tests import small_fleet
 from tests.individuals import individual
 
 from irtwin import workflow
-from irtwin.knowledge import parts, reasoning
+from irtwin.knowledge import by_parts, parts, reasoning
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
@@ -132,10 +132,15 @@ def anew(quads: Iterable[Quad]) -> KnowledgeGraph:
     return graph
 
 
+def refused(*_: object) -> None:
+    raise by_parts.Joined
+
+
 def as_one_part(graph: KnowledgeGraph) -> dict[str, set]:
     """Return what follows from the whole graph, taken as one part."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(parts, "join", lambda *_: "for comparison")
+        patch.setattr(by_parts, "conclude", refused)
         copy = KnowledgeGraph()
         copy.replace(
             (it for it in graph.quads() if not it.graph_name.value.startswith((GRAPH_INFERRED, GRAPH_REASONED))), ""

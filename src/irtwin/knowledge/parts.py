@@ -16,19 +16,34 @@ through the ontology, so what is concluded of all parts is what is concluded of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Triple
+import numpy as np
+import numpy.typing as npt
+from pyoxigraph import BlankNode, NamedNode, Quad, Triple
 
 from irtwin.knowledge import locality
 from irtwin.knowledge.owl_rl import datatypes
-from irtwin.knowledge.owl_rl.closure import Closure, show
+from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.owl_rl.program import program
-from irtwin.knowledge.owl_rl.terms import Node
+from irtwin.knowledge.owl_rl.rules import Fact, Number
+from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.store.changes import is_asserted
-from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_REASONED, OWL, RDF, term
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.vocabulary import (
+    GRAPH_ACTIVITY,
+    GRAPH_CHANGED,
+    GRAPH_INFERRED,
+    GRAPH_ONTOLOGY,
+    GRAPH_REASONED,
+    GRAPH_VALIDATION,
+    OWL,
+    RDF,
+    term,
+)
 
 Name = NamedNode | BlankNode
 
@@ -36,6 +51,8 @@ _TYPE = NamedNode(RDF + "type")
 _INVERSE_FUNCTIONAL = NamedNode(OWL + "InverseFunctionalProperty")
 _ROBOT = NamedNode(term("Industrial_Robot"))
 _HAS_KEY = NamedNode(OWL + "hasKey")
+_NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED)
+_NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 
 
 class Ontology:
@@ -46,6 +63,16 @@ class Ontology:
         self.triples = graph.triples(GRAPH_ONTOLOGY)
         self.terms: set[object] = {term for triple in self.triples for term in triple}
         self.terms.update(map(NamedNode, locality.of_all_rules(graph.resources).terms))
+
+    @cached_property
+    def schema(self) -> Schema:
+        """The ontology, closed. Contradiction where it contradicts itself."""
+        return _schema(frozenset(self.triples))
+
+    @cached_property
+    def borders(self) -> Borders:
+        """What a part, closed beside the schema, must not say."""
+        return Borders(self, self.schema.closure)
 
     def nodes(self, triple: Triple) -> list[Name]:
         """Return the nodes of parts that a triple speaks of."""
@@ -60,28 +87,112 @@ class Region:
     nodes: set[Name] = field(default_factory=set)
     asserted: set[Triple] = field(default_factory=set)
     concluded: set[Quad] = field(default_factory=set)
+    read: Counter[str] = field(default_factory=Counter)  # how many quads, by their graphs
+
+    def take(self, quad: Quad, ontology: Ontology) -> list[Name]:
+        """Take in a quad; return the nodes that it speaks of."""
+        name = quad.graph_name.value  # type: ignore[union-attr]
+        self.read[_kind(name)] += 1
+        if name.startswith(_NOT_PARTS):
+            return []
+        if not name.startswith(GRAPH_INFERRED) and name != GRAPH_REASONED:
+            self.asserted.add(quad.triple)
+        else:
+            self.concluded.add(quad)
+            if name == GRAPH_REASONED:
+                return []
+        return ontology.nodes(quad.triple)
 
 
 def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Region | None:
     """Return the parts that the seeds belong to, or None where one is a term that more is said of than the ontology."""
-    region, todo = Region(), list(seeds)
+    region, todo = Region(), set(seeds)
+    terms = todo & ontology.terms
+    if any(is_asserted(it) and _elsewhere(it) for it in graph.said_of(terms)):
+        return None
+    todo -= terms
     while todo:
-        node = todo.pop()
-        if node in ontology.terms:
-            if any(is_asserted(it) and it.subject == node and _elsewhere(it) for it in graph.about(node)):
-                return None
-        elif node not in region.nodes:
-            region.nodes.add(node)
-            for quad in graph.about(node):
-                if is_asserted(quad):
-                    region.asserted.add(quad.triple)
-                elif quad.graph_name.value.startswith((GRAPH_INFERRED, GRAPH_REASONED)):  # type: ignore[union-attr]
-                    region.concluded.add(quad)
-                else:
-                    continue
-                if quad.graph_name.value != GRAPH_REASONED:  # type: ignore[union-attr]
-                    todo += ontology.nodes(quad.triple)
+        region.nodes |= todo
+        found: set[Name] = set()
+        for quad in graph.said_of(todo):
+            found.update(region.take(quad, ontology))
+        before = graph.leading_to(todo, _NOT_FOLLOWED)
+        for quad in graph.said_of(before & ontology.terms):
+            if quad.object in todo:
+                found.update(region.take(quad, ontology))
+        todo = (found | before - ontology.terms) - region.nodes
     return region
+
+
+def some(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Iterator[Region | None]:
+    """Yield the parts that the seeds belong to, one by one, like `around`."""
+    wanted, done = set(seeds), set[Name]()
+    for seed in sorted(wanted, key=str):
+        if seed not in done:
+            region = around(graph, ontology, [seed])
+            if region is None:
+                yield None
+                return
+            done |= region.nodes & wanted
+            if region.nodes:  # none are around a term of the ontology
+                yield region
+
+
+def each(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
+    """Yield what was concluded of the ontology alone, and all parts, robots first; None where the graph is one part.
+
+    Each is found when it is asked for. Of those before, only the hashes of their nodes are kept: 8 bytes a node.
+    """
+    seen, read = [np.empty(0, np.int64)], Counter[str]()
+
+    def noted(region: Region | None) -> Region | None:
+        if region is not None:
+            seen.append(_hashes(region.nodes))
+            read.update(region.read)
+        return region
+
+    yield noted(_of_ontology(graph, ontology))
+    yield from map(noted, some(graph, ontology, graph.subjects(_TYPE, _ROBOT) - ontology.terms))
+    left = set[Name]()
+    for quad in _unread(graph, read):
+        nodes = ontology.nodes(quad.triple)
+        if not nodes and is_asserted(quad):
+            yield None
+            return
+        left.update(nodes)
+    known = np.isin(_hashes(left), np.concatenate(seen))
+    yield from some(graph, ontology, {node for node, is_known in zip(left, known, strict=True) if not is_known})
+
+
+def _of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
+    region = Region()
+    if graph.graphs(GRAPH_INFERRED):
+        for quad in graph.said_of(term for term in ontology.terms if isinstance(term, Name)):
+            if not is_asserted(quad) and not ontology.nodes(quad.triple):
+                region.take(quad, ontology)
+    return region
+
+
+def _unread(graph: KnowledgeGraph, read: Counter[str]) -> Iterator[Quad]:
+    """Yield the quads of those graphs that parts left something of."""
+    held = Counter[str]()
+    for name, count in graph.sizes():
+        held[_kind(name)] += count
+    kinds = {kind for kind, count in held.items() if kind and count > read[kind] and kind != GRAPH_ONTOLOGY}
+    for name in graph.graphs() if kinds else ():
+        if _kind(name) in kinds:
+            yield from in_graph(graph.triples(name), name)
+
+
+def _kind(name: str) -> str:
+    """Return what a graph is counted with; nothing where it is neither asserted nor inferred."""
+    if name.startswith(GRAPH_ACTIVITY):
+        return GRAPH_ACTIVITY
+    return "" if name.startswith(_NOT_FOLLOWED) else name
+
+
+def _hashes(nodes: Collection[Name]) -> npt.NDArray[np.int64]:
+    return np.fromiter(map(hash, nodes), np.int64, len(nodes))
 
 
 def parted(ontology: Ontology, triples: Iterable[Triple]) -> Callable[[Name], Name]:
@@ -128,38 +239,51 @@ def join(ontology: Ontology, closure: Closure, count: int) -> str | None:
 
     closure: of the ontology, `count` statements, and then of some parts.
     """
-    reach = locality.of_all_rules(ontology.resources)
-    if reach.unknown:
-        return min(reach.unknown)
-    if any(predicate == _HAS_KEY for _, predicate, _ in closure.since(0)):
-        return "owl:hasKey"
-    properties, classes = program().terms_of_models()
-    backward: set[object] = {NamedNode(iri) for iri in reach.backward}
-    backward |= {one for one, predicate, kind in closure.since(0) if (predicate, kind) == (_TYPE, _INVERSE_FUNCTIONAL)}
-    forbidden = {NamedNode(iri) for iri in properties | reach.anywhere}
-    kinds = {NamedNode(iri) for iri in classes}
-    for subject, predicate, object in closure.since(count):
-        if isinstance(subject, Literal):
-            joins = not (predicate == _TYPE and _is_datatype(object))  # of a value, the same holds in every part
-        elif subject in ontology.terms:
-            joins = True
-        elif predicate == _TYPE:
-            joins = object in kinds
-        else:
-            outside = object in ontology.terms or isinstance(object, Literal)
-            joins = predicate in forbidden or (outside and predicate in backward)
-        if joins or any(_is_datatype(end) and end not in ontology.terms for end in _ends(subject, object)):
-            return " ".join(map(show, (subject, predicate, object)))
-    return None
+    return Borders(ontology, closure).crossed(closure, count)
 
 
-def _ends(subject: Node, object: Node) -> tuple[Node, ...]:
-    """Return where a part could speak of a datatype that the ontology does not: all parts would be told of it."""
-    return () if isinstance(subject, Literal) else (subject, object)
+class Borders:
+    """What a part must not say, by the numbers of a closure that holds the ontology."""
+
+    def __init__(self, ontology: Ontology, closure: Closure):
+        reach = locality.of_all_rules(ontology.resources)
+        number, facts = closure.terms.number, closure.facts
+        properties, classes = program().terms_of_models()
+        self._everywhere = min(reach.unknown) if reach.unknown else None
+        self._type, self._has_key = number(_TYPE), number(_HAS_KEY)
+        self._terms = {number(term) for term in ontology.terms}  # type: ignore[arg-type]
+        self._forbidden = {number(NamedNode(iri)) for iri in properties | reach.anywhere}
+        self._kinds = {number(NamedNode(iri)) for iri in classes}
+        self._datatypes = {number(NamedNode(iri)) for iri in datatypes.names()}
+        self._backward = {number(NamedNode(iri)) for iri in reach.backward}
+        self._backward |= facts.subjects.get(self._type, {}).get(number(_INVERSE_FUNCTIONAL), set())
+
+    def crossed(self, closure: Closure, count: int = 0) -> str | None:
+        """Return a statement that `closure` knows beside the first `count`, and that crosses a border, in words."""
+        if self._everywhere is not None:
+            return self._everywhere
+        if closure.facts.objects.get(self._has_key):
+            return "owl:hasKey"
+        crossing = (fact for fact in closure.since(count) if self._joins(fact, closure.terms.literals))
+        return next(map(closure.in_words, crossing), None)
+
+    def _joins(self, fact: Fact, literals: set[Number]) -> bool:
+        subject, predicate, object = fact
+        if subject in literals:
+            return not (predicate == self._type and object in self._datatypes)  # of a value, the same in every part
+        if subject in self._terms:
+            return True
+        of_ontology = object in self._terms
+        if subject in self._datatypes or (object in self._datatypes and not of_ontology):
+            return True  # all parts would be told of its values
+        if predicate == self._type:
+            return object in self._kinds
+        return predicate in self._forbidden or (predicate in self._backward and (of_ontology or object in literals))
 
 
-def _is_datatype(term: Node) -> bool:
-    return isinstance(term, NamedNode) and datatypes.is_datatype(term.value)
+@lru_cache(maxsize=1)
+def _schema(ontology: frozenset[Triple]) -> Schema:
+    return Schema(ontology)
 
 
 def _elsewhere(quad: Quad) -> bool:

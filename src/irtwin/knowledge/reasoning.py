@@ -8,20 +8,18 @@ everything where the graph is one part.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from functools import lru_cache
+from contextlib import suppress
+from dataclasses import dataclass
 
-from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
+from pyoxigraph import Literal, NamedNode, Quad, Triple
 
-from irtwin.knowledge import engines, parts
+from irtwin.knowledge import by_parts, engines, parts
+from irtwin.knowledge.by_parts import Joined
+from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.parts import Ontology
-from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -36,7 +34,6 @@ from irtwin.knowledge.vocabulary import (
     PROV,
     term,
 )
-from irtwin.resources import Files, Resources, folder
 
 _COUNT = f"""
 SELECT ?owl_rl ?by_rules
@@ -80,28 +77,6 @@ class Inferences:
     set_aside: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass
-class _Conclusions:
-    """What was concluded, by the IRIs of named graphs; what it was made of; by whom; what makes the graph one part."""
-
-    contents: dict[str, set[Triple]] = field(default_factory=dict)
-    made_of: dict[object, NamedNode] = field(default_factory=dict)
-    made_by: set[Triple] = field(default_factory=set)
-    joined_by: str | None = None
-
-    def concluded(self) -> set[Triple]:
-        """Return the triples of all the named graphs."""
-        return set().union(*self.contents.values())
-
-    def quads(self) -> set[Quad]:
-        """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
-        store = Store()
-        derivations = {Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items()}  # type: ignore[arg-type]
-        for name, triples in {**self.contents, GRAPH_REASONED: derivations | self.made_by}.items():
-            store.extend(in_graph(triples, name))
-        return set(store)
-
-
 def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
@@ -115,10 +90,9 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     if engine != NATIVE:
         return _reason_over_all(graph, ontology, changed, engine)
     try:
-        if changed is not None and made_of(graph) == content_name(ontology.triples, ontology.resources):
-            done = _reason_again(graph, ontology, changed)
-            if done is not None:
-                return done
+        if changed is not None:
+            with suppress(Joined):
+                return _by_parts(graph, ontology, changed)
         return _reason_over_all(graph, ontology, changed)
     except Exception:
         graph.replace([], GRAPH_INFERRED, GRAPH_REASONED)
@@ -143,24 +117,21 @@ def around(graph: KnowledgeGraph, nodes: Iterable[NamedNode]) -> set[Triple]:
     return graph.construct(_AROUND.replace("?nodes", values))
 
 
-def _reason_again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences | None:
-    """Reason over the parts that changed; None where that would not do."""
-    if not changed:
+def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences:
+    """Reason over the parts that changed, or over all parts where ontology or rules did. Raises Joined."""
+    name = content_name(ontology.triples, ontology.resources)
+    whole = made_of(graph) != name
+    if whole:
+        notes = set(in_graph(graph.triples(GRAPH_REASONED), GRAPH_REASONED))
+        changes = by_parts.conclude(graph, ontology, parts.each(graph, ontology), whole)
+        base = Conclusions(made_of={_OWL_RL: name}, made_by={_made_by(NATIVE)}).quads()
+        changes.write(changed | notes - changes.noted - base, base - notes)
+    elif changed:
+        changes = by_parts.conclude(graph, ontology, parts.some(graph, ontology, nodes_of(changed)), whole)
+        changes.write(changed)
+    else:
         return _count(graph, ())
-    region = parts.around(graph, ontology, nodes_of(changed))
-    if region is None:
-        return None
-    try:
-        found = _infer(ontology, region.asserted)
-    except Contradiction:
-        return None
-    old = region.concluded
-    new = {quad for quad in found.quads() if ontology.nodes(quad.triple)}
-    nodes = {node for quad in new if _graph(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
-    if found.joined_by or has_blank_node(new ^ old) or any(graph.about(node) for node in nodes - region.nodes):
-        return None
-    graph.change((old - new) | changed, new - old)
-    return _count(graph, new ^ old)
+    return _count(graph, changes.names)
 
 
 def _reason_over_all(
@@ -180,30 +151,34 @@ def _reason_over_all(
         found = _infer_by(engine, ontology, premises)
     in_parts = engine == NATIVE and changed is not None and not found.joined_by
     found.made_of[_OWL_RL] = content_name(ontology.triples, ontology.resources) if in_parts else everything
-    found.made_by.add(Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)))
+    found.made_by.add(_made_by(engine))
     new = found.quads()
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
         graph.change(changed or (), ())
     else:
         graph.change((old - new) | (changed or set()), new - old)
-    return _count(graph, new ^ old, found.joined_by)
+    return _count(graph, map(graph_of, new ^ old), found.joined_by)
 
 
-def _infer(ontology: Ontology, premises: set[Triple]) -> _Conclusions:
+def _made_by(engine: str) -> Triple:
+    return Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine))
+
+
+def _infer(ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from the ontology and some parts."""
     closure = Closure(ontology.triples)
     count = len(closure)
     closure.add(premises)
     known = ontology.triples | premises | closure.worth_keeping()
-    found = _Conclusions(conclusions(known, all_rules(ontology.resources)))
+    found = by_rules(ontology, known)
     closure.add(found.concluded())
     found.joined_by = parts.join(ontology, closure, count)
     found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     return found
 
 
-def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> _Conclusions:
+def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
     try:
         return _infer(ontology, premises)
@@ -233,16 +208,12 @@ def _contradictory(
     return found
 
 
-def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> _Conclusions:
+def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from all of the graph by an engine that is not the native one."""
     known = premises | engines.worth_keeping(engine, premises)
-    found = _Conclusions(conclusions(known, all_rules(ontology.resources)))
+    found = by_rules(ontology, known)
     found.contents[GRAPH_OWL_RL] = engines.worth_keeping(engine, premises | found.concluded())
     return found
-
-
-def _graph(quad: Quad) -> str:
-    return quad.graph_name.value if isinstance(quad.graph_name, NamedNode) else ""
 
 
 def made_of(graph: KnowledgeGraph) -> object:
@@ -258,24 +229,9 @@ def engine_of(graph: KnowledgeGraph) -> str:
     return next((it for it in engines.ENGINES if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(it)) in said), NATIVE)
 
 
-def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:
-    """Return the name that triples, the rules and those who run them have by their content."""
-    digest = hashlib.sha256(_rules(resources.of("rules") + resources.of("shapes")) + engine.encode())
-    for line in sorted(map(str, triples)):
-        digest.update(line.encode())
-    return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
-
-
-@lru_cache(maxsize=16)
-def _rules(files: Files) -> bytes:
-    """Return rules and shapes as they are written, and those of OWL 2 RL."""
-    paths = [*sorted(folder("rules").glob("owl2_rl*")), *(file.path for file in files)]
-    return b"".join(path.read_bytes() for path in paths)
-
-
-def _count(graph: KnowledgeGraph, changed: Iterable[Quad], joined_by: str | None = None) -> Inferences:
+def _count(graph: KnowledgeGraph, changed: Iterable[str], joined_by: str | None = None) -> Inferences:
     counts = graph.query(_COUNT).rows[0]
-    names = {_graph(quad) for quad in changed} - {GRAPH_REASONED, GRAPH_CHANGED}
+    names = set(changed) - {GRAPH_REASONED, GRAPH_CHANGED}
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
     return Inferences(
         counts["owl_rl"],

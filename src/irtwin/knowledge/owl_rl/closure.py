@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, islice, product
@@ -12,8 +12,8 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.program import program
-from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number
-from irtwin.knowledge.owl_rl.terms import Node
+from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number, Rule
+from irtwin.knowledge.owl_rl.terms import Node, Terms
 from irtwin.knowledge.vocabulary import OWL, RDFS, XSD, shorten
 
 _TRIVIAL = (OWL + "Thing", OWL + "Nothing")
@@ -59,10 +59,12 @@ class Closure:
 
     def add(self, triples: Iterable[Triple]) -> None:
         """Take more triples as given, and infer what follows of them."""
-        self._triples.update(triples)
-        self._given.update(map(self._terms.fact, self._triples))
+        more = set(triples) - self._triples
+        self._triples |= more
+        facts = list(map(self._terms.fact, more))
+        self._given.update(facts)
         self._refuse_ill_typed()
-        self._saturate([*self._given, *self._types_of_mentioned()])
+        self._saturate([*facts, *self._types_of_mentioned()])
         self._add_reflexives()
         self._refuse_contradictions()
 
@@ -82,7 +84,7 @@ class Closure:
         class expressions and of datatypes, and one more way to write a literal that stands there already.
         """
         terms, helpers = self._terms, self._helpers()
-        hidden = {number for number, forms in enumerate(terms.forms) if forms and _is_hidden(forms[0])}
+        hidden = {number for number, forms in enumerate(terms.forms) if forms and is_hidden(forms[0])}
         reflexive = {terms.number(NamedNode(iri)) for iri in _REFLEXIVE}
         kept: set[Triple] = set()
         for fact in self._round.keys() - self._given - _truisms():
@@ -93,16 +95,31 @@ class Closure:
                 kept.update(list(terms.triples(fact))[:1])
         return kept
 
+    @property
+    def facts(self) -> Facts:
+        """All that is known, but that x is itself, by numbers."""
+        return self._facts
+
+    @property
+    def terms(self) -> Terms:
+        """The numbers of terms."""
+        return self._terms
+
+    @property
+    def known(self) -> Mapping[Fact, int]:
+        """All that is known, and the round that it was found in."""
+        return self._round
+
     def __len__(self) -> int:
         """Return how many statements are known."""
         return len(self._round)
 
-    def since(self, count: int) -> Iterator[Statement]:
+    def since(self, count: int) -> Iterator[Fact]:
         """Yield what is known beside the first `count` statements, given or inferred, but not that x is itself."""
-        forms = self._terms.forms
-        for subject, predicate, object in islice(self._round, count, None):
-            if (predicate != self._program.same or subject != object) and forms[subject] and forms[object]:
-                yield (forms[subject][0], forms[predicate][0], forms[object][0])
+        forms, same = self._terms.forms, self._program.same
+        for fact in islice(self._round, count, None):
+            if (fact[1] != same or fact[0] != fact[2]) and forms[fact[0]] and forms[fact[2]]:
+                yield fact
 
     def why(self, statement: Statement | Triple) -> Derivation | None:
         """Return how a statement was first inferred; None where it was given, does not follow, or needs no premise."""
@@ -170,7 +187,7 @@ class Closure:
     def _types_of_mentioned(self) -> Iterator[Fact]:
         """Say of each literal which of the datatypes that the graph speaks of contain it (dt-type2)."""
         nodes = {number for subject, _, object in self._given for number in (subject, object)}
-        mentioned = {iri: number for number in nodes if datatypes.is_datatype(iri := self._iri(number))}
+        mentioned = {iri: number for number in nodes if datatypes.is_datatype(iri := self.iri(number))}
         if mentioned:
             for number, value in self._terms.values.items():
                 for iri in datatypes.datatypes_of(value) & mentioned.keys():
@@ -212,18 +229,29 @@ class Closure:
 
     def _refuse_contradictions(self) -> None:
         for rule, join in self._program.contradictions:
-            for culprits in join(self._facts, self._facts):
-                raise _contradiction(rule.name, ", ".join(map(self._name, culprits)))
-        for kind, members in self._facts.subjects.get(self._program.type, {}).items():
-            if datatypes.is_datatype(self._iri(kind)):
+            self._refuse(rule, join(self._facts, self._facts))
+        self._refuse_other_datatypes(self._facts)
+
+    def _refuse(self, rule: Rule, found: Iterable[tuple[Number, ...]]) -> None:
+        for culprits in found:
+            raise _contradiction(rule.name, ", ".join(map(self._name, culprits)))
+
+    def _refuse_other_datatypes(self, facts: Facts) -> None:
+        """Refuse values that are said to be of a datatype, and are not (dt-not-type)."""
+        for kind, members in facts.subjects.get(self._program.type, {}).items():
+            if datatypes.is_datatype(self.iri(kind)):
                 for number in members & self._terms.values.keys():
-                    if self._iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
-                        raise _not_of(self._use(number), self._iri(kind))
+                    if self.iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
+                        raise _not_of(self._use(number), self.iri(kind))
 
     def _helpers(self) -> set[Number]:
         """Return the predicates that only rules speak: their own, and lists that stand for a chain or a key."""
         lists = (self._facts.objects.get(number, {}) for number in self._program.helpers)
         return self._program.helpers.union(*lists)
+
+    def in_words(self, fact: Fact) -> str:
+        """Return a statement as people write it."""
+        return " ".join(map(self._name, fact))
 
     def _shown(self, fact: Fact) -> Statement:
         subject, predicate, object = (self._terms.forms[number][0] for number in fact)
@@ -240,7 +268,8 @@ class Closure:
         """Return a given triple, as people write it, whose object has the number."""
         return " ".join(map(self._name, next(fact for fact in self._given if fact[2] == number)))
 
-    def _iri(self, number: Number) -> str:
+    def iri(self, number: Number) -> str:
+        """Return the IRI that has a number, or nothing where it is of a literal or blank node."""
         forms = self._terms.forms[number]
         return forms[0].value if forms and isinstance(forms[0], NamedNode) else ""
 
@@ -258,10 +287,11 @@ def says_something(triple: Triple) -> bool:
     """Whether a conclusion is worth keeping in a graph, as `Closure.worth_keeping` has it."""
     if triple.subject == triple.object and triple.predicate.value in _REFLEXIVE:
         return False
-    return not _is_hidden(triple.subject) and not _is_hidden(triple.object)
+    return not is_hidden(triple.subject) and not is_hidden(triple.object)
 
 
-def _is_hidden(term: Node) -> bool:
+def is_hidden(term: Node) -> bool:
+    """Whether what is said of a term is not worth keeping: of everything, of anonymous classes, of datatypes."""
     if isinstance(term, NamedNode):
         return term.value in _TRIVIAL or datatypes.is_datatype(term.value)
     return isinstance(term, BlankNode)

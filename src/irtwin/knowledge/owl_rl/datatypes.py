@@ -75,9 +75,17 @@ def datatypes_of(known: Value) -> frozenset[str]:
     return frozenset(_datatypes_of(*known))
 
 
+_OTHERS = (RDF + "langString", RDFS + "Literal")
+
+
 def is_datatype(iri: str) -> bool:
     """Tell whether an IRI is a datatype whose values are known here."""
-    return iri in _READERS or iri in (RDF + "langString", RDFS + "Literal")
+    return iri in _READERS or iri in _OTHERS
+
+
+def names() -> set[str]:
+    """Return the IRIs of all datatypes whose values are known here."""
+    return {*_READERS, *_OTHERS}
 
 
 def _datatypes_of(space: str, content: Hashable) -> Iterator[str]:

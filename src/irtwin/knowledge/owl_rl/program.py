@@ -16,6 +16,7 @@ from irtwin.resources import folder
 
 _SPACES = {**PREFIXES, "rl": "urn:irtwin:owl2-rl:"}
 _BY_GROUPS = ("eq-sym", "eq-trans")  # run by joining groups: as loops they take time with the cube of a group
+_OF_FACTS = ("owl:sameAs", "rl:in_all")
 _NUMBERS = {"rl:zero": "0", "rl:one": "1"}
 
 
@@ -35,30 +36,37 @@ class Program:
         axioms = sorted(read_turtle(folder("rules") / "owl2_rl_axioms.ttl"), key=str)
         self.axioms = [self.terms.fact(triple) for triple in axioms]
         self.type, self.same, self.different = map(self.number, ("rdf:type", "owl:sameAs", "owl:differentFrom"))
-        self._rules = read_rules(folder("rules") / "owl2_rl.rq")
+        self.rules = read_rules(folder("rules") / "owl2_rl.rq")
         self.helpers = {
             self.number(term)
-            for rule in self._rules
+            for rule in self.rules
             for pattern in rule.head
             for term in pattern
             if term.startswith("rl:")
         }
         self.forward = [
             compile_join(rule, self.number, rule.head, new=index)
-            for rule in self._rules
+            for rule in self.rules
             if rule.head and rule.name not in _BY_GROUPS
             for index in range(len(rule.body))
         ]
         self.contradictions = [
-            (rule, compile_join(rule, self.number, [rule.culprits])) for rule in self._rules if rule.culprits
+            (rule, compile_join(rule, self.number, [rule.culprits])) for rule in self.rules if rule.culprits
         ]
 
     def terms_of_models(self) -> tuple[set[str], set[str]]:
         """Return the IRIs of properties and of classes by whose use an ontology tells the rules what to conclude."""
-        body = [pattern for rule in self._rules for pattern in rule.body]
+        body = [pattern for rule in self.rules for pattern in rule.body]
         properties = {predicate for _, predicate, _ in body if not predicate.startswith(("?", "rl:"))} - {"rdf:type"}
         classes = {kind for _, predicate, kind in body if predicate == "rdf:type" and not kind.startswith("?")}
         return ({_node(it).value for it in properties}, {_node(it).value for it in classes})
+
+    def is_of_models(self, pattern: Pattern) -> bool:
+        """Whether a pattern fits what an ontology says of its classes and properties, and nothing else."""
+        _, predicate, kind = pattern
+        if predicate == "rdf:type":
+            return not kind.startswith("?")
+        return not predicate.startswith("?") and predicate not in _OF_FACTS
 
     def number(self, term: Term) -> Number:
         """Return the number of a term of the rules."""
@@ -66,7 +74,7 @@ class Program:
 
     def concluding(self, conclusion: Fact) -> Iterator[tuple[Rule, Join, list[Number]]]:
         """Return the rules that may draw a conclusion, and how to ask each for its premises."""
-        for rule in self._rules:
+        for rule in self.rules:
             for pattern in rule.head:
                 bound = self._unified(pattern, conclusion)
                 if bound is not None:

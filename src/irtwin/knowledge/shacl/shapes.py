@@ -29,6 +29,14 @@ class Shapes:
             if name in found and (value is None or NamedNode(value) in found[name])
         ]
 
+    def all(self) -> list[Node]:
+        """Return all subjects."""
+        return list(self._objects)  # type: ignore[arg-type]
+
+    def said_of(self, node: object) -> list[tuple[str, list[Node]]]:
+        """Return all properties of a node, by their whole IRIs, with their values."""
+        return list(self._objects.get(node, {}).items())
+
     def values(self, node: object, name: str) -> list[Node]:
         """Return the values of a property of SHACL's, or of any by its whole IRI."""
         return self._objects.get(node, {}).get(name if ":" in name else SH + name, [])

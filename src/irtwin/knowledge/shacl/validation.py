@@ -12,14 +12,16 @@ from functools import lru_cache
 
 import pyshacl
 import rdflib
-from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Triple, parse, serialize
+from pyoxigraph import BlankNode, NamedNode, RdfFormat, Store, Triple, parse, serialize
 from rdflib.namespace import SH
 
 from irtwin.knowledge import parts
-from irtwin.knowledge.parts import Ontology
-from irtwin.knowledge.reasoning import asserted, content_name
+from irtwin.knowledge.conclusions import content_name
+from irtwin.knowledge.parts import Ontology, Region
+from irtwin.knowledge.reasoning import asserted
 from irtwin.knowledge.reasoning import made_of as reasoned_from
 from irtwin.knowledge.shacl.of_ontology import SUB_CLASS_OF, with_ontology
+from irtwin.knowledge.shacl.suspects import any_suspect, queries
 from irtwin.knowledge.store.changes import DERIVED_FROM, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
@@ -61,9 +63,17 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     changed = graph.changed(GRAPH_VALIDATION)
     in_parts = changed is not None and made_of == reasoned_from(graph) and not graph.changed(GRAPH_INFERRED)
     validated = Triple(NamedNode(GRAPH_VALIDATION), DERIVED_FROM, made_of)
-    report = _again(graph, ontology, changed or set()) if in_parts and graph.holds(validated) else None
+    report = None
+    if in_parts and graph.holds(validated):
+        nodes = nodes_of(changed or set())
+        report = _by_parts(
+            graph, ontology, parts.some(graph, ontology, nodes), _as_rdflib(graph.triples(GRAPH_VALIDATION))
+        )
+    elif in_parts:
+        report = _by_parts(graph, ontology, parts.each(graph, ontology), _empty())
     if report is None:
         report = _report(asserted(graph), ontology, graph.resources.of("shapes"))
+    report = _empty() if report is None else report
     text = report.serialize(format="nt", encoding="utf-8")
     graph.replace(
         in_graph((quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)), GRAPH_VALIDATION), GRAPH_VALIDATION
@@ -73,23 +83,38 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     return tuple(sorted((_violation(report, node, robots) for node in report.objects(None, SH.result)), key=str))
 
 
-def _again(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> rdflib.Graph | None:
-    """Return the report of before with that of the parts that changed; None where all is to be checked."""
-    region = parts.around(graph, ontology, nodes_of(changed))
-    if region is None or any(isinstance(node, BlankNode) for node in region.nodes):
-        return None
-    report = _as_rdflib(graph.triples(GRAPH_VALIDATION))
+def _by_parts(
+    graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region | None], report: rdflib.Graph
+) -> rdflib.Graph | None:
+    """Put what is found in some parts in the place of what a report says of them; None where all is to be checked."""
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
-    nodes = {rdflib.URIRef(node.value) for node in region.nodes}
-    for result in [one for one in report.objects(None, SH.result) if report.value(one, SH.focusNode) in nodes]:
-        report -= report.cbd(result)
-        report.remove((None, SH.result, result))
-    if region.asserted:
+    for region in regions:
+        if region is None or any(isinstance(node, BlankNode) for node in region.nodes):
+            return None
+        nodes = {rdflib.URIRef(node.value) for node in region.nodes or ontology.terms if isinstance(node, NamedNode)}
+        for result in _about(report, nodes):
+            report -= report.cbd(result)
+            report.remove((None, SH.result, result))
+        if region.nodes and not region.asserted:
+            continue
         found = _report(ontology.triples | region.asserted, ontology, graph.resources.of("shapes"))
-        for result in [one for one in found.objects(None, SH.result) if found.value(one, SH.focusNode) in nodes]:
-            report += found.cbd(result)
-            report.add((head, SH.result, result))
+        if found is not None:
+            for result in _about(found, nodes):
+                report += found.cbd(result)
+                report.add((head, SH.result, result))
     report.set((head, SH.conforms, rdflib.Literal((head, SH.result, None) not in report)))
+    return report
+
+
+def _about(report: rdflib.Graph, nodes: set[rdflib.URIRef]) -> list[rdflib.term.Node]:
+    return [result for result in report.objects(None, SH.result) if report.value(result, SH.focusNode) in nodes]
+
+
+def _empty() -> rdflib.Graph:
+    """Return the report of a graph that keeps all constraints."""
+    report, head = rdflib.Graph(), rdflib.BNode()
+    report.add((head, rdflib.RDF.type, SH.ValidationReport))
+    report.add((head, SH.conforms, rdflib.Literal(True)))
     return report
 
 
@@ -110,18 +135,33 @@ class _Robots:
         return self._known[node]
 
 
-def _report(data: Iterable[Triple], ontology: Ontology, files: Files) -> rdflib.Graph:
+def _report(data: Iterable[Triple], ontology: Ontology, files: Files) -> rdflib.Graph | None:
+    """Return what pySHACL finds; None without asking it where nothing is suspected."""
+    shapes = _shapes(frozenset(ontology.triples), files)
+    said = shapes.unions.union(data)
+    store = Store()
+    store.extend(in_graph(said))
+    if not any_suspect(store, shapes.queries):
+        return None
     report: rdflib.Graph
-    shapes, unions = _shapes(frozenset(ontology.triples), files)
-    _, report, _ = pyshacl.validate(_as_rdflib(unions.union(data)), shacl_graph=shapes)
+    _, report, _ = pyshacl.validate(_as_rdflib(said), shacl_graph=shapes.graph)
     return report
 
 
+@dataclass(frozen=True)
+class _Constraints:
+    """The shapes; what they have to find in the data: which classes are below unions; how suspects are found."""
+
+    graph: rdflib.Graph
+    unions: frozenset[Triple]
+    queries: tuple[str, ...]
+
+
 @lru_cache(maxsize=1)
-def _shapes(ontology: frozenset[Triple], files: Files) -> tuple[rdflib.Graph, frozenset[Triple]]:
-    """Return the shapes, and what they have to find in the data: which classes are below unions of classes."""
+def _shapes(ontology: frozenset[Triple], files: Files) -> _Constraints:
     shapes = with_ontology((triple for file in files for triple in read_turtle(file.path)), ontology)
-    return _as_rdflib(shapes), frozenset(triple for triple in shapes if triple.predicate == SUB_CLASS_OF)
+    unions = frozenset(triple for triple in shapes if triple.predicate == SUB_CLASS_OF)
+    return _Constraints(_as_rdflib(shapes), unions, tuple(queries(shapes)))
 
 
 def _as_rdflib(triples: Iterable[Triple]) -> rdflib.Graph:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
 MOST_ROWS = 1_000_000
+_NAMED_AT_ONCE = 5_000  # IRIs in a query
 
 
 class KnowledgeGraph:
@@ -156,7 +157,9 @@ class KnowledgeGraph:
         triples = {quad.triple for quad in taken}
         remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
         lost = triples - remaining - {quad.triple for quad in given}
-        if taken or given:
+        if not taken and isinstance(self._store, Store):
+            self._store.extend(_with_union(given))
+        elif taken or given:
             self._store.update(
                 f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
                 f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
@@ -293,10 +296,50 @@ class KnowledgeGraph:
             if not isinstance(quad.graph_name, DefaultGraph)
         ]
 
+    def said_of(self, nodes: Iterable[NamedNode | BlankNode]) -> Iterator[Quad]:
+        """Yield the quads of named graphs that have one of some nodes for subject; not of a server's graph."""
+        named, others = _by_name(nodes)
+        for some in named:
+            rows = self._store.query(f"SELECT ?s ?p ?o ?g {{ VALUES ?s {{ {some} }} GRAPH ?g {{ ?s ?p ?o }} }}")
+            for subject, predicate, object, graph in cast(QuerySolutions, rows):
+                yield Quad(subject, predicate, object, graph)
+        yield from (quad for node in others for quad in self.about(node) if quad.subject == node)
+
+    @telling
+    def leading_to(self, nodes: Iterable[NamedNode | BlankNode], apart: Iterable[str]) -> set[NamedNode | BlankNode]:
+        """Return the subjects of which named graphs, but for some, say something with one of some nodes for object."""
+        named, others = _by_name(nodes)
+        without = ", ".join(f"<{name}>" for name in apart)
+        form = "SELECT DISTINCT ?s {{ VALUES ?o {{ {} }} GRAPH ?g {{ ?s ?p ?o }} FILTER(?g NOT IN ({})) }}"
+        found = {
+            row[0] for some in named for row in cast(QuerySolutions, self._store.query(form.format(some, without)))
+        }
+        apart = set(apart)
+        quads = (quad for node in others for quad in self.about(node) if quad.object == node)
+        found.update(quad.subject for quad in quads if getattr(quad.graph_name, "value", "") not in apart)
+        return found
+
+    @telling
+    def subjects(self, predicate: NamedNode, object: NamedNode) -> set[NamedNode | BlankNode]:
+        """Return the subjects of the triples that end so; not of a server's graph."""
+        assert isinstance(self._store, Store)
+        quads = self._store.quads_for_pattern(None, predicate, object, DefaultGraph())
+        return {quad.subject for quad in quads}  # type: ignore[misc]
+
+    def sizes(self) -> Iterator[tuple[str, int]]:
+        """Yield the IRIs of the named graphs and how many triples each holds."""
+        rows = self._store.query("SELECT ?g (COUNT(*) AS ?n) { GRAPH ?g { ?s ?p ?o } } GROUP BY ?g")
+        for row in cast(QuerySolutions, rows):
+            yield row["g"].value, int(row["n"].value)
+
     @telling
     def changed(self, reader: str) -> set[Quad] | None:
         """Return the notes of `changes` for GRAPH_INFERRED or GRAPH_VALIDATION; None on a server, where none are."""
         return changes.noted(self._store, reader) if isinstance(self._store, Store) else None
+
+    def made_of(self) -> set[Quad]:
+        """Return the quads that say of what the inferred graphs and the report were made; none of a server's graph."""
+        return changes.made_of(self._store) if isinstance(self._store, Store) else set()
 
     def _forget_what_was_inferred(self, written: Iterable[str]) -> None:
         """Before graphs are written whole: have everything inferred and validated anew, if they are asserted."""
@@ -324,6 +367,14 @@ def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Qua
     """Say of each triple that it belongs into the named graph, or into the default graph."""
     graph = DefaultGraph() if name is None else NamedNode(name)
     return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
+
+
+def _by_name(nodes: Iterable[NamedNode | BlankNode]) -> tuple[list[str], list[BlankNode]]:
+    """Return the IRIs among nodes, some thousand at a time, and the others, which no query can name."""
+    said = list(nodes)
+    named = [str(node) for node in said if isinstance(node, NamedNode)]
+    batches = [" ".join(named[at : at + _NAMED_AT_ONCE]) for at in range(0, len(named), _NAMED_AT_ONCE)]
+    return batches, [node for node in said if isinstance(node, BlankNode)]
 
 
 def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:

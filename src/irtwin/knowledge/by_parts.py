@@ -1,0 +1,108 @@
+"""Reasoning part by part: each is closed and ruled beside the ontology alone, and one is held at a time.
+
+Where a part turns out to bear on others (see `parts`) it cannot be done so, and all of the graph is to be reasoned
+over; what was written until then is written anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from pyoxigraph import Literal, NamedNode, Quad, Triple
+
+from irtwin.knowledge import parts
+from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of
+from irtwin.knowledge.owl_rl.beside import Beside, Equality
+from irtwin.knowledge.owl_rl.closure import Contradiction
+from irtwin.knowledge.parts import Ontology, Region
+from irtwin.knowledge.store.blank_nodes import has_blank_node
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, term
+
+MOST_WAITING = 200_000  # quads that wait to be written
+_CONTRADICTION = NamedNode(term("Contradiction"))
+
+
+class Joined(Exception):
+    """A part bears on others."""
+
+
+@dataclass
+class Changes:
+    """What changes in the graph: quads that wait to be written; the named graphs that differ; all notes on parts."""
+
+    graph: KnowledgeGraph
+    whole: bool
+    removed: set[Quad] = field(default_factory=set)
+    added: set[Quad] = field(default_factory=set)
+    names: set[str] = field(default_factory=set)
+    noted: set[Quad] = field(default_factory=set)
+
+    def take(self, old: set[Quad], new: set[Quad]) -> None:
+        """Let some quads be in the place of others; write when there are many."""
+        if has_blank_node(new ^ old):
+            raise Joined
+        self.removed |= old - new
+        self.added |= new - old
+        self.names.update(graph_of(quad) for quad in new ^ old)
+        self.noted.update(quad for quad in old | new if graph_of(quad) == GRAPH_REASONED)
+        if len(self.removed) + len(self.added) > MOST_WAITING:
+            self.write(self.graph.made_of() if self.whole else ())
+
+    def write(self, removed: Iterable[Quad] = (), added: Iterable[Quad] = ()) -> None:
+        """Write what waits, and more; a name of what conclusions are made of goes before they change."""
+        self.graph.change(self.removed.union(removed), self.added.union(added))
+        self.removed, self.added = set(), set()
+
+
+def conclude(graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region | None], whole: bool) -> Changes:
+    """Conclude of some parts, or of the `whole` graph part by part; return what is yet to be written.
+
+    Raises Joined where parts bear on each other.
+    """
+    if ontology.schema.unfit is not None:
+        raise Joined
+    changes, minted = Changes(graph, whole), set[parts.Name]()
+    for region in regions:
+        if region is None:
+            raise Joined
+        new = _conclude(ontology, region).quads()
+        nodes = {node for quad in new if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
+        nodes -= region.nodes
+        if not minted.isdisjoint(nodes) or any(graph.about(node) for node in nodes):
+            raise Joined
+        minted |= nodes
+        changes.take(region.concluded, new)
+    return changes
+
+
+def _conclude(ontology: Ontology, region: Region) -> Conclusions:
+    """Conclude of one part; where it contradicts itself nothing but that."""
+    if not region.nodes:
+        return Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
+    if not region.asserted:
+        return Conclusions()
+    try:
+        closure = Beside(ontology.schema, region.asserted)
+        _check(ontology, closure)
+        of_all = ontology.triples | ontology.schema.kept
+        found = by_rules(ontology, of_all | region.asserted | closure.worth_keeping())
+        closure.add(found.concluded())
+        _check(ontology, closure)
+    except Equality as same:
+        raise Joined from same
+    except Contradiction as clash:
+        return _set_aside(ontology, region, clash)
+    found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
+    return found
+
+
+def _check(ontology: Ontology, closure: Beside) -> None:
+    if ontology.borders.crossed(closure):
+        raise Joined
+
+
+def _set_aside(ontology: Ontology, region: Region, clash: Contradiction) -> Conclusions:
+    robots = parts.spoken_for(ontology, region.asserted)
+    return Conclusions(made_by={Triple(robot, _CONTRADICTION, Literal(str(clash))) for robot in robots})

@@ -1,0 +1,67 @@
+"""What rules and OWL 2 RL conclude of some parts of the graph, and what that was made of."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from pyoxigraph import NamedNode, Quad, Store, Triple
+
+from irtwin.knowledge.engines import NATIVE
+from irtwin.knowledge.parts import Ontology
+from irtwin.knowledge.rules import running
+from irtwin.knowledge.rules.files import all_rules
+from irtwin.knowledge.store.changes import DERIVED_FROM
+from irtwin.knowledge.store.graph import in_graph
+from irtwin.knowledge.vocabulary import GRAPH_REASONED
+from irtwin.resources import Files, Resources, folder
+
+
+@dataclass
+class Conclusions:
+    """What was concluded, by the IRIs of named graphs; what it was made of; by whom; what makes the graph one part."""
+
+    contents: dict[str, set[Triple]] = field(default_factory=dict)
+    made_of: dict[object, NamedNode] = field(default_factory=dict)
+    made_by: set[Triple] = field(default_factory=set)
+    joined_by: str | None = None
+
+    def concluded(self) -> set[Triple]:
+        """Return the triples of all the named graphs."""
+        return set().union(*self.contents.values())
+
+    def quads(self) -> set[Quad]:
+        """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
+        store = Store()
+        derivations = {Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items()}  # type: ignore[arg-type]
+        for name, triples in {**self.contents, GRAPH_REASONED: derivations | self.made_by}.items():
+            store.extend(in_graph(triples, name))
+        return set(store)
+
+
+def by_rules(ontology: Ontology, known: set[Triple]) -> Conclusions:
+    """Return what the rules conclude, each into a named graph of its own."""
+    return Conclusions(running.conclusions(known, all_rules(ontology.resources)))
+
+
+def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:
+    """Return the name that triples, the rules and those who run them have by their content."""
+    digest = hashlib.sha256(_rules(resources.of("rules") + resources.of("shapes")) + engine.encode())
+    for line in sorted(map(str, triples)):
+        digest.update(line.encode())
+    return NamedNode("ni:///sha-256;" + base64.urlsafe_b64encode(digest.digest()).decode().rstrip("="))
+
+
+@lru_cache(maxsize=16)
+def _rules(files: Files) -> bytes:
+    """Return rules and shapes as they are written, and those of OWL 2 RL."""
+    paths = [*sorted(folder("rules").glob("owl2_rl*")), *(file.path for file in files)]
+    return b"".join(path.read_bytes() for path in paths)
+
+
+def graph_of(quad: Quad) -> str:
+    """Return the IRI of a quad's named graph."""
+    return quad.graph_name.value if isinstance(quad.graph_name, NamedNode) else ""

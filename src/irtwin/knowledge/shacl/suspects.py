@@ -1,0 +1,177 @@
+"""Whether nodes may break a constraint, by one SPARQL query a shape: only then a SHACL engine, a slow one, is asked.
+
+A shape becomes a condition that its nodes keep; those of which it is not known to be true are suspects. The condition
+may be too strict, never too lax: what a shape says in words that are not known here makes all its nodes suspects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import count
+from typing import cast
+
+from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
+
+from irtwin.knowledge.shacl.shapes import Node, Shapes
+from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF, RDFS, SH, XSD
+
+_TARGETS = {
+    "targetClass": "$this a ?_kind . ?_kind rdfs:subClassOf* {}",
+    "targetNode": "VALUES $this {{ {} }}",
+    "targetSubjectsOf": "$this {} ?_any",
+    "targetObjectsOf": "?_any {} $this",
+}
+_COMPARED = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
+_BESIDE = {"lessThan": "<", "lessThanOrEquals": "<="}
+_SAYS_NOTHING = {SH + name for name in ("message", "severity", "name", "description", "order", "group", "rule")}
+_SAYS_NOTHING |= {RDF + "type", RDFS + "label", RDFS + "comment", SH + "path"}
+_SAYS_NOTHING |= {SH + name for name in _TARGETS}
+_TEXTS = (XSD + "string",)
+
+
+class _Unknown(Exception):
+    """A constraint that is not known here."""
+
+
+def queries(triples: Iterable[Triple]) -> list[str]:
+    """Return a query for each shape of a shapes graph that has targets; each selects its suspects as `$this`."""
+    return list(_Writer(Shapes(triples, "shapes")).queries())
+
+
+def any_suspect(store: Store, asked: Iterable[str]) -> bool:
+    """Whether one of the queries finds a node in a store's default graph."""
+    return any(next(iter(cast(QuerySolutions, store.query(text, prefixes=PREFIXES))), None) for text in asked)
+
+
+class _Writer:
+    def __init__(self, shapes: Shapes):
+        self._shapes = shapes
+        self._numbers = count()
+
+    def queries(self) -> Iterator[str]:
+        for shape in self._shapes.all():
+            focus = " UNION ".join(f"{{ {target} }}" for target in self._targets(shape))
+            if not focus or self._shapes.is_deactivated(shape):
+                continue
+            try:
+                if self._shapes.values(shape, "path"):
+                    conditions = list(self._of_values(shape, "?this"))
+                else:
+                    conditions = list(self._conditions(shape, "?this", with_queries=False))
+            except _Unknown:
+                conditions = ["false"]
+            if conditions:
+                yield f"SELECT DISTINCT $this {{ {focus} FILTER(!COALESCE({' && '.join(conditions)}, false)) }}"
+            for text in self._selects(shape):
+                yield f"SELECT DISTINCT $this {{ {focus} {{ {text} }} }}"
+
+    def _targets(self, shape: Node) -> Iterator[str]:
+        for name, form in _TARGETS.items():
+            yield from (form.format(value) for value in self._shapes.values(shape, name))
+        if {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")} & set(self._shapes.values(shape, RDF + "type")):
+            yield _TARGETS["targetClass"].format(shape)
+
+    def _conditions(self, shape: Node, node: str, *, with_queries: bool = True) -> Iterator[str]:
+        """Yield what is true of a node that keeps a shape; its queries are asked apart, or are not known."""
+        for name, values in self._shapes.said_of(shape):
+            if name in _SAYS_NOTHING or (name == SH + "sparql" and not with_queries):
+                continue
+            for value in values:
+                yield self._condition(name.removeprefix(SH), value, node)
+
+    def _condition(self, name: str, value: Node, node: str) -> str:
+        if name == "property":
+            return " && ".join(self._of_values(value, node)) or "true"
+        if name == "node":
+            return " && ".join(self._conditions(value, node)) or "true"
+        if name == "or":
+            either = [" && ".join(self._conditions(one, node)) or "true" for one in self._list(value)]
+            return f"({' || '.join(f'COALESCE({one}, false)' for one in either)})"
+        if name == "class":
+            kind = self._name()
+            return f"EXISTS {{ {node} a {kind} . {kind} rdfs:subClassOf* {value} }}"
+        if name == "datatype":
+            return f"(datatype({node}) = {value} && {self._well_formed(value, node)})"
+        if name == "in":
+            return self._is_in(node, self._list(value))
+        if name in _COMPARED and isinstance(value, Literal):
+            return f"{node} {_COMPARED[name]} {value}"
+        if name == "minLength" and isinstance(value, Literal):
+            return f"(!isBlank({node}) && STRLEN(STR({node})) >= {value})"
+        raise _Unknown(name)
+
+    def _of_values(self, shape: Node, node: str) -> Iterator[str]:
+        """Yield what is true of a node whose values of a property keep a shape of these."""
+        path = self._path(self._shapes.value(shape, "path"))
+        for name, values in self._shapes.said_of(shape):
+            short = name.removeprefix(SH)
+            if name in _SAYS_NOTHING:
+                continue
+            for value in values:
+                one, other = self._name(), self._name()
+                if short == "minCount" and value == _integer(1):
+                    yield f"EXISTS {{ {node} {path} {one} }}"
+                elif short == "maxCount" and value == _integer(0):
+                    yield f"NOT EXISTS {{ {node} {path} {one} }}"
+                elif short == "maxCount" and value == _integer(1):
+                    several = f"{node} {path} {one} , {other} FILTER(!sameTerm({one}, {other}))"
+                    yield f"NOT EXISTS {{ {several} }}"
+                elif short in _BESIDE:
+                    keeps = f"{one} {_BESIDE[short]} {other}"
+                    both = f"{node} {path} {one} ; {value} {other}"
+                    yield f"NOT EXISTS {{ {both} FILTER(!COALESCE({keeps}, false)) }}"
+                else:
+                    keeps = self._condition(short, value, one)
+                    yield f"NOT EXISTS {{ {node} {path} {one} FILTER(!COALESCE({keeps}, false)) }}"
+
+    def _selects(self, shape: Node) -> Iterator[str]:
+        for constraint in self._shapes.values(shape, "sparql"):
+            text = self._shapes.value(constraint, "select")
+            prefixes = {
+                (self._text(declared, "prefix"), self._text(declared, "namespace"))
+                for ontology in self._shapes.values(constraint, "prefixes")
+                for declared in self._shapes.values(ontology, "declare")
+            }
+            known = isinstance(text, Literal) and all(PREFIXES.get(name) == space for name, space in prefixes)
+            yield text.value if known and isinstance(text, Literal) else ""
+
+    def _path(self, path: Node | None) -> str:
+        if isinstance(path, NamedNode):
+            return str(path)
+        inverse = self._shapes.value(path, "inversePath")
+        if isinstance(inverse, NamedNode):
+            return f"^{inverse}"
+        raise _Unknown("path")
+
+    def _well_formed(self, datatype: Node, node: str) -> str:
+        """Return what is true of a literal whose text is one of its datatype."""
+        if isinstance(datatype, NamedNode) and datatype.value in _TEXTS:
+            return "true"
+        return f"{datatype}(STR({node})) = {node}"
+
+    def _is_in(self, node: str, items: list[Node]) -> str:
+        if not all(isinstance(one, NamedNode) or _is_plain(one) for one in items):
+            raise _Unknown("in")  # numbers are equal to others that are written otherwise
+        return f"{node} IN ({', '.join(map(str, items))})"
+
+    def _list(self, cell: Node) -> list[Node]:
+        found = []
+        while (first := self._shapes.value(cell, RDF + "first")) is not None:
+            found.append(first)
+            cell = cast(Node, self._shapes.value(cell, RDF + "rest"))
+        return found
+
+    def _text(self, node: Node, name: str) -> str:
+        found = self._shapes.value(node, name)
+        return found.value if isinstance(found, Literal) else ""
+
+    def _name(self) -> str:
+        return f"?_v{next(self._numbers)}"
+
+
+def _is_plain(term: Node) -> bool:
+    return isinstance(term, Literal) and term.datatype.value in _TEXTS and term.language is None
+
+
+def _integer(number: int) -> Literal:
+    return Literal(str(number), datatype=NamedNode(XSD + "integer"))

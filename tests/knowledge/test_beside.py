@@ -1,0 +1,91 @@
+"""Facts closed beside an ontology give what both give when they are closed together."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyoxigraph import Quad, RdfFormat, Triple, parse
+
+from irtwin.knowledge.owl_rl.beside import Beside, Equality
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
+from irtwin.knowledge.owl_rl.schema import Schema
+from irtwin.knowledge.store.graph import KnowledgeGraph
+
+PREFIXES = """
+@prefix ex: <https://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+"""
+AXIOMS = [
+    "ex:C rdfs:subClassOf ex:D .",
+    "ex:D owl:equivalentClass ex:E .",
+    "ex:p rdfs:domain ex:C .",
+    "ex:q rdfs:range ex:D .",
+    "ex:v rdfs:range xsd:integer .",
+    "ex:p rdfs:subPropertyOf ex:q .",
+    "ex:p owl:inverseOf ex:r .",
+    "ex:q a owl:TransitiveProperty .",
+    "ex:r a owl:SymmetricProperty .",
+    "ex:p a owl:FunctionalProperty .",
+    "ex:s owl:propertyChainAxiom (ex:p ex:q ex:r) .",
+    "ex:F owl:intersectionOf (ex:C ex:E) .",
+    "ex:G owl:unionOf (ex:C ex:F) .",
+    "ex:H owl:onProperty ex:q ; owl:someValuesFrom ex:C .",
+    "ex:I owl:onProperty ex:v ; owl:someValuesFrom xsd:integer .",
+    "ex:D rdfs:subClassOf [ owl:onProperty ex:r ; owl:allValuesFrom ex:J ] .",
+    "ex:K owl:onProperty ex:q ; owl:hasValue ex:o .",
+    "ex:E rdfs:subClassOf ex:K .",
+    "ex:L owl:disjointWith ex:C .",
+    "ex:s a owl:AsymmetricProperty .",
+    "ex:o a ex:C ; ex:p ex:o2 .",
+]
+FACTS = [f"ex:{one} ex:{name} ex:{other} ." for one in "abc" for name in "pqrs" for other in "abc"]
+FACTS += [f"ex:{one} a ex:{kind} ." for one in "abc" for kind in "CDEFGHJL"]
+FACTS += ["ex:a ex:v 1 .", "ex:b ex:v 1.0 .", 'ex:c ex:v "x" .', "ex:a ex:q ex:o .", "ex:b ex:p ex:o ."]
+
+
+def triples(statements: list[str]) -> set[Triple]:
+    return {quad.triple for quad in parse(PREFIXES + "\n".join(statements), format=RdfFormat.TURTLE)}
+
+
+def together(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
+    """Return what is concluded, None for a contradiction."""
+    try:
+        return Closure(ontology | facts).worth_keeping()
+    except Contradiction:
+        return None
+
+
+def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
+    schema = Schema(ontology)
+    assert schema.unfit is None
+    try:
+        return (Beside(schema, facts).worth_keeping() | schema.kept) - facts
+    except Contradiction:
+        return None
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.sampled_from(AXIOMS), unique=True), st.lists(st.sampled_from(FACTS), unique=True, max_size=12))
+def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
+    ontology, facts = triples(axioms), triples(said)
+    try:
+        assert beside(ontology, facts) == together(ontology, facts)
+    except Equality:
+        found = together(ontology, facts)
+        assert found is None or any(one.predicate.value.endswith("#sameAs") for one in found)
+
+
+def test_facts_that_come_later(two_robots: list[Quad]) -> None:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    ontology, facts = graph.triples(), sorted((quad.triple for quad in two_robots), key=str)
+    schema = Schema(ontology)
+    closure = Beside(schema, facts[::2])
+    closure.add(facts[1::2])
+    assert closure.worth_keeping() | schema.kept == Closure([*ontology, *facts]).worth_keeping()
+
+
+def test_terms_that_are_the_same_are_told() -> None:
+    assert Schema(triples(["ex:C owl:sameAs ex:D ."])).unfit is not None
+    assert Schema(triples(["owl:sameAs rdfs:domain ex:C ."])).unfit is not None
+    with pytest.raises(Equality):
+        Beside(Schema(triples(["ex:p a owl:FunctionalProperty ."])), triples(["ex:a ex:p ex:b , ex:c ."]))
