@@ -17,7 +17,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SOURCE,
     ONTOLOGY,
     OWL,
-    PREFIXES,
     RDF,
 )
 
@@ -41,7 +40,7 @@ def export_owl(graph: KnowledgeGraph, path: Path) -> None:
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    serialize(sorted(kept | _declarations(triples), key=str), str(part), RdfFormat.RDF_XML, prefixes=PREFIXES)
+    serialize(sorted(kept | _declarations(triples), key=str), str(part), RdfFormat.RDF_XML, prefixes=graph.prefixes)
     part.replace(path)
 
 
