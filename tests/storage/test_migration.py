@@ -17,7 +17,7 @@ from tests.rows import activity, data_set
 from irtwin.errors import InputError
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
-from irtwin.storage.revisions.versions import r0001_tables_of_0_1
+from irtwin.storage.revisions.versions import r0001_tables_of_0_1, r0002_base_of_individuals
 from irtwin.storage.schema import Base
 
 # As a later irtwin would have it: runs have got the column `sample_rate_hz`.
@@ -109,7 +109,7 @@ def test_an_older_workspace_is_migrated(
 
 
 def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:
-    used = "https://w3id.org/irtwin/id/run/Arm_A.fit_1"
+    used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
     with Workspace(tmp_path) as place:
         robot, joints, runs, series = data_set()
         place.ingest(robot, joints, runs, series)
