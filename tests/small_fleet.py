@@ -112,9 +112,9 @@ def _robots() -> Iterator[Base]:
         )  # fmt: skip
         for position, joint in enumerate(JOINTS[robot], 1):
             yield schema.Joint(
-                robot_id=robot, name=joint, position=position, kind="revolute", lower_limit_rad=-3.0,
-                upper_limit_rad=3.0, speed_limit_rad_s=4.0, torque_limit_nm=None if robot == "Arm_B" else 100.0,
-                gear_ratio=50.0 if robot == "Arm_A" else None,
+                robot_id=robot, name=joint, position=position, lower_limit_rad=-3.0, upper_limit_rad=3.0,
+                kind="prismatic" if robot == "Arm_D" else "revolute", speed_limit_rad_s=4.0,
+                torque_limit_nm=None if robot == "Arm_B" else 100.0, gear_ratio=50.0 if robot == "Arm_A" else None,
             )  # fmt: skip
 
 
