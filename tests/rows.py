@@ -87,7 +87,7 @@ def data_set() -> tuple[Robot, list[Joint], list[Run], dict[str, pa.Table]]:
     return robot(), joints(), runs, {item.run_id: samples(seed) for seed, item in enumerate(runs)}
 
 
-def activity(name: str, provider: str, subject: str = f"https://w3id.org/irtwin/id/robot/{ROBOT}") -> Activity:
+def activity(name: str, provider: str, subject: str = f"robot/{ROBOT}") -> Activity:
     return Activity(
         activity_id=name,
         robot_id=ROBOT,

@@ -14,7 +14,6 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from irtwin.knowledge.vocabulary import ID
 from irtwin.storage import experiment_schema as experiment
 from irtwin.storage import gap_schema as gap
 from irtwin.storage import live_schema as live
@@ -113,9 +112,9 @@ def _robots() -> Iterator[Base]:
         )  # fmt: skip
         for position, joint in enumerate(JOINTS[robot], 1):
             yield schema.Joint(
-                robot_id=robot, name=joint, position=position, kind="revolute", lower_limit_rad=-3.0,
-                upper_limit_rad=3.0, speed_limit_rad_s=4.0, torque_limit_nm=None if robot == "Arm_B" else 100.0,
-                gear_ratio=50.0 if robot == "Arm_A" else None,
+                robot_id=robot, name=joint, position=position, lower_limit_rad=-3.0, upper_limit_rad=3.0,
+                kind="prismatic" if robot == "Arm_D" else "revolute", speed_limit_rad_s=4.0,
+                torque_limit_nm=None if robot == "Arm_B" else 100.0, gear_ratio=50.0 if robot == "Arm_A" else None,
             )  # fmt: skip
 
 
@@ -237,7 +236,7 @@ def _twins() -> Iterator[Base]:
             yield schema.TwinEffect(twin_id=twin, effect=effect, activity_id=made)
         for of, name, *_, part in (run[:7] for run in RUNS):
             if of == robot and part == "fit":
-                yield schema.ActivityUse(activity_id=made, entity=f"{ID}run/{robot}.{name}")
+                yield schema.ActivityUse(activity_id=made, entity=f"run/{robot}.{name}")
             if of == robot:
                 yield schema.TwinRun(twin_id=twin, run_id=f"{robot}.{name}", part=part, activity_id=made)
     for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
@@ -253,8 +252,8 @@ def _twins() -> Iterator[Base]:
     for number, (tried, before, after, outcome) in enumerate(ROUNDS, 1):
         made = f"improvement.Arm_A.{number}"
         yield _activity(made, "Arm_A", "improvement", "2026-03-05 12:04")
-        yield schema.ActivityUse(activity_id=made, entity=f"{ID}run/Arm_A.check_1")
-        yield schema.ActivityUse(activity_id=made, entity=f"{ID}twin/Arm_A.t0")
+        yield schema.ActivityUse(activity_id=made, entity="run/Arm_A.check_1")
+        yield schema.ActivityUse(activity_id=made, entity="twin/Arm_A.t0")
         yield schema.ImprovementRound(
             round_id=f"Arm_A.{number}", robot_id="Arm_A", number=number, tried=tried, effects="rigid_body",
             earlier_twin_id="Arm_A.t0", tried_twin_id=f"Arm_A.t{number}", error_before_percent=before,
@@ -402,7 +401,7 @@ def _cause(
 
 def _activity(activity_id: str, robot: str, provider: str, ended: str) -> Base:
     return schema.Activity(
-        activity_id=activity_id, robot_id=robot, provider=provider, subject=f"{ID}robot/{robot}", software=SOFTWARE,
+        activity_id=activity_id, robot_id=robot, provider=provider, subject=f"robot/{robot}", software=SOFTWARE,
         started=min(_moment("2026-03-05 12:00"), _moment(ended)), ended=_moment(ended),
     )  # fmt: skip
 

@@ -64,7 +64,7 @@ def case_study(workspace: Path, announce: Announce = lambda line: None) -> Path:
     workflow.run(data_set, workspace)
     announce("4. The page: read back from the graph")
     with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place, None) as graph:
-        robot = robot_iri(identifier(ROBOT))
+        robot = graph.iri(robot_iri(identifier(ROBOT)))
         described, meshes = robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document)
         out = place.folder / "reports" / "case_study.html"
         render(graph, robot, place.read_file, out, partial(draw_scene, described, meshes))

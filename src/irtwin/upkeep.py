@@ -130,7 +130,7 @@ def repair(
         with files.working_folder(place.folder, ".repair-") as folder:
             place.mapped_rows.unlink(missing_ok=True)
             announce("Rebuilding the graph from the database")
-            with KnowledgeGraph(folder / "graph", place.folder, place.resources) as graph:
+            with KnowledgeGraph(folder / "graph", place.folder, place.resources, place.base) as graph:
                 graph.load_ontology()
                 map_rows(place, graph)
                 readable = _carry_over(place.graph_folder, graph, announce)

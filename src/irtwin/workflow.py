@@ -58,18 +58,20 @@ def run(
     database: str | None = None,
     graph_url: str | None = None,
     repair: bool = False,
+    base: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Path:
     """Take a data set to a twin, a knowledge graph and a report; return the report's path.
 
     `database` is an SQLAlchemy URL, SQLite in the workspace if None; `graph_url` a SPARQL server's, the workspace's own
-    graph if None; `announce` is told each step as it ends.
+    graph if None; `base` is what the IRIs of individuals begin with, in a workspace without robots; `announce` is
+    told each step as it ends.
     Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
-    with Workspace(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+    with Workspace(Path(workspace), database, base=base) as place, rewriting(place, graph_url) as graph:
         robot_id = take_in(place, data_set, announce)
         graph.load_ontology()
         map_rows(place, graph)
@@ -266,7 +268,7 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
 
 def populate_apart(apart: Workspace, announce: Announce) -> None:
     """Populate what the robot of a staged workspace lacks, by a graph of that robot alone."""
-    with KnowledgeGraph(workspace=apart.folder, resources=apart.resources) as graph:
+    with KnowledgeGraph(workspace=apart.folder, resources=apart.resources, base=apart.base) as graph:
         graph.load_ontology()
         check_effects(graph)
         map_rows(apart, graph)
@@ -294,14 +296,14 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
             f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"
         )
     for robot, contradiction in inferred.set_aside:
-        announce(f"  nothing is concluded of {shorten(robot)}: {contradiction}")
+        announce(f"  nothing is concluded of {shorten(robot, graph.base)}: {contradiction}")
     for violation in validate(graph):
         announce(f"  {violation}")
 
 
 def write_report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
     """Write a robot's energy report from the graph; return its path."""
-    robot = robot_iri(robot_id)
+    robot = graph.iri(robot_iri(robot_id))
     out = place.report_path(robot_id)
     scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
     render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), graph.resources)

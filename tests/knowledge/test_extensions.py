@@ -41,7 +41,7 @@ SHAPE = (
     "my:shape a sh:NodeShape ; sh:targetClass irt:IR_RunProcess ;\n    sh:property [ sh:path irt:Run_Time ; WHAT ] .\n"
 )
 MAPPING = """<#Long> rr:logicalTable [ rr:tableName "TABLE" ] ;
-    rr:subjectMap [ rr:template "https://w3id.org/irtwin/id/run/{run_id}" ; GRAPH ] ;
+    rr:subjectMap [ rr:template "run/{run_id}" ; GRAPH ] ;
     rr:predicateObjectMap [ rr:predicate my:p ; rr:objectMap [ rr:column "run_time_s" ] ] .
 """
 GRAPH = "rr:graph <https://w3id.org/irtwin/graph/source/my>"
@@ -115,6 +115,12 @@ def test_a_fault_is_said_with_file_and_line(name: str, text: str, said: str, tmp
         (MAPPING.replace("TABLE", "run").replace("GRAPH", GRAPH).replace("run_time_s", "colour"), "no column colour"),
         (MAPPING.replace("TABLE", "run").replace("GRAPH", ""), "line 10: <Long>.* has no rr:graphMap"),
         (MAPPING.replace("TABLE", "run").replace("GRAPH", "rr:graph my:own"), "its graph is none of a mapping"),
+        (
+            MAPPING.replace("TABLE", "run")
+            .replace("GRAPH", GRAPH)
+            .replace('"run/', '"https://w3id.org/irtwin/id/run/'),
+            "line 10: <Long>, subject map: individuals lie below the workspace's base, which may be another",
+        ),
         (MAPPING.replace("rr:tableName", "rr:tableNam").replace("GRAPH", GRAPH), "tableNam"),
     ],
 )

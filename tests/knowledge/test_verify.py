@@ -47,7 +47,7 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
         made = rows.activity("identification.1", "identification")
         workspace.replace_activity(made, read, rows.twin(TWIN), documents={f"twins/{TWIN}.json": b"{}"})
         energy = rows.activity("energy.1", "energy", run_iri(RUN))
-        meter = rows.activity("meter.1", "meter", run_iri(RUN)), [one for one in read if "/series/" in one]
+        meter = rows.activity("meter.1", "meter", run_iri(RUN)), [one for one in read if one.startswith("series/")]
         workspace.replace_activity(energy, [*read, twin_iri(TWIN)], rows.run_energy(TWIN), metered=meter)
         graph.load_ontology()
         documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
@@ -79,7 +79,7 @@ def tampered(filled: Path) -> Callable[[str, bytes | None], None]:
 
 def series_of(place: Path) -> str:
     with Workspace(place / "w") as workspace:
-        (series,) = [one for one in inputs(workspace, rows.ROBOT, [RUN]) if "/series/" in one]
+        (series,) = [one for one in inputs(workspace, rows.ROBOT, [RUN]) if one.startswith("series/")]
     return f"w/series/{series.split('/')[-2]}.parquet"
 
 

@@ -187,7 +187,7 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
         used = session.scalars(
             select(schema.ActivityUse.entity).where(schema.ActivityUse.activity_id == twin.activity_id)
         )
-        assert f"https://w3id.org/irtwin/id/gap_diagnosis/{found.diagnosis_id}" in set(used)
+        assert f"gap_diagnosis/{found.diagnosis_id}" in set(used)
     assert count(workspace, schema.RunEnergy) == 0
     assert count(workspace, gap_schema.GapDiagnosis) == 1
     keep(workspace, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))

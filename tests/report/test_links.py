@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from irtwin.knowledge.vocabulary import ID, IRT
-from irtwin.report.plant.links import individual, page_of, tail
+from irtwin.report.plant.links import links
 
 
 @pytest.mark.parametrize(
@@ -23,9 +23,18 @@ from irtwin.report.plant.links import individual, page_of, tail
     ],
 )
 def test_page_of(iri: str, path: str | None) -> None:
-    assert page_of(iri) == path
+    assert links(ID).page_of(iri) == path
 
 
 def test_an_individual_is_at_its_iris_path() -> None:
-    assert individual(f"{ID}robot/Arm_A") == "/irtwin/id/robot/Arm_A"
-    assert tail(f"{ID}run/a.b") == "a.b"
+    assert links(ID).individual(f"{ID}robot/Arm_A") == "/irtwin/id/robot/Arm_A"
+    assert links(ID).tail(f"{ID}run/a.b") == "a.b"
+
+
+def test_individuals_of_a_plant_are_at_its_own_path() -> None:
+    of = links("https://plant.example/energy/")
+    assert of.page_of("https://plant.example/energy/robot/Arm_A") == "/robot/Arm_A"
+    assert of.individual("https://plant.example/energy/twin/t1") == "/energy/twin/t1"
+    assert of.individual(f"{IRT}Run_Time") == "/irtwin#Run_Time"
+    assert of.individual(f"{ID}robot/Arm_A") == "/irtwin/id/robot/Arm_A"  # told so by an update, maybe
+    assert of.individual("https://plant.example/other") == "https://plant.example/other"

@@ -177,6 +177,12 @@ def test_a_unit_that_another_property_gives(graph: KnowledgeGraph) -> None:
     assert peak == "7.125\N{NO-BREAK SPACE}N m"
 
 
+@pytest.mark.parametrize(("joint", "limits"), [("Arm_A/j1", {"3 rad", "4 rad/s"}), ("Arm_D/j1", {"3 m", "4 m/s"})])
+def test_a_joint_that_slides_has_units_of_its_own(graph: KnowledgeGraph, joint: str, limits: set[str]) -> None:
+    said = {value.text for one in individual_of(graph, f"{ID}joint/{joint}").said for value in one.values}
+    assert limits <= {text.replace("\N{NO-BREAK SPACE}", " ") for text in said}
+
+
 def individual_of(graph: KnowledgeGraph, iri: str) -> individual.Individual:
     return individual.individual(iri, ask(graph, page.questions("individual"), {"individual": iri}))
 

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import inspect, text
-from tests.rows import data_set
+from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
-from irtwin.storage.revisions.versions import r0001_tables_of_0_1
+from irtwin.storage.revisions.versions import r0001_tables_of_0_1, r0002_base_of_individuals
 from irtwin.storage.schema import Base
 
 # As a later irtwin would have it: runs have got the column `sample_rate_hz`.
@@ -26,7 +26,7 @@ import os
 import sqlalchemy as sa
 from alembic import op
 
-revision, down_revision = "0002", "0001"
+revision, down_revision = "9000", NEWEST
 
 
 def upgrade():
@@ -59,10 +59,11 @@ def digest() -> str:
 
 
 def older(place: Workspace) -> None:
-    """Make the tables those of the first revision, as far as LATER goes, in a database that says no revision."""
+    """Make the tables those of the first revision, as far as later ones go, in a database that says no revision."""
     robot, joints, runs, series = data_set()
     place.ingest(robot, joints, runs, series)
     with place.engine.begin() as connection:
+        connection.execute(text("DROP TABLE individuals"))
         connection.execute(text("ALTER TABLE run DROP COLUMN sample_rate_hz"))
         connection.execute(text("DROP TABLE alembic_version"))
 
@@ -75,7 +76,8 @@ def columns(place: Workspace) -> set[str]:
 def later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "revisions"
     shutil.copytree(migration.REVISIONS, folder, ignore=shutil.ignore_patterns("__pycache__"))
-    (folder / "versions" / "r0002_rates.py").write_text(LATER, encoding="utf-8")
+    later = LATER.replace("NEWEST", repr(migration.newest()))
+    (folder / "versions" / "r9000_rates.py").write_text(later, encoding="utf-8")
     monkeypatch.setattr(migration, "REVISIONS", folder)
     return folder
 
@@ -99,11 +101,26 @@ def test_an_older_workspace_is_migrated(
     with Workspace(tmp_path / "place", url) as place:
         older(place)
     with Workspace(tmp_path / "place", url) as place, place.engine.connect() as connection:
-        assert migration.revision(connection) == "0002"
+        assert migration.revision(connection) == "9000"
         assert set(connection.execute(text("SELECT sample_rate_hz FROM run")).scalars()) == {250.0}
         assert connection.execute(text("SELECT count(*) FROM series")).scalar()  # which refer to runs
         assert connection.execute(text("SELECT count(*) FROM run")).scalar() == len(data_set()[2])
     assert (tmp_path / "place" / "irtwin.db.0001").is_file() is not on_server
+
+
+def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:
+    used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
+    with Workspace(tmp_path) as place:
+        robot, joints, runs, series = data_set()
+        place.ingest(robot, joints, runs, series)
+        place.replace_activity(activity("a.1", "run_state", used), [used, "https://plant.example/x"], [])
+        with place.engine.begin() as connection:
+            connection.execute(text("DROP TABLE individuals"))
+            connection.execute(text("DROP TABLE alembic_version"))
+    with Workspace(tmp_path) as place, place.engine.connect() as connection:
+        assert connection.execute(text("SELECT subject FROM activity")).scalars().all() == ["run/Arm_A.fit_1"]
+        found = connection.execute(text("SELECT entity FROM activity_use")).scalars()
+        assert set(found) == {"run/Arm_A.fit_1", "https://plant.example/x"}
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:

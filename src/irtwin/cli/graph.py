@@ -201,14 +201,15 @@ def export(
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
 @click.option("--timeout", type=Number(min=0.1), default=600.0, show_default=True, help="Limit per triples map, s.")
-def map_database(mapping: Path, database: str, out: Path, timeout: float) -> None:
+@click.option("--base", metavar="IRI", help="What relative IRIs are below. Default: the document's @base.")
+def map_database(mapping: Path, database: str, out: Path, timeout: float, base: str | None) -> None:
     """Map a database to triples with an R2RML document.
 
     Works with any R2RML document and any database that SQLAlchemy supports.
     """
     from irtwin.knowledge.mapping import map_to_file
 
-    map_to_file(mapping, database, out, seconds=timeout)
+    map_to_file(mapping, database, out, base, timeout)
 
 
 @click.command()

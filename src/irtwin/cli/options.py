@@ -44,6 +44,11 @@ graph_option = click.option(
     envvar="IRTWIN_GRAPH",
     help="Query URL of a SPARQL 1.1 server for the graph. Default: a folder in the workspace.",
 )
+base_option = click.option(
+    "--base",
+    metavar="IRI",
+    help="What the IRIs of individuals begin with, as https://plant.example/energy/. It stays once a robot is there.",
+)
 payload_mass_option = click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
 payload_com_option = click.option(
     "--payload-com",

@@ -10,6 +10,7 @@ import click
 
 from irtwin.cli.options import (
     announce,
+    base_option,
     database_option,
     graph_option,
     payload_com_option,
@@ -28,14 +29,21 @@ if TYPE_CHECKING:
 @database_option
 @graph_option
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
-def run(dataset: Path, workspace: Path, database: str | None, graph_url: str | None, repair: bool) -> None:
+@base_option
+def run(
+    dataset: Path, workspace: Path, database: str | None, graph_url: str | None, repair: bool, base: str | None
+) -> None:
     """Build a twin, a graph and a report from a data set.
 
     DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
+
+    The base of IRIs may stand in `plant.toml` of the workspace instead, as base_iri = "https://plant.example/energy/".
     """
     from irtwin.workflow import run as run_all
 
-    report = run_all(dataset, workspace, database=database, graph_url=graph_url, repair=repair, announce=announce)
+    report = run_all(
+        dataset, workspace, database=database, graph_url=graph_url, repair=repair, base=base, announce=announce
+    )
     click.echo(report)
 
 
@@ -64,14 +72,15 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 
 @click.command()
 @workspace_option
-def demo(workspace: Path) -> None:
+@base_option
+def demo(workspace: Path, base: str | None) -> None:
     """Run the example data set: simulated logs of a KUKA KR6 R700."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
     data_set = unpack_demo(workspace)
     announce(f"The example data set is in {data_set}. Use it as a template for your own.")
-    report = run_all(data_set, workspace, announce=announce)
+    report = run_all(data_set, workspace, base=base, announce=announce)
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
     click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
 

@@ -192,6 +192,7 @@ def _check_mapping(file: Resource, engine: Engine) -> None:
     try:
         for triples_map in read_document(file.path).triples_maps.values():
             _check_graphs(file, triples_map)
+            _check_base(triples_map)
         with planned(engine, [file.path], seconds=_LONGEST):
             pass
     except InputError as error:
@@ -212,6 +213,15 @@ def _check_graphs(file: Resource, triples_map: TriplesMap) -> None:
             f"{triples_map.where}: has no rr:graphMap; name {GRAPH_SOURCE}{file.path.name.partition('.')[0]}, "
             f"or {GRAPH_ACTIVITY}{{activity_id}} for rows that a provider made"
         )
+
+
+def _check_base(triples_map: TriplesMap) -> None:
+    """Individuals lie below the workspace's base, whatever it is."""
+    for term in (triples_map.subject, *(one for pair in triples_map.properties for one in pair.objects)):
+        if isinstance(term, TermMap) and _start(term).startswith(ID):
+            raise InputError(
+                f"{term.where}: individuals lie below the workspace's base, which may be another: leave out {ID}"
+            )
 
 
 def _start(graph: TermMap) -> str:

@@ -5,13 +5,15 @@ What the terms mean stands in `ontology/`; a test holds every term that the code
 
 from __future__ import annotations
 
+from irtwin.storage.base_iri import DEFAULT
+
 ONTOLOGY = "https://w3id.org/irtwin"
 IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
 REASONER = f"{ONTOLOGY}/reasoner/"
 SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
-ID = f"{ONTOLOGY}/id/"
+ID = DEFAULT  # individuals of a workspace that has no base of its own
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 RDFS = "http://www.w3.org/2000/01/rdf-schema#"
@@ -22,6 +24,7 @@ SKOS = "http://www.w3.org/2004/02/skos/core#"
 QUDT = "http://qudt.org/schema/qudt/"
 UNIT = "http://qudt.org/vocab/unit/"
 SH = "http://www.w3.org/ns/shacl#"
+VOID = "http://rdfs.org/ns/void#"
 
 PREFIXES = {
     "irt": IRT,
@@ -59,10 +62,15 @@ def term(name: str) -> str:
     return IRT + name
 
 
-def shorten(iri: str) -> str:
+def prefixes(base: str) -> dict[str, str]:
+    """Return the prefixes of a graph whose individuals lie below a base."""
+    return {**PREFIXES, "id": base}
+
+
+def shorten(iri: str, base: str = ID) -> str:
     """Return the IRI with its prefix, `irt:Run_Time`, or as it is where no prefix fits."""
     prefix, namespace = max(
-        ((name, space) for name, space in PREFIXES.items() if iri.startswith(space)),
+        ((name, space) for name, space in prefixes(base).items() if iri.startswith(space)),
         key=lambda pair: len(pair[1]),
         default=("", ""),
     )

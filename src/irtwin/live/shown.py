@@ -28,7 +28,7 @@ class ShownRuns:
     def __init__(self, place: Workspace, graph: KnowledgeGraph) -> None:
         self._place, self._graph = place, graph
         self._documents = graph.resources.paths("mappings")
-        self.mapper = RowMapper(place.engine, self._documents)
+        self.mapper = RowMapper(place.engine, self._documents, place.base)
         self._rules = read_rules(graph.resources.path("rules", "live_rules.ttl"))
         self._rules_of_runs = read_rules(graph.resources.path("rules", "rules.ttl"))  # of a run that is over
         self._beside: set[Triple] | None = None
@@ -68,7 +68,7 @@ class ShownRuns:
 
     def _quads_of(self, run_id: str) -> set[Quad]:
         """Return what the graph says of a live run."""
-        run = NamedNode(run_iri(run_id))
+        run = NamedNode(self._graph.iri(run_iri(run_id)))
         graphs = " ".join(f"<{GRAPH_ACTIVITY}{activity}>" for activity in activities(run_id))
         found = self._graph.answer(
             f"""SELECT ?g ?s ?p ?o {{

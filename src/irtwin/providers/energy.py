@@ -42,7 +42,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     return Made(
         robot_id=robot_id,
         used=[*read, twin_iri(twin_id)],
-        metered=[] if motion.power is None else [one for one in read if "/series/" in one],
+        metered=[] if motion.power is None else [one for one in read if one.startswith("series/")],
         rows=[
             _run_energy(run_id, twin_id, role, twin, motion, ledger),
             *(

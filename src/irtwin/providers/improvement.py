@@ -33,7 +33,7 @@ from irtwin.twin.validate import validate
 
 WITHIN, BETTER, NO_BETTER = "within the limit", "better", "no better"
 _SAME, _DIAGNOSED = "same effects", "effects of a diagnosis"
-_ROUNDS = "https://w3id.org/irtwin/id/improvement_round/"
+_ROUNDS = "improvement_round/"
 
 Announce = Callable[[str], None]
 

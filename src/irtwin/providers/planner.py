@@ -76,8 +76,9 @@ def populate(
                 refused.add(_robot_id(subject))
                 set_aside(_robot_id(subject), error)
                 continue
-            activity = _activity(declaration.name, subject, made, started, software_of(declaration.name))
-            meter = _activity(METER, subject, made, started, activity.software)
+            below = subject.removeprefix(graph.base)
+            activity = _activity(declaration.name, below, made, started, software_of(declaration.name))
+            meter = _activity(METER, below, made, started, activity.software)
             metered = (meter, made.metered) if made.metered else None
             workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents, metered=metered)
             count += 1

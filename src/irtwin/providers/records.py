@@ -46,7 +46,6 @@ from irtwin.storage.schema import (
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
-_INDIVIDUALS = "https://w3id.org/irtwin/id/"
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
 _READABLE = 40  # characters of a name that is not plain
 
@@ -200,29 +199,29 @@ def _folded(name: str) -> str:
 
 
 def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[str]:
-    """Return the IRIs of what is read of some runs: they, their samples, and the files that say what they are of."""
+    """Return the IRIs, below the base, of what is read of some runs: they, their samples, files that say of what."""
     ids = list(run_ids)
     told = select(schema.Series.series_id, schema.Series.run_id)
     told = told.where(schema.Series.run_id.in_(ids), schema.Series.kind != MODELLED)
     files = select(SourceFile.source_file_id).where(SourceFile.robot_id == robot_id)
     with workspace.reading() as session:
-        series = [f"{_INDIVIDUALS}series/{series_id}/{run_id}" for series_id, run_id in session.execute(told)]
-        return [*map(run_iri, ids), *series, *(f"{_INDIVIDUALS}source_file/{it}" for it in session.scalars(files))]
+        series = [f"series/{series_id}/{run_id}" for series_id, run_id in session.execute(told)]
+        return [*map(run_iri, ids), *series, *(f"source_file/{it}" for it in session.scalars(files))]
 
 
 def robot_iri(robot_id: str) -> str:
-    """Return the IRI of a robot's individual."""
-    return f"{_INDIVIDUALS}robot/{robot_id}"
+    """Return the IRI of a robot's individual, below the workspace's base: see `KnowledgeGraph.iri`."""
+    return f"robot/{robot_id}"
 
 
 def run_iri(run_id: str) -> str:
-    """Return the IRI of a run's individual."""
-    return f"{_INDIVIDUALS}run/{run_id}"
+    """Return the IRI of a run's individual, likewise."""
+    return f"run/{run_id}"
 
 
 def twin_iri(twin_id: str) -> str:
-    """Return the IRI of a twin's individual."""
-    return f"{_INDIVIDUALS}twin/{twin_id}"
+    """Return the IRI of a twin's individual, likewise."""
+    return f"twin/{twin_id}"
 
 
 def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:

@@ -12,7 +12,6 @@ from starlette.requests import Request
 
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.table import to_python
-from irtwin.knowledge.vocabulary import ID
 from irtwin.report.questions import Answer, Answers, Question, Row
 from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Refusal
@@ -28,8 +27,9 @@ _TRIES = 3  # workers that may be lost before they begin
 class Asking:
     """Asks on behalf of clients, each in its turn; all that a page asks is asked of one worker, in a query's time."""
 
-    def __init__(self, pool: Pool, updates: Updates, limits: Limits) -> None:
+    def __init__(self, pool: Pool, updates: Updates, limits: Limits, base: str) -> None:
         self._pool, self._updates, self._limits = pool, updates, limits
+        self.base = base  # of the graph's individuals
 
     async def answers(self, request: Request, questions: Mapping[str, Question], bindings: Bindings) -> Answers:
         """Answer a page's questions; `bindings` gives variables an IRI or a literal. Raises Refusal."""
@@ -69,7 +69,7 @@ class Asking:
                 ) from None
 
     async def _body(self, worker: Worker, text: str, accept: str) -> tuple[str, bytes]:
-        about = {"text": text, "default_graphs": (), "named_graphs": (), "base": ID, "accept": accept}
+        about = {"text": text, "default_graphs": (), "named_graphs": (), "base": self.base, "accept": accept}
         media_type = await worker.ask({**about, "at_once": self._updates.just_now})
         body = bytearray()
         async for piece in worker.pieces():

@@ -88,9 +88,9 @@ def _page(name: str) -> Response:
 
 def _drawn(folder: Path, robot_id: str) -> bytes:
     """Return what robot.js builds a robot of, made of what the graph says of it, as JSON. Raises InputError."""
-    iri = robot_iri(robot_id)
     with Snapshot(folder) as snapshot:
         graph = snapshot.current(False)
+        iri = graph.iri(robot_iri(robot_id))
         if any(sign in iri for sign in '<>"{}|\\^` '):
             raise InputError(f"no robot {robot_id!r} here")
         robot = robot_of_graph(graph, iri)

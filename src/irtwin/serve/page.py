@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from irtwin.knowledge.questions.queries import named_questions
-from irtwin.knowledge.vocabulary import PREFIXES
+from irtwin.knowledge.vocabulary import prefixes
 from irtwin.report.plant.page import style as plant_style
 from irtwin.resources import Resources
 from irtwin.serve.protocol import Refusal
@@ -61,10 +61,10 @@ def asset(request: Request) -> Response:
     return Response(content, media_type=_TYPES[name], headers=headers)
 
 
-def questions(resources: Resources, request: Request) -> Response:
+def questions(resources: Resources, base: str, request: Request) -> Response:
     """Return the named questions and the prefixes that they use."""
     known = [{"title": q.title, "question": q.question, "text": q.text} for q in named_questions(resources).values()]
-    return Response(json.dumps({"prefixes": PREFIXES, "questions": known}), media_type="application/json")
+    return Response(json.dumps({"prefixes": prefixes(base), "questions": known}), media_type="application/json")
 
 
 @cache

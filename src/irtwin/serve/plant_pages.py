@@ -13,7 +13,6 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
-from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant import comparison, links, overview, page, robot, sheet
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.plant.tariff import Tariff, read_tariff
@@ -34,6 +33,7 @@ class PlantPages:
 
     def __init__(self, workspace: Path, asking: Asking, reports: ReportFiles) -> None:
         self._workspace, self._asking, self._reports = workspace, asking, reports
+        self._links = links.links(asking.base)
 
     def routes(self) -> list[Route]:
         """Return where they are."""
@@ -60,18 +60,18 @@ class PlantPages:
         return await html(drawn)
 
     async def _robot(self, request: Request) -> Response:
-        iri = _individual("robot", request.path_params["name"])
+        iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
-        said = {**self._beside(), "report": self._reports.of_robot(links.tail(iri))}
+        said = {**self._beside(), "report": self._reports.of_robot(self._links.tail(iri))}
         return await html(
             lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **robot.of_robot(answers), **said)
         )
 
     async def _run(self, request: Request) -> Response:
-        iri = _individual("run", request.path_params["name"])
+        iri = self._individual("run", request.path_params["name"])
         answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
         (run,) = answers["run"].rows
-        said = {**self._beside(), "report": self._reports.of_robot(links.tail(run["robot"]))}
+        said = {**self._beside(), "report": self._reports.of_robot(self._links.tail(run["robot"]))}
         return await html(
             lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said)
         )
@@ -83,7 +83,7 @@ class PlantPages:
         except InputError as error:
             found, trouble = None, str(error)
             answers = await self._choice(request)
-        bindings = {"robot": _individual("robot", request.query_params.get("robot", ""))}
+        bindings = {"robot": self._individual("robot", request.query_params.get("robot", ""))}
         said |= {"asked": dict(request.query_params), "query": request.url.query, "found": found}
         said |= {"trouble": trouble} if trouble else {}
         return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **said))
@@ -94,13 +94,13 @@ class PlantPages:
         return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff), tariff))
 
     async def _runs_table(self, request: Request) -> Response:
-        iri = _individual("robot", request.query_params.get("of", ""))
+        iri = self._individual("robot", request.query_params.get("of", ""))
         asked = {name: page.questions("robot")[name] for name in ("robot", "runs")}
         answers = await self._known(request, asked, {"robot": iri}, "robot")
         return await table(request, "runs", lambda: robot.runs_sheet(answers))
 
     async def _ledger_table(self, request: Request) -> Response:
-        iri = _individual("run", request.query_params.get("of", ""))
+        iri = self._individual("run", request.query_params.get("of", ""))
         asked = {name: page.questions("run")[name] for name in ("run", "ledger")}
         answers = await self._known(request, asked, {"run": iri}, "run")
         return await table(request, "ledger", lambda: robot.ledger_sheet(answers))
@@ -117,11 +117,11 @@ class PlantPages:
     async def _compared(self, request: Request) -> tuple[comparison.Comparison | None, Answers]:
         """Return what a form asks for, None where it does not say both sides, and all answers. Raises InputError."""
         answers = await self._choice(request)
-        sides = [comparison.side(request.query_params, which) for which in ("a", "b")]
+        sides = [comparison.side(request.query_params, which, self._asking.base) for which in ("a", "b")]
         if None in sides:
             return None, answers
         asked = {name: one for name, one in page.questions("comparison").items() if "first" in one.bind}
-        robot_iri = _individual("robot", request.query_params["robot"])
+        robot_iri = self._individual("robot", request.query_params["robot"])
         before, after = [
             await self._asking.answers(request, asked, {"robot": robot_iri, **_iris(one.bindings())})
             for one in sides if one is not None
@@ -130,7 +130,7 @@ class PlantPages:
 
     async def _choice(self, request: Request) -> Answers:
         """Return the robot that is compared, and its runs."""
-        iri = _individual("robot", request.query_params.get("robot", ""))
+        iri = self._individual("robot", request.query_params.get("robot", ""))
         asked = {name: page.questions("comparison")[name] for name in ("robot", "runs")}
         return await self._known(request, asked, {"robot": iri}, "robot")
 
@@ -144,20 +144,25 @@ class PlantPages:
         return answers
 
     def _beside(self) -> dict[str, Any]:
-        """Return what each page says beside its answers: the tariff as it is now, or what is wrong with its file."""
+        """Return what each page says beside its answers: base, tariff as it is now, or what is wrong with its file."""
         tariff, trouble = Tariff(), ""
         try:
             tariff = read_tariff(self._workspace)
         except InputError as error:
             trouble = str(error)
-        return {"tariff": tariff, "trouble": trouble, "file": TARIFF, "excel": sheet.excel_is_there()}
+        return {
+            "tariff": tariff,
+            "trouble": trouble,
+            "file": TARIFF,
+            "excel": sheet.excel_is_there(),
+            "base": self._asking.base,
+        }
 
-
-def _individual(kind: str, tail: str) -> str:
-    try:
-        return NamedNode(f"{ID}{kind}/{tail}").value
-    except ValueError:
-        raise Refusal(404, f"no {kind} has this name") from None
+    def _individual(self, kind: str, tail: str) -> str:
+        try:
+            return NamedNode(f"{self._asking.base}{kind}/{tail}").value
+        except ValueError:
+            raise Refusal(404, f"no {kind} has this name") from None
 
 
 def _iris(bindings: Bindings) -> Bindings:

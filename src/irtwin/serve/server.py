@@ -24,6 +24,7 @@ from starlette.routing import Route
 from irtwin.asking import checked
 from irtwin.errors import InputError
 from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant.tariff import read_tariff
 from irtwin.serve import individuals, page
 from irtwin.serve.asking import Asking
@@ -55,13 +56,13 @@ def serve(
     Port 0 takes a free one; `announce` is told the endpoint's address once it answers.
     Raises InputError where the graph is missing, the port is taken, or the tariff cannot be used.
     """
-    with Snapshot(graph):
-        pass  # what cannot be read is said here, once, rather than by each worker
+    with Snapshot(graph) as snapshot:  # what cannot be read is said here, once, rather than by each worker
+        base = snapshot.graph.base
     read_tariff(graph.parent)  # likewise: later, a page would say it
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
-    app = application(graph, host, token=token, limits=limits, opened=lambda: announce(address))
+    app = application(graph, host, token=token, limits=limits, base=base, opened=lambda: announce(address))
     config = uvicorn.Config(
         app,
         http=Connection,
@@ -120,14 +121,23 @@ def read_token(file: Path | None) -> str | None:
 
 
 def application(
-    graph: Path, host: str, *, token: str | None, limits: Limits, opened: Callable[[], None] = lambda: None
+    graph: Path,
+    host: str,
+    *,
+    token: str | None,
+    limits: Limits,
+    base: str = ID,
+    opened: Callable[[], None] = lambda: None,
 ) -> Starlette:
-    """Return the ASGI application; its workers live between its start-up and its shutdown."""
+    """Return the ASGI application; its workers live between its start-up and its shutdown.
+
+    base: what the IRIs of the graph's individuals begin with.
+    """
     pool = Pool(graph, 1 + max(2, os.cpu_count() or 2), limits)
     updates = Updates(graph, token, limits)
     live = LivePages(graph)
     resources = checked(graph.parent)
-    asking = Asking(pool, updates, limits)
+    asking = Asking(pool, updates, limits, base)
     reports = ReportFiles(graph.parent)
     plant = PlantPages(graph.parent, asking, reports)
 
@@ -146,11 +156,11 @@ def application(
             *plant.routes(),
             Route("/query", lambda request: page.response(), methods=["GET"]),
             Route("/sparql", Endpoint(pool, updates, limits)),
-            Route("/questions.json", partial(page.questions, resources), methods=["GET"]),
+            Route("/questions.json", partial(page.questions, resources, base), methods=["GET"]),
             *reports.routes(),
             *live.routes(),
             Route("/assets/{name}", page.asset, methods=["GET"]),
-            Route("/irtwin{rest:path}", partial(individuals.respond, asking, resources), methods=["GET"]),
+            *individuals.routes(asking, resources),
         ],
         middleware=[Middleware(Guard, local=_is_loopback(host))],
         exception_handlers={Refusal: _refused},

@@ -22,7 +22,6 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
@@ -96,7 +95,7 @@ def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None
     name = offered[media_type]
     file = cast(IO[bytes], sink)
     if isinstance(found, QueryTriples):
-        serialize(found, file, format=_RDF[name], prefixes=PREFIXES)
+        serialize(found, file, format=_RDF[name], prefixes=graph.prefixes)
     else:
         found.serialize(file, format=_RESULTS[name])
     sink.end()

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.resources import Resources, resources_of
-from irtwin.storage import engine, files
+from irtwin.storage import base_iri, engine, files
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
@@ -21,12 +21,14 @@ from irtwin.storage.files import inside
 from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.rows import (
+    base_of,
     drop_activities,
     drop_data_set,
     drop_robot,
     drop_run,
     facts,
     insert_rows,
+    keep_base,
     named_files,
     part_tables,
     release_plans,
@@ -57,7 +59,7 @@ _FROM_A_BACKUP = (
     "again into a new one (where a server keeps the database, give --database)"
 )
 TWINS, DIAGNOSES, MESHES = "twins", "diagnoses", "meshes"
-TARIFF = "plant.toml"  # what a kilowatt hour costs and emits; a person writes it
+TARIFF = "plant.toml"  # what a kilowatt hour costs and emits, and the base of IRIs; a person writes it
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES)  # of files that rows name
 
 
@@ -68,10 +70,13 @@ class Workspace:
     them are committed last, and files that no row names are removed afterwards.
     """
 
-    def __init__(self, folder: Path, url: str | None = None, resources: Resources | None = None) -> None:
+    def __init__(
+        self, folder: Path, url: str | None = None, resources: Resources | None = None, base: str | None = None
+    ) -> None:
         """Open a workspace, or make one. Raises InputError where the database cannot be opened.
 
-        `resources` are those that hold for it; its own and those of installed packages if None.
+        `resources` are those that hold for it; its own and those of installed packages if None. `base` is what the IRIs
+        of its individuals begin with, else what `plant.toml` says; it stays once a robot is there.
         """
         self.folder = folder
         self.resources = resources or resources_of(folder)
@@ -87,6 +92,7 @@ class Workspace:
         engine.use_write_ahead_log(self.engine)
         engine.check(self.engine)
         self._make_tables()
+        self.base = self._base(base)
 
     @classmethod
     def existing(cls, folder: Path, url: str | None = None) -> Self:
@@ -177,8 +183,9 @@ class Workspace:
     ) -> None:
         """Keep what a provider made, in place of what it, or the provider `instead_of`, made of the same subject.
 
-        used: IRIs of what the activity read; rows: of the tables with an `activity_id`, which is set here;
-        series: modelled samples by `run_id`; documents: files by their path in the workspace (`twins/ID.json`);
+        used: IRIs of what the activity read, below the workspace's base or whole;
+        rows: of the tables with an `activity_id`, which is set here; series: modelled samples by `run_id`;
+        documents: files by their path in the workspace (`twins/ID.json`);
         metered: the activity that read the meter alone, and from what.
         What was derived from the replaced rows (the energy of an earlier twin) is dropped too.
         """
@@ -304,6 +311,26 @@ class Workspace:
         named += [(row.mesh_file, row.mesh_sha256) for row in session.execute(shapes) if row.mesh_file is not None]
         whole = all(is_whole(self.folder, path, checksum) for path, checksum in named)
         return whole and stored == {facts(row) for row in rows}
+
+    def _base(self, given: str | None) -> str:
+        """Return what the IRIs of individuals begin with; keep what is said of it anew."""
+        file = self.folder / TARIFF
+        in_file = base_iri.said(file)
+        base = in_file if given is None else base_iri.checked(given, "--base")
+        if None not in (in_file, base) and in_file != base:
+            raise InputError(
+                f"{file}: says {base_iri.KEY} = {in_file!r}, and --base {base}; say the same or leave one out"
+            )
+        with self.engine.connect() as connection:
+            kept = base_of(connection)
+        if base is None or base == kept:
+            return kept
+        with self._writing() as session:
+            try:
+                keep_base(session.connection(), base)
+            except InputError as error:
+                raise InputError(f"{self.folder}: {error}") from None
+        return base
 
     def _make_tables(self) -> None:
         of_packages = package_tables()

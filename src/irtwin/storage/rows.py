@@ -10,11 +10,14 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, exists, insert, select, update
 from sqlalchemy.orm import Session, aliased
 
+from irtwin.errors import InputError
+from irtwin.storage import base_iri
 from irtwin.storage.schema import (
     LIVE,
     LIVE_RUN,
     Activity,
     Base,
+    Individuals,
     Robot,
     Run,
     RunEnergy,
@@ -223,7 +226,7 @@ def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
             yield table, rows.where(table.columns["run_id"].in_(runs))
         elif "activity_id" in table.columns:
             yield table, _made_by(table, made)
-        else:
+        elif "robot_id" in table.columns:
             yield table, rows.where(table.columns["robot_id"] == robot_id)
 
 
@@ -243,3 +246,23 @@ def _owner(row: RowMapping) -> str:
 
 def _made_tables() -> list[Table]:
     return [table for table in Base.metadata.sorted_tables if "activity_id" in table.columns]
+
+
+def base_of(connection: Connection) -> str:
+    """Return the base that a database keeps; the default where none was said."""
+    said: str | None = connection.scalar(select(Individuals.base_iri))
+    return said or base_iri.DEFAULT
+
+
+def keep_base(connection: Connection, base: str) -> None:
+    """Keep a base. Raises InputError where robots have another one already."""
+    current = base_of(connection)
+    if base == current:
+        return
+    if connection.scalar(select(exists().where(Robot.robot_id.is_not(None)))):
+        raise InputError(
+            f"the individuals of this workspace lie below {current}, and others may name them so; they cannot move to "
+            f"{base}: take the data sets into a new workspace with that base"
+        )
+    connection.execute(delete(Individuals))
+    connection.execute(insert(Individuals).values(base_iri=base))

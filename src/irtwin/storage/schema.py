@@ -49,6 +49,14 @@ class Base(DeclarativeBase):
     type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: Moment}
 
 
+class Individuals(Base):
+    """What the IRIs of all individuals begin with: one row, or none where it is the default."""
+
+    __tablename__ = "individuals"
+
+    base_iri: Mapped[str] = mapped_column(primary_key=True)
+
+
 class Robot(Base):
     """An industrial robot; `robot_id` is the end of its IRI."""
 
@@ -156,14 +164,14 @@ class Activity(Base):
     activity_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))  # the robot that it was about
     provider: Mapped[str]  # end of the provider's IRI
-    subject: Mapped[str]  # IRI of the individual it worked on
+    subject: Mapped[str]  # IRI of the individual it worked on, below the workspace's base
     started: Mapped[datetime]
     ended: Mapped[datetime]
     software: Mapped[str]  # "irtwin 0.1.0"
 
 
 class ActivityUse(Base):
-    """An entity that an activity read: a run's series or a twin, by IRI."""
+    """An entity that an activity read: a run's series or a twin, by its IRI below the workspace's base."""
 
     __tablename__ = "activity_use"
 

@@ -34,7 +34,10 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
     Where the block ends well, what the robot is there replaces in one transaction what it was. Else all stays as it
     was, and so it does where the process is killed. Others may read and write meanwhile.
     """
-    with files.working_folder(place.folder, _PREFIX) as folder, Workspace(folder, resources=place.resources) as apart:
+    with (
+        files.working_folder(place.folder, _PREFIX) as folder,
+        Workspace(folder, resources=place.resources, base=place.base) as apart,
+    ):
         before = _rows(place, robot_id)
         _put(place, before, apart, robot_id)
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import TypeGuard, cast
 
@@ -25,8 +25,6 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_ONTOLOGY,
     GRAPH_OWL_RL,
     GRAPH_SOURCE,
-    ID,
-    PREFIXES,
     shorten,
 )
 from irtwin.resources import Files
@@ -71,7 +69,7 @@ class Explainer:
 
     def triple(self, triple: Triple) -> Explanation:
         """Explain a triple that the graph holds."""
-        what = _show(triple)
+        what = self._show(triple)
         if triple in self._told:
             return Explanation(what, _ABOVE)
         self._told.add(triple)
@@ -88,7 +86,7 @@ class Explainer:
 
     def individual(self, iri: str) -> Explanation:
         """Explain an individual: the activities that made it, what they used, and the file that it is."""
-        what = shorten(iri)
+        what = shorten(iri, self._graph.base)
         if iri in self._told:
             return Explanation(what, _ABOVE)
         self._told.add(iri)
@@ -110,20 +108,22 @@ class Explainer:
             if run in self._told:
                 continue
             kept = provenance.file_of(self._graph, run)
-            yield Explanation(shorten(run), self._known_from(run), (), None, kept.file, kept.checksum, kept.folder)
+            yield Explanation(
+                shorten(run, self._graph.base), self._known_from(run), (), None, kept.file, kept.checksum, kept.folder
+            )
 
     def _known_from(self, run: str) -> str:
         return _PLANNED if provenance.is_planned(self._graph, run) else _RECORDED
 
     def _stated(self, triple: Triple, name: str) -> Explanation:
-        what = _show(triple)
+        what = self._show(triple)
         if name.startswith(GRAPH_ACTIVITY):
-            activity = f"{ID}activity/{name.removeprefix(GRAPH_ACTIVITY)}"
+            activity = self._graph.iri(f"activity/{name.removeprefix(GRAPH_ACTIVITY)}")
             used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
             return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
-            maker = mapping_of(triple, self._graph.resources.of("mappings"))
+            maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)
             return Explanation(what, maker, (), None, near.file, near.checksum, near.folder)
         if name == GRAPH_ONTOLOGY:
             return Explanation(what, "the ontology", file=_module(triple, self._graph.resources.of("ontology")))
@@ -136,11 +136,11 @@ class Explainer:
             if derivation is not None:
                 said = _without_helpers(closure, derivation.premises)
                 return Explanation(
-                    _show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, said))
+                    self._show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, said))
                 )
         if self._is_of_hermit(statement):
-            return Explanation(_show(statement), "OWL 2 DL, by HermiT: no rule of OWL 2 RL concludes it")
-        return Explanation(_show(statement), "OWL 2 RL: so it is with everything")
+            return Explanation(self._show(statement), "OWL 2 DL, by HermiT: no rule of OWL 2 RL concludes it")
+        return Explanation(self._show(statement), "OWL 2 RL: so it is with everything")
 
     def _is_of_hermit(self, statement: Statement) -> bool:
         subject, predicate, object = statement
@@ -159,7 +159,7 @@ class Explainer:
                 near |= around(self._graph, nodes)
                 self._closures.append(Closure(ontology | near))
                 yield self._closures[-1]
-                nodes = {term for triple in near for term in triple if _is_individual(term)}
+                nodes = {term for triple in near for term in triple if self._is_individual(term)}
         if not self._has_whole:
             self._has_whole = True
             self._closures.append(Closure(not_closed(self._graph)))
@@ -167,7 +167,7 @@ class Explainer:
 
     def _premise(self, statement: Statement) -> Explanation:
         if statement in self._told:
-            return Explanation(_show(statement), _ABOVE)
+            return Explanation(self._show(statement), _ABOVE)
         subject, predicate, object = statement
         if not isinstance(subject, Literal) and isinstance(predicate, NamedNode):
             triple = Triple(subject, predicate, object)
@@ -175,6 +175,12 @@ class Explainer:
                 return self.triple(triple)
         self._told.add(statement)
         return self._inferred(statement)
+
+    def _show(self, statement: Triple | Statement) -> str:
+        return " ".join(show(term, self._graph.base) for term in statement)
+
+    def _is_individual(self, term: object) -> TypeGuard[NamedNode]:
+        return isinstance(term, NamedNode) and term.value.startswith(self._graph.base)
 
     def _file_near(self, triple: Triple) -> provenance.File:
         """Return the file that says a triple: a data set's, or else that of the subject, or of the object."""
@@ -185,10 +191,6 @@ class Explainer:
                 return told
         found = (provenance.file_of(self._graph, end) for end in ends)
         return next((one for one in found if one.file is not None), provenance.File())
-
-
-def _is_individual(term: object) -> TypeGuard[NamedNode]:
-    return isinstance(term, NamedNode) and term.value.startswith(ID)
 
 
 def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[Statement]:
@@ -204,7 +206,7 @@ def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[
 
 
 def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
-    terms = [_sparql(term, f"?_{place}") for place, term in enumerate(_TERM.findall(pattern))]
+    terms = [_sparql(term, f"?_{place}", graph.prefixes) for place, term in enumerate(_TERM.findall(pattern))]
     terms += [f"?_{place}" for place in range(len(terms), 3)]
     if len(terms) > 3:
         raise InputError(f"{pattern}: is more than subject, predicate and object; put text in quotation marks")
@@ -213,17 +215,13 @@ def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
     return list(cast(QueryTriples, found))
 
 
-def _sparql(term: str, variable: str) -> str:
+def _sparql(term: str, variable: str, prefixes: Mapping[str, str]) -> str:
     prefix, colon, name = term.partition(":")
     if term in _WILDCARDS or term.startswith("?"):
         return variable
-    if colon and prefix in PREFIXES:
-        return f"<{PREFIXES[prefix]}{name}>"
+    if colon and prefix in prefixes:
+        return f"<{prefixes[prefix]}{name}>"
     return f"<{term}>" if name.startswith("//") and not term.startswith("<") else term
-
-
-def _show(statement: Triple | Statement) -> str:
-    return " ".join(map(show, statement))
 
 
 def _maker(maker: dict[str, object]) -> str:

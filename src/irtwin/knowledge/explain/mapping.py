@@ -9,16 +9,17 @@ from pyoxigraph import NamedNode, Triple
 
 from irtwin.knowledge.mapping.document import LogicalTable, TriplesMap
 from irtwin.knowledge.mapping.reader import read_document
+from irtwin.knowledge.mapping.terms import absolute
 from irtwin.knowledge.vocabulary import RDF
 from irtwin.resources import Files
 
 _TYPE = NamedNode(RDF + "type")
 
 
-def mapping_of(triple: Triple, files: Files) -> str:
-    """Return, in words, the first triples map of the mappings that may have made a triple."""
+def mapping_of(triple: Triple, files: Files, base: str) -> str:
+    """Return, in words, the first triples map of the mappings that may have made a triple of a graph with a base."""
     for where, triples_map in _triples_maps(files):
-        if _says(triples_map, triple):
+        if _says(triples_map, triple, base):
             return f"mapping {where}, {_table(triples_map.table)}"
     return "a mapping"
 
@@ -33,16 +34,17 @@ def _triples_maps(files: Files) -> tuple[tuple[str, TriplesMap], ...]:
     )
 
 
-def _says(triples_map: TriplesMap, triple: Triple) -> bool:
-    if triples_map.subject.constant != triple.subject and not _fits(triples_map, triple.subject):
+def _says(triples_map: TriplesMap, triple: Triple, base: str) -> bool:
+    if triples_map.subject.constant != triple.subject and not _fits(triples_map, triple.subject, base):
         return False
     if triple.predicate == _TYPE and triple.object in triples_map.classes:
         return True
     return any(triple.predicate == each.constant for pair in triples_map.properties for each in pair.predicates)
 
 
-def _fits(triples_map: TriplesMap, subject: object) -> bool:
-    parts = (re.escape(part) if isinstance(part, str) else "[^/]+" for part in triples_map.subject.template)
+def _fits(triples_map: TriplesMap, subject: object, base: str) -> bool:
+    template = absolute(triples_map.subject.template, base)
+    parts = (re.escape(part) if isinstance(part, str) else "[^/]+" for part in template)
     return isinstance(subject, NamedNode) and re.fullmatch("".join(parts), subject.value) is not None
 
 

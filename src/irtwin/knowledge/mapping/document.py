@@ -15,6 +15,7 @@ from irtwin.knowledge.mapping.identifiers import Identifier
 RR = "http://www.w3.org/ns/r2rml#"
 
 Node = NamedNode | BlankNode | Literal
+Template = tuple[str | Identifier, ...]  # fixed text and columns
 
 
 class TermType(Enum):
@@ -42,7 +43,7 @@ class TermMap:
     term_type: TermType
     constant: NamedNode | Literal | None = None
     column: Identifier | None = None
-    template: tuple[str | Identifier, ...] = ()
+    template: Template = ()
     datatype: NamedNode | None = None
     language: str | None = None
 

@@ -28,8 +28,8 @@ from irtwin.knowledge.mapping.remembered import ENTRY, DamagedRows, Entries, Rem
 from irtwin.knowledge.mapping.source import read, schema_version
 from irtwin.knowledge.mapping.terms import Row
 from irtwin.knowledge.store.blank_nodes import has_blank_node
-from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, OWL
+from irtwin.knowledge.store.graph import URI_SPACE, KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL
 
 _MAPPED = (GRAPH_SOURCE, GRAPH_ACTIVITY)
 _VERSION_GRAPH = f"{GRAPH_SOURCE}version"
@@ -56,11 +56,15 @@ def refresh(
 
 
 def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path, seconds: float) -> None:
-    with planned(engine, documents, seconds=seconds) as (connection, statements), RememberedRows(file) as remembered:
+    with (
+        planned(engine, documents, graph.base, seconds) as (connection, statements),
+        RememberedRows(file) as remembered,
+    ):
         run = _Run(connection, statements, remembered)
         made_by = _digest(
             metadata.version("irtwin"),
             schema_version(connection),
+            graph.base,
             *(path.read_text() for path in documents),
             *(statement.sql for statement in statements),
         )
@@ -75,7 +79,7 @@ def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], f
                 remembered.version = version
                 return
         remembered.forget()
-        graph.replace(chain(run.added(), [_version(version)]), *_MAPPED)
+        graph.replace(chain(run.added(), [_version(version)], _uri_space(graph.base)), *_MAPPED)
         remembered.version = version
 
 
@@ -157,4 +161,13 @@ def _digest(*parts: str) -> str:
 
 
 def _version(name: str) -> Quad:
-    return Quad(NamedNode(GRAPH_SOURCE), NamedNode(f"{OWL}versionInfo"), Literal(name), NamedNode(_VERSION_GRAPH))
+    return _said(f"{OWL}versionInfo", name)
+
+
+def _uri_space(base: str) -> list[Quad]:
+    """Return what tells readers of the graph the base of its individuals, where they would take another."""
+    return [] if base == ID else [_said(URI_SPACE, base)]
+
+
+def _said(property: str, value: str) -> Quad:
+    return Quad(NamedNode(GRAPH_SOURCE), NamedNode(property), Literal(value), NamedNode(_VERSION_GRAPH))

@@ -14,10 +14,9 @@ from irtwin.errors import InputError
 from irtwin.knowledge.mapping.plan import Statement, plan
 from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.mapping.source import read, snapshot
+from irtwin.knowledge.vocabulary import ID
 from irtwin.storage import files
 from irtwin.storage.engine import open_engine
-
-BASE_IRI = "https://w3id.org/irtwin/id/"
 
 
 def map_database(
@@ -25,7 +24,7 @@ def map_database(
 ) -> Iterator[Quad]:
     """Yield the quads that mapping documents make of a database, as one snapshot of it shows it.
 
-    base_iri: what relative IRIs lie below; else what a document declares as @base, else BASE_IRI;
+    base_iri: what relative IRIs lie below; else what a document declares as @base, else that of the ontology;
     seconds: how long a triples map's SQL may take, with the mapping of its rows.
     The same quad may come more than once. Memory stays flat: rows are read in chunks.
     Raises InputError for a fault in a document, before the first quad, and for a row that does not fit it.
@@ -47,7 +46,7 @@ def planned(
         statements = [
             statement
             for document in checked
-            for statement in plan(connection, document, base_iri or document.base_iri or BASE_IRI)
+            for statement in plan(connection, document, base_iri or document.base_iri or ID)
         ]
         yield connection, statements
 

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from pyoxigraph import BlankNode, Literal, NamedNode
 
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping.document import TermMap, TermType
+from irtwin.knowledge.mapping.document import Template, TermMap, TermType
 from irtwin.knowledge.mapping.identifiers import Identifier
 from irtwin.knowledge.mapping.natural import STRING, Lexical, Natural, is_lexical
 
@@ -26,6 +26,8 @@ _RESERVED = re.compile(
     + "".join(f"{chr(plane << 16)}-{chr((plane << 16) + 0xFFFD)}" for plane in range(1, 14))
     + f"{chr(0xE1000)}-{chr(0xEFFFD)}-]"
 )
+
+_RELATIVE = re.compile("[^:/?#]+/")  # no scheme can come any more
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:
     if term_map.constant is not None:
         constant = term_map.constant
         return lambda row: constant
-    text = _text(term_map, columns)
+    text = _text(term_map, columns, base_iri)
     if term_map.term_type is TermType.LITERAL:
         return _literal_maker(term_map, text)
     if term_map.term_type is TermType.BLANK_NODE:
@@ -55,9 +57,9 @@ def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:
     return _iri_maker(term_map, text, base_iri)
 
 
-def _text(term_map: TermMap, columns: Columns) -> _Text:
+def _text(term_map: TermMap, columns: Columns, base_iri: str) -> _Text:
     if term_map.column is None:
-        return _template_text(term_map, columns)
+        return _template_text(term_map, columns, base_iri)
     column = columns[term_map.column]
     index, natural = column.index, column.natural
 
@@ -68,8 +70,9 @@ def _text(term_map: TermMap, columns: Columns) -> _Text:
     return text
 
 
-def _template_text(term_map: TermMap, columns: Columns) -> _Text:
-    parts = [part if isinstance(part, str) else columns[part] for part in term_map.template]
+def _template_text(term_map: TermMap, columns: Columns, base_iri: str) -> _Text:
+    template = term_map.template if term_map.term_type is not TermType.IRI else absolute(term_map.template, base_iri)
+    parts = [part if isinstance(part, str) else columns[part] for part in template]
     encoded = term_map.term_type is TermType.IRI
 
     def text(row: Row) -> Lexical | None:
@@ -86,6 +89,12 @@ def _template_text(term_map: TermMap, columns: Columns) -> _Text:
         return result, STRING
 
     return text
+
+
+def absolute(template: Template, base_iri: str) -> Template:
+    """Return a template of IRIs with the base before it, where it is relative whatever a row holds."""
+    first = template[0] if template else ""
+    return (base_iri + first, *template[1:]) if isinstance(first, str) and _RELATIVE.match(first) else template
 
 
 def _percent_encoded(match: re.Match[str]) -> str:

@@ -14,7 +14,7 @@ from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number, Rule
 from irtwin.knowledge.owl_rl.terms import Node, Terms
-from irtwin.knowledge.vocabulary import OWL, RDFS, XSD, shorten
+from irtwin.knowledge.vocabulary import ID, OWL, RDFS, XSD, shorten
 
 _TRIVIAL = (OWL + "Thing", OWL + "Nothing")
 _REFLEXIVE = (  # what everything, every class or every property is to itself
@@ -297,10 +297,10 @@ def is_hidden(term: Node) -> bool:
     return isinstance(term, BlankNode)
 
 
-def show(term: Node) -> str:
-    """Return a term as people write it, with prefixes."""
+def show(term: Node, base: str = ID) -> str:
+    """Return a term as people write it, with prefixes; individuals lie below a base."""
     if isinstance(term, NamedNode):
-        return shorten(term.value)
+        return shorten(term.value, base)
     if isinstance(term, Literal) and term.datatype.value != XSD + "string" and term.language is None:
         return f'"{term.value}"^^{shorten(term.datatype.value)}'
     return str(term)

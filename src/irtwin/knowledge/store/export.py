@@ -19,10 +19,8 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
     GRAPH_SOURCE,
-    ID,
     ONTOLOGY,
     OWL,
-    PREFIXES,
     RDF,
     RDFS,
 )
@@ -50,13 +48,13 @@ def export_owl(graph: KnowledgeGraph, path: Path) -> None:
         to_milliseconds(triple) for triple in triples if triple.subject not in modules and triple.predicate != _IMPORTS
     }
     kept |= _declarations(triples)
-    kept |= _labels(kept)
+    kept |= _labels(kept, graph.base)
     rules = as_swrl(graph, all_rules(graph.resources))
     kept |= rules.triples
     kept |= {Triple(_ONTOLOGY, _COMMENT, _left_out(rule, why)) for rule, why in rules.left_out}
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    serialize(sorted(kept, key=str), str(part), RdfFormat.RDF_XML, prefixes=PREFIXES)
+    serialize(sorted(kept, key=str), str(part), RdfFormat.RDF_XML, prefixes=graph.prefixes)
     part.replace(path)
 
 
@@ -76,14 +74,14 @@ def _declarations(triples: Iterable[Triple]) -> set[Triple]:
     }
 
 
-def _labels(triples: Iterable[Triple]) -> set[Triple]:
-    """Label each individual that has no label by its IRI: "joint energy KUKA.palletising, joint_a1"."""
+def _labels(triples: Iterable[Triple], base: str) -> set[Triple]:
+    """Label each individual that has no label by its IRI below the base: "joint energy KUKA.palletising, joint_a1"."""
     labelled = {triple.subject for triple in triples if triple.predicate == _LABEL}
-    return {Triple(one, _LABEL, Literal(_label(one.value))) for one in _of_type(triples, _INDIVIDUAL) - labelled}
+    return {Triple(one, _LABEL, Literal(_label(one.value, base))) for one in _of_type(triples, _INDIVIDUAL) - labelled}
 
 
-def _label(iri: str) -> str:
-    path = iri.removeprefix(ID).removeprefix(f"{ONTOLOGY}/")
+def _label(iri: str, base: str) -> str:
+    path = iri.removeprefix(base).removeprefix(f"{ONTOLOGY}/")
     kind, *names = map(unquote, path.split("/")) if "://" not in path else [iri]
     return f"{kind.replace('_', ' ')} {', '.join(names)}" if names else kind
 

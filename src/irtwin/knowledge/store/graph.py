@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 from pyoxigraph import (
     BlankNode,
     DefaultGraph,
+    Literal,
     NamedNode,
     Quad,
     QueryBoolean,
@@ -33,7 +34,7 @@ from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import Table, to_python
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, check, keeping_union
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_UPDATE, ID, PREFIXES
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_UPDATE, ID, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 1_000_000
 _NAMED_AT_ONCE = 5_000  # IRIs in a query
+URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
+_ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base }} }} LIMIT 1"
 
 
 class KnowledgeGraph:
@@ -50,16 +53,22 @@ class KnowledgeGraph:
     repeats a triple that several graphs hold, and a sum would count it twice.
 
     Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
-    in `workspace`, which a folder's parent is if none is given.
+    in `workspace`, which a folder's parent is if none is given. Its individuals lie below `base`, else below what the
+    graph says of itself.
     """
 
     def __init__(
-        self, place: Path | str | None = None, workspace: Path | None = None, resources: Resources | None = None
+        self,
+        place: Path | str | None = None,
+        workspace: Path | None = None,
+        resources: Resources | None = None,
+        base: str | None = None,
     ):
         self._store: Store | SparqlServer
         self._read_only = False
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         self._resources = resources
+        self._base = base
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
             self._store = Store() if place is None else SparqlServer(str(place))
@@ -75,7 +84,7 @@ class KnowledgeGraph:
         """Open a workspace's graph: in its folder, or on a SPARQL server. InputError where it is damaged or lost."""
         if url is None:
             place.check_graph()
-        return cls(url or place.graph_folder, place.folder, place.resources)
+        return cls(url or place.graph_folder, place.folder, place.resources, place.base)
 
     @classmethod
     def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
@@ -86,7 +95,7 @@ class KnowledgeGraph:
         graph = cls.__new__(cls)
         graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
-        graph._workspace, graph._resources = workspace or path.parent, None
+        graph._workspace, graph._resources, graph._base = workspace or path.parent, None, None
         return graph
 
     def __enter__(self) -> Self:
@@ -110,6 +119,26 @@ class KnowledgeGraph:
         if self._resources is None:
             self._resources = resources_of(self._workspace)
         return self._resources
+
+    @property
+    def base(self) -> str:
+        """What the IRIs of its individuals begin with."""
+        if self._base is None:
+            said = cast(QuerySolutions, self._store.query(_ASK_BASE))
+            self._base = next((row["base"].value for row in said), ID)
+        return self._base
+
+    @property
+    def prefixes(self) -> dict[str, str]:
+        """The prefixes that queries need not declare."""
+        return prefixes(self.base)
+
+    def iri(self, name: str) -> str:
+        """Return the IRI of an individual by its name below the base, \"robot/UR10\"; a whole IRI stays as it is."""
+        return name if "://" in name or name.startswith("urn:") else self.base + name
+
+    def _term(self, value: str | Literal) -> str | Literal:
+        return self.iri(value) if isinstance(value, str) else value
 
     def load_ontology(self) -> None:
         """Put the modules of `ontology/` into the ontology's graph."""
@@ -204,14 +233,16 @@ class KnowledgeGraph:
         return {triple for name in self.graphs(*below) for triple in _read(self._store, name)}
 
     @telling
-    def query(self, text: str, bindings: Mapping[str, str] | None = None) -> Table:
+    def query(self, text: str, bindings: Mapping[str, str | Literal] | None = None) -> Table:
         """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
 
-        `bindings` gives variables the IRI that they stand for. The usual prefixes need no PREFIX.
-        InputError where the text is no such query, asks another server, or has too many answers.
+        `bindings` gives variables the IRI that they stand for, whole or below the base. The usual prefixes need no
+        PREFIX.        InputError where the text is no such query, asks another server, or has too many answers.
         """
         faults: dict[str, None] = {}
-        answer = self.answer(bound(text, bindings or {}), faults=faults)
+        answer = self.answer(
+            bound(text, {name: self._term(one) for name, one in (bindings or {}).items()}), faults=faults
+        )
         if isinstance(answer, QueryBoolean):
             return Table(("answer",), ({"answer": bool(answer)},))
         if isinstance(answer, QuerySolutions):
@@ -238,20 +269,22 @@ class KnowledgeGraph:
         default_graphs: Sequence[str] = (),
         named_graphs: Sequence[str] = (),
         faults: dict[str, None] | None = None,
-        base: str = ID,
+        base: str | None = None,
     ) -> QuerySolutions | QueryBoolean | QueryTriples:
         """Answer a query row by row as they are found; InputError where it is none or asks another server.
 
         Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
-        `faults` is told why functions had no answer, while the rows are found. Relative IRIs are below `base`.
+        `faults` is told why functions had no answer, while the rows are found. Relative IRIs are below `base`,
+        else below the graph's.
         """
+        base = base or self.base
         refuse_service(text, base, isinstance(self._store, SparqlServer))
         whole = not (default_graphs or named_graphs)
         try:
             return self._store.query(
                 text,
                 base_iri=base,
-                prefixes=PREFIXES,
+                prefixes=self.prefixes,
                 default_graph=None if whole else [_graph_name(iri) for iri in default_graphs],
                 named_graphs=None if whole else [_graph_name(iri) for iri in named_graphs],
                 custom_functions=self._functions({} if faults is None else faults),
@@ -265,20 +298,21 @@ class KnowledgeGraph:
 
     @telling
     def update(
-        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str = ID
+        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str | None = None
     ) -> None:
         """Do a SPARQL update in one transaction that keeps the default graph the union: see `updates`.
 
         Graphs and base are those of `answer`. InputError where the text is no update, reads from elsewhere, or fails.
         """
+        base = base or self.base
         check(text, base, isinstance(self._store, SparqlServer))
         if default_graphs or named_graphs:
             text = using(text, default_graphs, named_graphs, base)
         try:
-            change = as_change(text, self._holding, base)
+            change = as_change(text, self._holding, base, self.prefixes)
             if change is None:
                 self._forget_what_was_inferred([GRAPH_UPDATE])
-                self._store.update(keeping_union(text, base), base_iri=base, prefixes=PREFIXES)
+                self._store.update(keeping_union(text, base), base_iri=base, prefixes=self.prefixes)
             else:
                 self.change(*change)
             self._store.flush()

@@ -32,7 +32,10 @@ def check(text: str, base: str | None, on_server: bool = False) -> None:
 
 
 def as_change(
-    text: str, holding: Callable[[Iterable[Triple]], Iterable[Quad]], base: str | None = None
+    text: str,
+    holding: Callable[[Iterable[Triple]], Iterable[Quad]],
+    base: str | None = None,
+    prefixes: dict[str, str] = PREFIXES,
 ) -> tuple[set[Quad], set[Quad]] | None:
     """Return the quads of named graphs that an update takes out and puts in, where its text alone tells: or None.
 
@@ -47,7 +50,7 @@ def as_change(
     # A group is one INSERT's template as well: what follows it would not be let through here.
     if not is_update(f"{prologue}INSERT {data}\nWHERE {{ }}", base):
         return None
-    named, union = _inserted(f"{prologue}INSERT DATA {data}", base)
+    named, union = _inserted(f"{prologue}INSERT DATA {data}", base, prefixes)
     if has_blank_node(named) or has_blank_node(union):
         return None
     if head[1].lower() == "delete":
@@ -93,9 +96,9 @@ def _in_place(text: str, base: str | None) -> SyntaxError | None:
     return None
 
 
-def _inserted(text: str, base: str | None) -> tuple[set[Quad], set[Triple]]:
+def _inserted(text: str, base: str | None, prefixes: dict[str, str]) -> tuple[set[Quad], set[Triple]]:
     """Return what an INSERT DATA puts into named graphs, and into the union."""
     store = Store()
-    store.update(text, base_iri=base, prefixes=PREFIXES)
+    store.update(text, base_iri=base, prefixes=prefixes)
     union = set(store.quads_for_pattern(None, None, None, DefaultGraph()))
     return set(store) - union, {quad.triple for quad in union}

@@ -69,7 +69,7 @@ def render_alone(
         mapped = map_database(workspace.engine, graph.resources.paths("mappings"))
         graph.replace(mapped, GRAPH_SOURCE, GRAPH_ACTIVITY)
         infer(graph)
-        render_gap(graph, robot_iri(robot_id), workspace.read_document, out, graph.resources)
+        render_gap(graph, graph.iri(robot_iri(robot_id)), workspace.read_document, out, graph.resources)
 
 
 def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:

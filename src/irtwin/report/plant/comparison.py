@@ -62,11 +62,14 @@ class Comparison:
     apart: bool  # the two sides have no kind of energy in common
 
 
-def side(asked: Mapping[str, str], which: str) -> Side | None:
-    """Read what a form says of side `a` or `b`; None where it says nothing. InputError where it is no date."""
+def side(asked: Mapping[str, str], which: str, base: str = ID) -> Side | None:
+    """Read what a form says of side `a` or `b`; None where it says nothing. InputError where it is no date.
+
+    base: what the IRIs of runs begin with.
+    """
     if asked.get("by") == "run":
         run = asked.get(f"{which}_run", "")
-        return Side(f"{ID}run/{run}", *_ALWAYS) if run else None
+        return Side(f"{base}run/{run}", *_ALWAYS) if run else None
     first, last = asked.get(f"{which}_from", "").strip(), asked.get(f"{which}_to", "").strip()
     if not (first or last):
         return None

@@ -63,21 +63,21 @@ class Individual:
     whole: bool
 
 
-def individual(iri: str, answers: Answers) -> Individual:
+def individual(iri: str, answers: Answers, base: str = ID) -> Individual:
     """Make what a page shows of the answers to `reports/plant/individual/*.rq`."""
-    said = _said(answers["said"].rows)
+    said = _said(answers["said"].rows, base)
     named = answers["name"].first
     return Individual(
         iri=iri,
         name=str(named["name"]) if named else wording.local_name(iri),
         types=[one for one in said if one.iri == TYPE],
         said=[one for one in said if one.iri != TYPE],
-        incoming=_incoming(answers["incoming"].rows),
+        incoming=_incoming(answers["incoming"].rows, base),
         whole=len(answers["said"].rows) < MOST[0] and len(answers["incoming"].rows) < MOST[1],
     )
 
 
-def _said(rows: Iterable[Row]) -> list[Property]:
+def _said(rows: Iterable[Row], base: str) -> list[Property]:
     found: dict[str, Property] = {}
     graphs: dict[tuple[str, str, bool], set[str]] = defaultdict(set)
     kept: dict[tuple[str, str, bool], Row] = {}
@@ -90,22 +90,26 @@ def _said(rows: Iterable[Row]) -> list[Property]:
             row["property"], Property(row["property"], row["property_label"] or shorten(row["property"]))
         )
         of.values.append(
-            Value(_text(row), row["value"] if row["leads"] else None, tuple(map(_by, sorted(graphs[key]))))
+            Value(
+                _text(row, base),
+                row["value"] if row["leads"] else None,
+                tuple(_by(graph, base) for graph in sorted(graphs[key])),
+            )
         )
     return sorted(found.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
-def _incoming(rows: Iterable[Row]) -> list[Property]:
+def _incoming(rows: Iterable[Row], base: str) -> list[Property]:
     found: dict[str, Property] = {}
     for subject, row in sorted({(row["property"], row["subject"]): row for row in rows}.items()):
         of = found.setdefault(subject[0], Property(subject[0], row["property_label"] or shorten(subject[0])))
-        of.values.append(Value(str(row["subject_label"] or shorten(subject[1])), subject[1], ()))
+        of.values.append(Value(str(row["subject_label"] or shorten(subject[1], base)), subject[1], ()))
     return sorted(found.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
-def _text(row: Row) -> str:
+def _text(row: Row, base: str) -> str:
     if row["leads"]:
-        return str(row["value_label"] or shorten(row["value"]))
+        return str(row["value_label"] or shorten(row["value"], base))
     value: Any = row["value"]
     text = (
         f"{value:.10g}"
@@ -118,11 +122,11 @@ def _text(row: Row) -> str:
     return f"{text}\N{NO-BREAK SPACE}{unit}" if unit else text
 
 
-def _by(graph: str) -> tuple[str, str | None]:
+def _by(graph: str, base: str) -> tuple[str, str | None]:
     """Say who stated what a graph holds, with the IRI of an activity."""
     if graph.startswith(GRAPH_ACTIVITY):
         name = graph.removeprefix(GRAPH_ACTIVITY)
-        return f"activity {name}", f"{ID}activity/{name}"
+        return f"activity {name}", f"{base}activity/{name}"
     if graph.startswith(GRAPH_INFERRED):
         return f"concluded by {graph.removeprefix(GRAPH_INFERRED)}", None
     if graph.startswith(GRAPH_SOURCE):

@@ -9,6 +9,7 @@ from typing import Any
 import jinja2
 
 from irtwin import resources
+from irtwin.knowledge.vocabulary import ID
 from irtwin.report.energy.page import environment
 from irtwin.report.plant import links
 from irtwin.report.plant.tariff import JOULES
@@ -32,18 +33,19 @@ def style() -> str:
 
 
 def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any) -> str:
-    """Return a page; `answers` and `bindings` are shown as the questions behind it."""
-    template = _templates().get_template(f"plant/{name}")
+    """Return a page; `answers` and `bindings` are shown as the questions behind it, links are those of `base`."""
+    template = _templates(said.get("base", ID)).get_template(f"plant/{name}")
     rows = {question: answer.rows for question, answer in answers.items()}
     return template.render(answers=answers, rows=rows, bindings=bindings, **said)
 
 
 @cache
-def _templates() -> jinja2.Environment:
+def _templates(base: str) -> jinja2.Environment:
+    of = links.links(base)
     templates = environment(resources.shipped())
     templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates.filters |= {
-        "page_of": links.page_of, "individual": links.individual, "tail": links.tail, "kwh": _kwh, "spaced": _spaced,
+        "page_of": of.page_of, "individual": of.individual, "tail": of.tail, "kwh": _kwh, "spaced": _spaced,
     }  # fmt: skip
     return templates
 

@@ -12,10 +12,11 @@ from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
+from irtwin.storage.base_iri import KEY
 from irtwin.storage.database import TARIFF
 
 JOULES = 3.6e6  # of a kWh
-_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh")
+_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
 _MOST_BYTES = 100_000
 

@@ -3,7 +3,7 @@
 // window.irtwinLive tells how well it keeps up: counts, and the newest lags and frames in ms.
 (function () {
   const robotId = decodeURIComponent(location.pathname.split("/")[2]);
-  const here = "/live/" + encodeURIComponent(robotId), iri = "<https://w3id.org/irtwin/id/robot/" + encodeURIComponent(robotId) + ">";
+  const here = "/live/" + encodeURIComponent(robotId), iri = "id:robot\\/" + encodeURIComponent(robotId).replace(/[.!~*'()]/g, "\\$&");
   const SHOWN = 30, KEPT = 4096; // s of the curve; lags and frames that are remembered
   const SLOW_RATIO = 0.5; // of the screen's points are drawn where the processor draws
   const CURVE_EVERY = 45; // ms
