@@ -10,7 +10,7 @@ import jinja2
 
 from irtwin import resources
 from irtwin.report.energy.page import environment
-from irtwin.report.plant import links
+from irtwin.report.plant import links, paging
 from irtwin.report.plant.tariff import JOULES
 from irtwin.report.questions import Answers, Question, read_questions
 
@@ -35,7 +35,7 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
     """Return a page; `answers` and `bindings` are shown as the questions behind it."""
     template = _templates().get_template(f"plant/{name}")
     rows = {question: answer.rows for question, answer in answers.items()}
-    return template.render(answers=answers, rows=rows, bindings=bindings, **said)
+    return template.render(answers=answers, rows=rows, bindings=bindings, **{"number": 1, **said})
 
 
 @cache
@@ -44,6 +44,7 @@ def _templates() -> jinja2.Environment:
     templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates.filters |= {
         "page_of": links.page_of, "individual": links.individual, "tail": links.tail, "kwh": _kwh, "spaced": _spaced,
+        "pages": paging.pages, "on_page": paging.on_page,
     }  # fmt: skip
     return templates
 
