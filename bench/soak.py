@@ -127,7 +127,7 @@ class Client:
         self._ask(text, accept, status)
 
     def _page(self) -> None:
-        for path in ("/", "/sparql", "/assets/yasgui.min.js", "/irtwin/robot"):
+        for path in ("/", "/sparql", "/assets/yasqe.min.js", "/irtwin/robot"):
             self._count(self._http.get(self._url + path), 200)
 
     def _leave(self) -> None:

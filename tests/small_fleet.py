@@ -41,6 +41,12 @@ RUNS: list[tuple[Any, ...]] = [
     ("Arm_D", "first", "2026-03-05 06:00", 4.0, 2.0, None, None, None, None, None, None, None, None),
 ]
 REPEATS = {"Arm_C.press_2": "Arm_C.press_1"}
+MADE = {  # run: product, pieces, cycles
+    "Arm_A.fit_1": ("bracket", 10, None),
+    "Arm_A.check_1": ("bracket", 30, 15),
+    "Arm_C.press_1": (None, None, 4),
+}
+SLOWER = {"Arm_B.haul": ("Arm_B.work_1", 1.6, 12.0, 5.0)}  # plan: the run, times longer, J saved, half its interval
 PLANS: list[
     tuple[Any, ...]
 ] = [  # robot, plan, the run that carried it out, s, payload kg, J: energy, half its interval
@@ -166,8 +172,10 @@ def _devices(robot: str, joint: str | None, kind: str, column: str, label: str, 
 def _plans() -> Iterator[Base]:
     for robot, name, _, seconds, payload, *_ in PLANS:
         run_id = f"{robot}.{name}"
+        scaled, times, *_ = SLOWER.get(run_id, (None, None))
         yield schema.Run(
-            run_id=run_id, robot_id=robot, name=name, kind="Planned_Run", payload_kg=payload, payload_com_x_m=0.0,
+            run_id=run_id, robot_id=robot, name=name, kind="Planned_Run", payload_kg=payload,
+            time_scaling_of=scaled, time_scale=times, payload_com_x_m=0.0,
             payload_com_y_m=0.0, payload_com_z_m=0.0, run_time_s=seconds, sample_count=int(100 * seconds),
             sample_rate_hz=100.0, file=f"series/{run_id}.parquet", sha256=f"plan of {run_id}",
         )  # fmt: skip
@@ -183,7 +191,9 @@ def _prices() -> Iterator[Base]:
             continue
         run_id, made = f"{robot}.{name}", f"energy.{robot}.{name}"
         yield _activity(made, robot, "energy", "2026-03-05 12:03")
+        *_, saved, width = SLOWER.get(run_id, (None, None))
         yield schema.RunPrice(
+            saving_j=saved, saving_lower_j=saved and saved - width, saving_upper_j=saved and saved + width,
             run_id=run_id, twin_id=f"{robot}.t1", energy_from="modelled", energy_j=joules, energy_lower_j=joules - half,
             energy_upper_j=joules + half, mean_power_w=joules / seconds, mean_power_lower_w=(joules - half) / seconds,
             mean_power_upper_w=(joules + half) / seconds, peak_power_w=280.0, peak_power_lower_w=270.0,
@@ -199,7 +209,9 @@ def _runs() -> Iterator[Base]:
     performs = {f"{robot}.{run}": f"{robot}.{plan}" for robot, plan, run, *_ in PLANS}
     for robot, name, start, seconds, payload, idle, *_ in RUNS:
         run_id = f"{robot}.{name}"
+        product, pieces, cycles = MADE.get(run_id, (None, None, None))
         yield schema.Run(
+            product=product, pieces=pieces, cycles=cycles,
             run_id=run_id, robot_id=robot, name=name, kind="Measured_Run", role="observed", payload_kg=payload,
             payload_com_x_m=0.0, payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id),
             performs=performs.get(run_id), start_time=_moment(start), start_time_from="log", run_time_s=seconds,

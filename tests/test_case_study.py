@@ -17,6 +17,7 @@ from irtwin.errors import InputError
 from irtwin.planning.plan import Plan
 from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
+from tests.screens import faults, narrow_and_dark
 
 pytest.importorskip("ompl")
 pytest.importorskip("toppra")
@@ -107,7 +108,7 @@ def browser() -> Iterator[Any]:
 def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any) -> None:
     file = done[1] / "reports" / "case_study.html"
     assert file.stat().st_size < 3_000_000
-    page = browser.new_page(viewport={"width": 400, "height": 900})
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -121,5 +122,7 @@ def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any
     page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time: 1e9}}))")
     (row,) = ask("planned_against_measured", done[1]).rows
     assert float(page.inner_text(".is-energy")) == pytest.approx(row["planned_J"], abs=0.6)
-    assert page.evaluate("document.documentElement.scrollWidth") == 400
+    assert page.evaluate("document.documentElement.scrollWidth") == 1440
+    assert faults(page) == []
+    assert narrow_and_dark(page) == []
     assert complaints == []

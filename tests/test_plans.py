@@ -341,3 +341,44 @@ def test_a_planned_motion_that_the_robot_cannot_make_stores_nothing(tmp_path: Pa
         workflow.run(write(tmp_path / "logs", [far, *others]), tmp_path / "workspace")
     with Workspace(tmp_path / "workspace") as place, place.reading() as session:
         assert session.scalars(select(schema.Run)).all() == []
+
+
+def test_a_slower_motion_says_what_it_saves(performed: Path) -> None:
+    said = irtwin("slow", "arm_2", "done", "--times", 1.5, "--workspace", performed)
+    assert said.status == 0, said.err
+    (row,) = asking.ask("slower_motions", performed)
+    assert (row["run"], row["plan"], row["times_longer"]) == ("done", "done_1.5_slower", 1.5)
+    assert row["lower_J"] < row["saving_J"] < row["upper_J"]
+    assert f"saves {row['saving_J']:.3g} +- " in said.out or f"takes {-row['saving_J']:.3g} +- " in said.out
+    energies = {
+        one["run"]: one
+        for one in asking.ask(
+            "SELECT ?run ?j ?s { ?any irt:Run_Name ?run ; irt:Run_Time ?s "
+            "OPTIONAL { ?any irt:Planned_Energy ?p } OPTIONAL { ?any irt:Modelled_Energy ?m } "
+            "BIND(COALESCE(?p, ?m) AS ?j) }",
+            performed,
+        )
+    }
+    quick, slower = energies["done"], energies["done_1.5_slower"]
+    assert slower["s"] == pytest.approx(1.5 * quick["s"], rel=1e-3)
+    twin = plans.robot_twin("arm_2", performed)
+    q = np.repeat([[1.0, -1.0]], 50, axis=0)  # where the motion ends
+    held = Motion(np.linspace(0, 1, 50), q, 0 * q, 0 * q, run="held")
+    waiting = float(np.mean(twin.power(held))) * (slower["s"] - quick["s"])
+    assert row["saving_J"] == pytest.approx(quick["j"] + waiting - slower["j"], abs=0.02 * quick["j"])
+    page = (performed / "reports" / "arm_2.html").read_text(encoding="utf-8")
+    assert ("Made 1.5 times longer, done would save" in page) is (row["lower_J"] > 0)
+
+
+@pytest.mark.parametrize(
+    ("run", "more", "message"),
+    [
+        ("swing_1", (), 'run "swing_1" does not begin and end at rest; cut it there'),
+        ("dome", (), 'the robot has no measured run "dome"; the nearest is "done"'),
+        ("done", ("--run", "reach"), 'the robot has a run "reach" already; choose another name'),
+    ],
+)
+def test_what_cannot_be_made_slower(performed: Path, run: str, more: tuple[str, ...], message: str) -> None:
+    said = irtwin("slow", "arm_2", run, "--times", 1.5, "--workspace", performed, *more)
+    assert said.status == 2
+    assert message in said.err

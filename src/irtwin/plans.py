@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 from irtwin import modelling
+from irtwin.errors import InputError
 from irtwin.modelling import Expectation
 from irtwin.planning.plan import Plan, Task
-from irtwin.providers.energy import stored_price
-from irtwin.providers.records import check_run_name, find_robot, keep_run, load_twin
+from irtwin.providers.energy import stored_price, stored_saving
+from irtwin.providers.records import (
+    check_run_name,
+    find_measured,
+    find_plan,
+    find_robot,
+    keep_run,
+    load_run,
+    load_twin,
+)
+from irtwin.providers.run_state import standstill
 from irtwin.signals.channels import Signals
+from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
-from irtwin.twin.price import Price
+from irtwin.twin.price import Figure, Price
 from irtwin.twin.twin import Twin
 from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, write_report
 
@@ -103,6 +114,47 @@ def predict(
     if out is not None:
         modelling.write_expectation(expected, out)
     return expected, kept
+
+
+def slow(
+    robot: str,
+    run: str,
+    times: float,
+    workspace: Path | str,
+    *,
+    name: str,
+    database: str | None = None,
+    graph_url: str | None = None,
+) -> tuple[Figure, Kept]:
+    """Make a measured run of a robot so many `times` slower, and keep it as a planned run called `name`.
+
+    Returns what it saves, J, against the run as it was with standing still after it. Raises InputError, and keeps
+    nothing, where there is no such run or name, the run does not begin and end at rest, or the twin knows no power.
+    """
+    place_of = Path(workspace)
+    with Workspace.existing(place_of, database) as place:
+        robot_id = find_robot(place, robot)
+        run_id = find_measured(place, robot_id, run).run_id
+
+    def make(twin: Twin) -> tuple[None, Run]:
+        if not twin.knows_power:
+            raise InputError(
+                f"{place_of}: the robot's twin has seen no power, so it cannot say what slower motions save"
+            )
+        with Workspace.existing(place_of, database) as place:
+            known = load_run(place, twin.robot, run_id)
+        motion = condition(known, twin.robot, twin.cutoff)
+        still = standstill(motion)
+        if not (still[0] and still[-1]):
+            raise InputError(f'{place_of}: run "{known.name}" does not begin and end at rest; cut it there')
+        time = (motion.time - motion.time[0]) * times
+        signals = Signals(time, motion.q, dq=motion.dq / times, ddq=motion.ddq / times**2)
+        made = _run(name, signals, known.payload_mass, known.payload_com)
+        return None, replace(made, time_scaling_of=known.name, time_scale=times)
+
+    _, kept = _keep(robot, name, make, place_of, database, graph_url)
+    with Workspace.existing(place_of, database) as place:
+        return stored_saving(place, find_plan(place, kept.robot, kept.run).run_id), kept
 
 
 def _keep(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from tests.bring.dialects import NAME, good, per_joint, robot, signals, write_text
 from tests.data_sets import irtwin
@@ -30,6 +32,8 @@ from irtwin.signals.log import (
     DataSet,
     read_data_set,
 )
+from irtwin.signals.sources import catalogue
+from irtwin.signals.sources.source import Source
 
 MEASURED = Path(__file__).parents[3] / "shared/data"
 STARTED = datetime(2026, 3, 2, 8, 0, 0, 250_000, tzinfo=UTC)
@@ -157,6 +161,30 @@ def test_a_bag_comes_back_to_the_last_bit(tmp_path: Path, form: str) -> None:
     said = irtwin("import", tmp_path / form, "--robot", NAME, "--power-at", "mains", "--out", tmp_path / "set")
     assert said.status == 0
     assert_same(read_data_set(tmp_path / "set"), "q dq torque power temperature", tolerance=0)
+
+
+class Numbers(Source):
+    """Samples of a package's own format: one NumPy archive."""
+
+    suffixes: ClassVar[tuple[str, ...]] = (".npz",)
+    counted: ClassVar[str] = "sample"
+
+    def columns(self) -> Sequence[str]:
+        with np.load(self.path) as kept:
+            return list(kept)
+
+    def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
+        with np.load(self.path) as kept:
+            return pa.table({name: kept[name] for name in columns}), ["read by a package"]
+
+
+def test_a_format_that_a_package_brings_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue, "_registered", lambda: (Numbers,))
+    np.savez(tmp_path / "run.npz", **good())
+    found = bring([tmp_path / "run.npz"], tmp_path / "set", NAME, MAINS)
+    assert found.forms[0].form == ".npz, by tests"
+    assert "read by a package" in found.said
+    assert_same(read_data_set(tmp_path / "set"))
 
 
 def recording_of_rtde(folder: Path, delimiter: str = " ") -> Path:

@@ -23,9 +23,14 @@ WITH_WORKSPACE = ("run", "query", "export", "live", "diagnose into workspace", "
 KEPT_AND_MOVED = ("run", "map", "explain", "export", "reason", "backup", "restore", "repair", "drop")
 ADOPTED = ("run", "diagnose into workspace", "adopt", "query")
 FOR_ROS = ("run", "export for ROS", "export MCAP", "export bag", "live replay")
+BROUGHT = ("import", "check of what was imported")
+TOLD = ("run", "live", "alarms", "alarms of the robot")
+OF_MANY = ("fleet diagnose", "fleet status", "fleet run", "fleet status of runs")
 BETTERED = ("run", "predict into workspace", "improve", "query")
-_LONG = (WITH_WORKSPACE, KEPT_AND_MOVED, ADOPTED, FOR_ROS, BETTERED)
-_SHORT = (BRIEF,) * 36 + (ALONE,) * 16 + (CHECKED,) * 8 + (MOTION,) * 4 + (PLANNED,) * 4 + (DESCRIBED,) * 4
+_LONG = (WITH_WORKSPACE, KEPT_AND_MOVED, ADOPTED, FOR_ROS, BETTERED, TOLD, OF_MANY)
+_SHORT = (
+    (BRIEF,) * 36 + (ALONE,) * 16 + (CHECKED,) * 8 + (MOTION,) * 4 + (PLANNED,) * 4 + (DESCRIBED,) * 4 + (BROUGHT,) * 8
+)
 _TRIED = (*_SHORT, IN_SYMBOLS, IN_SYMBOLS, *_LONG)
 
 

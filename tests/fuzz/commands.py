@@ -36,6 +36,9 @@ for _module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):  # here, once,
 SECONDS = 60  # of the processor, as others may share it
 _PATIENCE = 300  # s, for what waits and does nothing
 MEGABYTES = 2000  # beside what the libraries take
+_SET_ASIDE = 3  # exit status of a fleet that has refused a data set
+_TELLING = ("fleet", "import")
+_FAILED = re.compile(r"^failed +\d|\b[1-9]\d* failed\b", re.M)
 _EXCITING = 2.0  # s until Ctrl-C: the best motion so far is kept
 _STOPPED = 130  # exit status after Ctrl-C
 MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
@@ -98,10 +101,10 @@ def try_case(case: Case, tried: Counter[str] | None = None) -> Fault | None:
                 tried[f"{command}: {'refused' if done.status else 'answered'}"] += 1
             if patience is not None and done.status == _STOPPED:
                 continue  # before there was a motion to keep
-            kind = fault_of(done, writes, checks=command == "check")
+            kind = fault_of(done, writes, checks=command.startswith("check"), tells=command.startswith(_TELLING))
             if kind is not None:
                 return Fault(f"{place + 1}: {command}", f"{command}: {kind}", done.err[-6000:])
-            if done.status:
+            if done.status and done.status != _SET_ASIDE and "Written: " not in done.err:
                 break
     return None
 
@@ -153,6 +156,20 @@ def _arguments(case: Case, command: str, folder: Path) -> tuple[list[str] | None
             [out["taken.parquet"]],
         ),
         "improve": (["improve", _robot(folder), _again(run, folder), "--workspace", workspace], []),
+        "import": (
+            [
+                *("import", *sorted((data / "runs").iterdir()), "--robot", data / "robot.urdf"),
+                *("--power-at", "mains", "--out", folder / "brought"),
+            ],
+            [],
+        ),
+        "check of what was imported": (["check", folder / "brought"], []),
+        "alarms": (["alarms", "--workspace", workspace], []),
+        "alarms of the robot": (["alarms", "--robot", _robot(folder), "--workspace", workspace], []),
+        "fleet diagnose": (["fleet", "diagnose", _many(folder), "--workers", "1", "--out", folder / "fleet"], []),
+        "fleet run": (["fleet", "run", _many(folder), "--workers", "1", "--out", folder / "fleet_run"], []),
+        "fleet status": (["fleet", "status", folder / "fleet"], []),
+        "fleet status of runs": (["fleet", "status", folder / "fleet_run"], []),
         "run": (["run", data, "--workspace", workspace, "--repair"], []),
         "query": (["query", "energy_per_joint", "--workspace", workspace], []),
         "export": (["export", "--owl", out["all.owl"], "--workspace", workspace], [out["all.owl"]]),
@@ -191,6 +208,16 @@ def _robot(folder: Path) -> str:
     """Return the robot in the workspace."""
     pages = sorted((folder / "workspace" / "reports").glob("*.html"))
     return pages[0].stem if pages else "arm"
+
+
+def _many(folder: Path) -> Path:
+    """Return a list of data sets: the drawn one, and one that is none."""
+    bad = folder / "bad"
+    bad.mkdir(exist_ok=True)
+    (bad / "dataset.toml").write_text("[robot\n")
+    listed = folder / "sets.txt"
+    listed.write_text(f"{folder / 'data'}\n{bad}\n")
+    return listed
 
 
 def _again(run: Path, folder: Path) -> Path:
@@ -253,8 +280,11 @@ def _child(work: Callable[[], None], stdin: Path, out: Path, err: Path) -> None:
         os._exit(status)
 
 
-def fault_of(done: Done, writes: list[Path], *, checks: bool = False) -> str | None:
-    """Say what is wrong with how a command ended; None where nothing is. One that `checks` may say findings alone."""
+def fault_of(done: Done, writes: list[Path], *, checks: bool = False, tells: bool = False) -> str | None:
+    """Say what is wrong with how a command ended; None where nothing is.
+
+    One that `checks` may say findings alone; one that `tells` of several things may need as many lines.
+    """
     if done.status == -signal.SIGKILL:
         return f"hang of {SECONDS} s"
     if "Traceback (most recent call last)" in done.err:
@@ -263,7 +293,9 @@ def fault_of(done: Done, writes: list[Path], *, checks: bool = False) -> str | N
         return f"exit status {done.status}"
     if found := _WARNING.search(done.err):
         return re.sub(r"^.*/(src|site-packages)/", "", found[0])[:200]
-    if done.status:
+    if tells and _FAILED.search(done.out + done.err):
+        return "a data set failed that was neither done nor refused"
+    if done.status and not (tells and (done.status == _SET_ASIDE or "Written: " in done.err)):
         lines = [line for line in done.err.splitlines() if line.strip() and not _STEP.match(line)]
         if len(lines) != 1 and not (checks and not lines and _CURE.search(done.err)):
             return f"{len(lines)} lines of error"

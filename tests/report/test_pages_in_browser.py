@@ -12,6 +12,7 @@ from pyoxigraph import Literal, NamedNode, Quad
 from tests import gap_cases
 from tests.gap_pages import page_of as gap_page
 from tests.report.robots import PageOf, six_axis
+from tests.screens import faults, is_dark, narrow_and_dark
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
@@ -38,22 +39,6 @@ def opened(browser: Any, file: Path, width: int, scheme: str) -> Any:
     ).new_page()
     page.goto(file.as_uri())
     return page
-
-
-def faults(page: Any, *parts: str) -> list[tuple[str, list[Any]]]:
-    """Return what axe-core finds wrong, on the whole page or in parts of it."""
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    context = {"include": [[part] for part in parts]} if parts else None
-    found = axe.Axe().run(page, context=context).response["violations"]
-    return [(fault["id"], [node["target"] for node in fault["nodes"]]) for fault in found]
-
-
-def is_dark(page: Any) -> bool:
-    back, ink = (
-        [int(part) for part in page.evaluate(f"getComputedStyle(document.body).{of}").strip("rgb()").split(",")]
-        for of in ("backgroundColor", "color")
-    )
-    return sum(back) < sum(ink)
 
 
 @pytest.fixture
@@ -100,13 +85,19 @@ def test_the_gap_page(browser: Any, tmp_path: Path) -> None:
         page = opened(browser, file, width, scheme)
         page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
         assert is_dark(page) == (scheme == "dark")
+        assert page.evaluate("document.documentElement.scrollWidth") == width
         assert faults(page) == [], (width, scheme)
         page.context.close()
 
 
 def test_the_page_of_the_ontology(browser: Any, tmp_path: Path) -> None:
     write_page(tmp_path / "ontology.html")
-    page = opened(browser, tmp_path / "ontology.html", 400, "dark")
-    assert is_dark(page)
-    assert faults(page, "nav", ".tree", "article:nth-of-type(-n+5)") == []  # of a thousand terms
+    page = opened(browser, tmp_path / "ontology.html", 1440, "light")
+    assert not is_dark(page)
+    assert page.evaluate("document.documentElement.scrollWidth") == 1440
+    page.evaluate(
+        "document.querySelectorAll('article:nth-of-type(n+6)').forEach((one) => one.remove())"
+    )  # of a thousand
+    assert faults(page) == []
+    assert narrow_and_dark(page) == []
     page.context.close()

@@ -98,15 +98,27 @@ def test_a_plant_without_robots() -> None:
     assert not overview.sheet(overview.overview(answers, TARIFF), TARIFF).rows
 
 
-def test_a_hundred_robots(answers: Answers) -> None:
+def test_a_piece_and_a_cycle(answers: Answers) -> None:
+    said = text(drawn(answers, TARIFF))
+    assert "bracket Arm_A electrical, measured 40 75.0 J 15 133 J" in said.replace("\N{NO-BREAK SPACE}", " ")
+    assert "not named Arm_C mechanical, by the twin – – 4 100 J" in said.replace("\N{NO-BREAK SPACE}", " ")
+    rows = {row[0]: row[2:] for row in overview.made_sheet(answers).rows}
+    assert rows["Arm_A"] == ("bracket", "measured", 40, 75.0, 15, pytest.approx(2000 / 15))
+    assert rows["Arm_C"] == (None, "mechanical", None, None, 4, 100.0)
+
+
+def test_more_than_a_hundred_robots(answers: Answers) -> None:
     answers = {
-        name: replace(answer, rows=tuple(renamed(row, number) for number in range(25) for row in answer.rows))
+        name: replace(answer, rows=tuple(renamed(row, number) for number in range(30) for row in answer.rows))
         for name, answer in answers.items()
     }
     found = overview.overview(answers, TARIFF)
-    assert found.robots == sum(len(group.lines) for group in found.groups) == 100
-    assert found.electrical_j == 25 * 5900.0
-    assert drawn(answers, TARIFF).count('<th scope="row">') == 100
+    assert found.robots == sum(len(group.lines) for group in found.groups) == 120
+    assert found.electrical_j == 30 * 5900.0
+    html = drawn(answers, TARIFF)
+    assert html.count('class="state"') == 50 + 30 + 30  # the 60 that are measured take two pages
+    assert "Page 1 of 2; 60 robots." in html and '<a href="?page=2#measured">Next</a>' in html
+    assert len(overview.sheet(found, TARIFF).rows) == 120
 
 
 def renamed(row: Mapping[str, Any], number: int) -> dict[str, Any]:

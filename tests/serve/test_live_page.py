@@ -14,6 +14,7 @@ import httpx
 import pytest
 from tests import small_robots
 from tests.endpoint import Server, serving
+from tests.screens import faults, narrow_and_dark
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.workflow import run as run_all
@@ -126,6 +127,9 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     assert page.inner_text("#robots a") == "arm"
     page.click("#robots a")
     wait_for(lambda: page.inner_text("#name") == "arm")
+    wait_for(lambda: page.locator("#by-joint .bar").count() == 2)
+    assert faults(page) == []
+    assert narrow_and_dark(page) == []
     assert complaints == []
 
 

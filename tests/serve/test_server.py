@@ -144,7 +144,7 @@ def test_clients_that_hang_are_broken_off_in_one_line(new_graph: Callable[[], Pa
             client.close()
 
 
-PATHS = ("/", "/sparql", "/sparql?query=ASK{}", "/sparql?query=rubbish", "/irtwin", "/assets/page.js", "/nowhere")
+PATHS = ("/", "/sparql", "/sparql?query=ASK{}", "/sparql?query=rubbish", "/irtwin", "/assets/query.js", "/nowhere")
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -178,7 +178,7 @@ def test_its_own_names_do(server, host: str) -> None:
         "/assets/..%2f..%2fcli.py",
         "/assets/%2fetc%2fpasswd",
         "/assets//etc/passwd",
-        "/assets/page.js%00.css",
+        "/assets/query.js%00.css",
         "/assets/README.md",
         "/assets/",
         "/irtwin/../../etc/passwd",

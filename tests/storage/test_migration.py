@@ -11,22 +11,26 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from alembic.migration import MigrationContext
+from alembic.operations import Operations
 from sqlalchemy import inspect, text
 from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
+from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
-from irtwin.storage.revisions.versions import r0001_tables_of_0_1, r0002_base_of_individuals
+from irtwin.storage.revisions.versions import r0001_tables_of_0_1, r0002_base_of_individuals, r0003_made_and_slower
 from irtwin.storage.schema import Base
 
+BEFORE = migration.newest()
 # As a later irtwin would have it: runs have got the column `sample_rate_hz`.
-LATER = """
+LATER = f"""
 import os
 import sqlalchemy as sa
 from alembic import op
 
-revision, down_revision = "9000", NEWEST
+revision, down_revision = "{int(BEFORE) + 1:04}", "{BEFORE}"
 
 
 def upgrade():
@@ -58,14 +62,29 @@ def digest() -> str:
     return hashlib.sha256("\n".join(sorted(columns)).encode()).hexdigest()[:16]
 
 
-def older(place: Workspace) -> None:
-    """Make the tables those of the first revision, as far as later ones go, in a database that says no revision."""
+AFTER_0_1 = {  # columns that revisions have added
+    "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles"),
+    "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
+}
+
+
+def older(place: Workspace, *, of_0_1: bool = False) -> None:
+    """Make the tables those before LATER; `of_0_1`: those of irtwin 0.1, in a database that says no revision."""
     robot, joints, runs, series = data_set()
     place.ingest(robot, joints, runs, series)
-    with place.engine.begin() as connection:
-        connection.execute(text("DROP TABLE individuals"))
-        connection.execute(text("ALTER TABLE run DROP COLUMN sample_rate_hz"))
-        connection.execute(text("DROP TABLE alembic_version"))
+    recreate = "always" if place.engine.dialect.name == "sqlite" else "never"
+    with engines.writing(place.engine, restructuring=True) as session:
+        connection = session.connection()
+        operations = Operations(MigrationContext.configure(connection))
+        for table, gone in AFTER_0_1.items() if of_0_1 else {"run": ("sample_rate_hz",)}.items():
+            with operations.batch_alter_table(table, recreate=recreate) as of:
+                for column in gone:
+                    of.drop_column(column)
+        if of_0_1:
+            connection.execute(text("DROP TABLE individuals"))
+            connection.execute(text("DROP TABLE alembic_version"))
+        else:
+            connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": BEFORE})
 
 
 def columns(place: Workspace) -> set[str]:
@@ -76,8 +95,7 @@ def columns(place: Workspace) -> set[str]:
 def later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "revisions"
     shutil.copytree(migration.REVISIONS, folder, ignore=shutil.ignore_patterns("__pycache__"))
-    later = LATER.replace("NEWEST", repr(migration.newest()))
-    (folder / "versions" / "r9000_rates.py").write_text(later, encoding="utf-8")
+    (folder / "versions" / f"r{int(BEFORE) + 1:04}_rates.py").write_text(LATER, encoding="utf-8")
     monkeypatch.setattr(migration, "REVISIONS", folder)
     return folder
 
@@ -86,6 +104,10 @@ def test_the_newest_revision_is_of_these_tables() -> None:
     (file,) = (migration.REVISIONS / "versions").glob(f"r{migration.newest()}_*.py")
     module = import_module(f"{r0001_tables_of_0_1.__package__}.{file.stem}")
     assert digest() == module.TABLES, f"the tables changed: write a revision with TABLES = {digest()!r}"
+
+
+def test_each_revision_follows_another() -> None:
+    assert r0003_made_and_slower.down_revision == r0002_base_of_individuals.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -101,22 +123,36 @@ def test_an_older_workspace_is_migrated(
     with Workspace(tmp_path / "place", url) as place:
         older(place)
     with Workspace(tmp_path / "place", url) as place, place.engine.connect() as connection:
-        assert migration.revision(connection) == "9000"
+        assert migration.revision(connection) == migration.newest()
         assert set(connection.execute(text("SELECT sample_rate_hz FROM run")).scalars()) == {250.0}
         assert connection.execute(text("SELECT count(*) FROM series")).scalar()  # which refer to runs
         assert connection.execute(text("SELECT count(*) FROM run")).scalar() == len(data_set()[2])
-    assert (tmp_path / "place" / "irtwin.db.0001").is_file() is not on_server
+    assert (tmp_path / "place" / f"irtwin.db.{BEFORE}").is_file() is not on_server
+
+
+@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
+def test_a_workspace_of_0_1_gets_the_tables_of_now(
+    on_server: bool, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
+    with Workspace(tmp_path / "place", url) as place:
+        older(place, of_0_1=True)
+        assert "product" not in columns(place)
+    with Workspace(tmp_path / "place", url) as place, place.engine.connect() as connection:
+        assert migration.revision(connection) == migration.newest()
+        for table in Base.metadata.sorted_tables:
+            made = {column["name"]: column["nullable"] for column in inspect(connection).get_columns(table.name)}
+            assert made == {column.name: column.nullable for column in table.columns}, table.name
+        keys = {one["constrained_columns"][0] for one in inspect(connection).get_foreign_keys("run")}
+        assert keys == {"robot_id", "repeat_of", "performs", "time_scaling_of"}
+        assert connection.execute(text("SELECT count(*) FROM run")).scalar() == len(data_set()[2])
 
 
 def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:
     used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
     with Workspace(tmp_path) as place:
-        robot, joints, runs, series = data_set()
-        place.ingest(robot, joints, runs, series)
+        older(place, of_0_1=True)
         place.replace_activity(activity("a.1", "run_state", used), [used, "https://plant.example/x"], [])
-        with place.engine.begin() as connection:
-            connection.execute(text("DROP TABLE individuals"))
-            connection.execute(text("DROP TABLE alembic_version"))
     with Workspace(tmp_path) as place, place.engine.connect() as connection:
         assert connection.execute(text("SELECT subject FROM activity")).scalars().all() == ["run/Arm_A.fit_1"]
         found = connection.execute(text("SELECT entity FROM activity_use")).scalars()
@@ -130,7 +166,7 @@ def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Pa
         assert subprocess.run(command, env={**os.environ, "KILLED": "yes"}, check=False).returncode == 9
         assert "sample_rate_hz" not in columns(place)
         with place.engine.connect() as connection:
-            assert migration.revision(connection) is None
+            assert migration.revision(connection) == BEFORE
     with Workspace(tmp_path / "place") as place:
         assert "sample_rate_hz" in columns(place)
 

@@ -143,7 +143,7 @@ def test_the_graph_is_served(program: Path, away: Path) -> None:
             assert server.stdout is not None
             told = re.search(r"http://[\d.]+:\d+", server.stdout.readline())
             assert told is not None
-            for place in ("/", "/assets/yasgui.min.js", "/assets/meshcat.js", "/live", "/sparql"):
+            for place in ("/", "/assets/yasqe.min.js", "/assets/meshcat.js", "/live", "/sparql"):
                 with urllib.request.urlopen(told[0] + place, timeout=60) as answer:
                     assert answer.status == 200
         finally:

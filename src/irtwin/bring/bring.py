@@ -205,17 +205,18 @@ def _name(path: Path, taken: Mapping[Path, tuple[RunText, TakenRun]]) -> str:
     return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(files) + 3))) if one not in files)
 
 
-def found_in(folder: Path) -> tuple[str, ...]:
-    """Return what reading and checking say of a data set that was written."""
+def found_in(folder: Path) -> tuple[tuple[str, ...], bool]:
+    """Return what reading and checking say of a data set that was written, and whether it can be used as it is."""
     try:
         data_set = read_data_set(folder)
     except InputError as error:
-        return (f"to do: {error}",)
+        return (f"to do: {error}",), False
     lines = [f"note: {line}" for line in data_set.repairs]
-    for finding in check(data_set).findings:
+    checked = check(data_set)
+    for finding in checked.findings:
         state = "cure first" if finding.stops else "mended when it is read" if finding.mended else "to be looked at"
         lines.append(f"{finding.fault} ({state}): {finding.say}")
-    return tuple(dict.fromkeys(lines))
+    return tuple(dict.fromkeys(lines)), checked.sound
 
 
 def _check_place(out: Path) -> None:

@@ -121,6 +121,9 @@ def _run_lines(run: RunText) -> Iterator[str]:
         "repeat_of", "runs/OTHER.parquet", "the run of the same programmed motion: tells the noise floor", False
     )
     yield _line("performs", "NAME", "the planned run that it carried out", False)
+    yield _line("product", "bracket 12", "what the run made", False)
+    yield _line("pieces", 40, "how many of it: tells the energy of a piece", False)
+    yield _line("cycles", 40, "how often its programme ran: tells the energy of a cycle", False)
     if run.columns:
         yield "# Its columns were taken so:"
     for each in run.columns:

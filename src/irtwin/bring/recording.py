@@ -15,7 +15,7 @@ from irtwin.bring.head import MISSING
 from irtwin.errors import InputError
 from irtwin.input_file import check_file
 from irtwin.robot.description import Robot
-from irtwin.signals.sources.catalogue import source_of
+from irtwin.signals.sources.catalogue import registered, source_of
 from irtwin.signals.sources.source import MOST_COLUMNS, MOST_VALUES, first_line
 
 BAGS = (".bag", ".mcap", ".db3")
@@ -60,6 +60,8 @@ def read_recording(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recor
         return _bag(path, robot, topics)
     if suffix in SHEETS:
         return read_sheet(path)
+    if suffix in registered():
+        return _of_package(path, robot, topics)
     return _parquet(path) if suffix == ".parquet" else read_text(path)
 
 
@@ -153,6 +155,15 @@ def _parquet(path: Path) -> Recording:
         raise InputError(f"{path}: not a readable Parquet file ({first_line(error)}); export the log again") from error
     columns, texts = as_columns(path, table, ("row", 1))
     return Recording(path, "Parquet", columns, texts)
+
+
+def _of_package(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
+    """Read a file by the source that an installed package brought for it."""
+    source = source_of(path, robot, topics)
+    table, said = source.read(source.columns(), repair=False)
+    columns, texts = as_columns(path, table, (source.counted, source.first))
+    form = f"{path.suffix.lower()}, by {type(source).__module__.partition('.')[0]}"
+    return Recording(path, form, columns, texts, said=tuple(said), first=source.first, counted=source.counted)
 
 
 def _bag(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:

@@ -60,7 +60,8 @@ def import_(
 
     FILE is a ROS bag (1, 2, MCAP), a recording of RTDE by Universal Robots, a CSV file of PlotJuggler or of anybody, a
     Parquet or an Excel file. Units are told by names and by checks against other columns, and shown. What cannot be
-    told is asked on a terminal; elsewhere the command stops and says what to give.
+    told is asked on a terminal; elsewhere the command stops and says what to give. What was written is checked, as by
+    `irtwin check`: where something must be cured first, the exit status is 2.
     """
     from irtwin.bring.bring import Options, bring, found_in
 
@@ -71,8 +72,13 @@ def import_(
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)
-    for line in (*brought.said, *found_in(out)):
+    found, sound = found_in(out)
+    for line in (*brought.said, *found):
         say(f"irtwin: {line}")
+    if not sound:
+        say(f"Written: {out}, but it cannot be used yet. Cure what is said above, or import again into a new folder.")
+        say(f"Then: irtwin check {out}")
+        sys.exit(2)
     say(f"Written: {out}. Read its dataset.toml; then: irtwin run {out}")
 
 

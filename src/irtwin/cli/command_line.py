@@ -65,7 +65,7 @@ def cli() -> None:
 for command in (
     *(bring.init, bring.import_),
     *(twin.check, twin.run, twin.demo, twin.case_study, twin.diagnose, twin.adopt, twin.improve),
-    *(motion.plan, motion.predict, motion.excite),
+    *(motion.plan, motion.predict, motion.slow, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
     *(service.serve, service.live, alarms.alarms),
     *(upkeep.status, upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),

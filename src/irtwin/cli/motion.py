@@ -19,6 +19,7 @@ from irtwin.cli.options import (
     payload_mass_option,
     say,
     speech,
+    workspace_option,
 )
 from irtwin.errors import InputError
 
@@ -177,6 +178,40 @@ def predict(
         )  # fmt: skip
     _say_unchecked(expected.checks_itself)
     click.echo(f"{_where(out, kept)}: {(kept or expected).price or _NO_POWER}")
+
+
+@click.command()
+@click.argument("robot")
+@click.argument("run")
+@click.option(
+    "--times",
+    type=Number(1.0, 10.0, min_open=True),
+    required=True,
+    help="How many times longer the motion is to take: 1.25 is four fifths of its speed.",
+)
+@workspace_option
+@click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_TIMES_slower.")
+@database_option
+@graph_option
+def slow(
+    robot: str, run: str, times: float, workspace: Path, name: str | None, database: str | None, graph_url: str | None
+) -> None:
+    """Say what a run of a robot would save if it were slower, by the robot's twin.
+
+    The motion keeps its way and takes longer. What it takes is held against the motion as it was, with waiting after it
+    until the slower one is done: where a robot waits anyway, that is what slowing down saves. It is kept as a planned
+    run, and the robot's report says it.
+    """
+    from irtwin import plans
+
+    saved, kept = plans.slow(
+        robot, run, times, workspace, name=name or f"{run}_{times:g}_slower", database=database, graph_url=graph_url
+    )
+    by = "" if saved.half_width is None else f" +- {saved.half_width:.2g}"
+    said = f"saves {saved.value:.3g}{by} J" if saved.value >= 0 else f"takes {-saved.value:.3g}{by} J more"
+    click.echo(
+        f"{_where(None, kept)}: {said} than {run} with waiting after it; +- 95 % interval of the twin's parameters"
+    )
 
 
 @click.command()

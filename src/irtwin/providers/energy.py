@@ -19,7 +19,7 @@ from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import LIVE_RUN, PLANNED_RUN
-from irtwin.twin.price import Figure, Price, cost
+from irtwin.twin.price import Figure, Price, cost, saving
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate
 
@@ -69,6 +69,9 @@ def provide(workspace: Workspace, run_id: str) -> Made:
 def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twin: Twin) -> Made:
     motion = condition(load_run(workspace, twin.robot, run_id), twin.robot, twin.cutoff)
     taken = cost(twin, [motion])
+    with workspace.reading() as session:
+        scaled = session.get_one(schema.Run, run_id).time_scaling_of
+    saved = None if scaled is None else _saving(workspace, scaled, twin, motion)
     row = schema.RunPrice(
         run_id=run_id,
         twin_id=twin_id,
@@ -76,14 +79,36 @@ def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twi
         **_figure("energy", "j", taken.energy),
         **_figure("mean_power", "w", taken.mean),
         **_figure("peak_power", "w", taken.peak),
+        **({} if saved is None else _figure("saving", "j", saved)),
     )
     nothing = np.zeros(len(motion.time), dtype=bool)
     return Made(
         robot_id=robot_id,
-        used=[*inputs(workspace, robot_id, [run_id]), twin_iri(twin_id)],
+        used=[*inputs(workspace, robot_id, [run_id, *([] if scaled is None else [scaled])]), twin_iri(twin_id)],
         rows=[row],
         series={run_id: modelled_series(twin, motion, nothing)},
     )
+
+
+def _saving(workspace: Workspace, scaled: str, twin: Twin, motion: Motion) -> Figure | None:
+    """Return what a time scaling of a run saves against the run as it was, and standing still until the scaling ends.
+
+    None where the twin knows nothing of power.
+    """
+    if not twin.knows_power:
+        return None
+    quick = condition(load_run(workspace, twin.robot, scaled), twin.robot, twin.cutoff)
+    return saving(twin, motion, [quick, standing(quick, float(motion.time[-1] - motion.time[0]))])
+
+
+def standing(motion: Motion, until: float) -> Motion:
+    """Return standing still where a motion ends, from then until so many s after it began."""
+    step = float(np.median(np.diff(motion.time)))
+    first, last = float(motion.time[-1]), float(motion.time[0]) + until
+    time = np.linspace(first, last, max(2, round((last - first) / step) + 1))
+    q = np.repeat(motion.q[-1:], len(time), axis=0)
+    rest = np.zeros_like(q)
+    return Motion(time, q, rest, rest, run=motion.run, payload_mass=motion.payload_mass, payload_com=motion.payload_com)
 
 
 def _figure(name: str, unit: str, figure: Figure) -> dict[str, float | None]:
@@ -110,6 +135,14 @@ def stored_price(workspace: Workspace, run_id: str) -> Price | None:
         peak=figure(row.peak_power_w, row.peak_power_upper_w),
         mean=figure(row.mean_power_w, row.mean_power_upper_w),
     )
+
+
+def stored_saving(workspace: Workspace, run_id: str) -> Figure:
+    """Return what a time scaling saves, J, as it was stored."""
+    with workspace.reading() as session:
+        row = session.get_one(schema.RunPrice, run_id)
+    assert row.saving_j is not None
+    return Figure(row.saving_j, None if row.saving_upper_j is None else row.saving_upper_j - row.saving_j)
 
 
 def held_out(role: schema.TwinRun, motion: Motion) -> np.ndarray:

@@ -161,6 +161,11 @@ def find_plan(workspace: Workspace, robot_id: str, name: str) -> Run:
     return _run_of(workspace, name, "planned run", Run.robot_id == robot_id, Run.kind == PLANNED_RUN)
 
 
+def find_measured(workspace: Workspace, robot_id: str, name: str) -> Run:
+    """Return a robot's measured run by its name. Raises InputError, with the nearest name, where there is none."""
+    return _run_of(workspace, name, "measured run", Run.robot_id == robot_id, Run.kind == MEASURED_RUN)
+
+
 def _run_of(workspace: Workspace, name: str, what: str, *where: ColumnElement[bool]) -> Run:
     with workspace.reading() as session:
         known = {row.name: row for row in session.scalars(select(Run).where(*where))}
@@ -386,6 +391,11 @@ def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = N
         payload_com_z_m=z,
         repeat_of=None if run.repeat_of is None else f"{robot_id}.{identifier(run.repeat_of)}",
         performs=None if run.performs is None else f"{robot_id}.{identifier(run.performs)}",
+        time_scaling_of=None if run.time_scaling_of is None else f"{robot_id}.{identifier(run.time_scaling_of)}",
+        time_scale=run.time_scale,
+        product=run.product,
+        pieces=run.pieces,
+        cycles=run.cycles,
         start_time=None if planned else run.started or now,
         start_time_from=None if planned else "log" if run.started else "ingest",
         run_time_s=duration,

@@ -1,4 +1,4 @@
-"""The query page: the project's own few files around a packed YASGUI, all served from here."""
+"""The query page: the project's own few files around YASGUI's editor, all served from here."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from starlette.responses import Response
 
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import prefixes
+from irtwin.report.energy.page import plotly
+from irtwin.report.heading import UNITS, WORDS
 from irtwin.report.plant.page import style as plant_style
 from irtwin.resources import Resources
 from irtwin.serve.protocol import Refusal
@@ -25,20 +27,24 @@ POLICY = (
 )
 FOLDER = Path(__file__).parent / "assets"
 _TYPES = {
+    "answer.js": "text/javascript",
     "live.css": "text/css",
     "live.js": "text/javascript",
     "live_list.js": "text/javascript",
     "meshcat.js": "text/javascript",
-    "page.css": "text/css",
     "plant.css": "text/css",
+    "plot.js": "text/javascript",
+    "plotly.js": "text/javascript",
+    "query.css": "text/css",
+    "query.js": "text/javascript",
     "robot.js": "text/javascript",
-    "page.js": "text/javascript",
-    "yasgui.min.css": "text/css",
-    "yasgui.min.js": "text/javascript",
+    "yasqe.min.css": "text/css",
+    "yasqe.min.js": "text/javascript",
 }
 _MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
     "meshcat.js": viewer_script,
     "plant.css": plant_style,
+    "plotly.js": plotly,
     "robot.js": partial(scene_asset, "robot.js"),
 }
 
@@ -46,7 +52,7 @@ _MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
 def response() -> Response:
     """Return the page."""
     headers = {"Content-Security-Policy": POLICY, "Vary": "Accept"}
-    return Response((FOLDER / "page.html").read_bytes(), media_type="text/html", headers=headers)
+    return Response((FOLDER / "query.html").read_bytes(), media_type="text/html", headers=headers)
 
 
 def asset(request: Request) -> Response:
@@ -62,9 +68,10 @@ def asset(request: Request) -> Response:
 
 
 def questions(resources: Resources, base: str, request: Request) -> Response:
-    """Return the named questions and the prefixes that they use."""
+    """Return the named questions, the prefixes that they use, and what headings are made of."""
     known = [{"title": q.title, "question": q.question, "text": q.text} for q in named_questions(resources).values()]
-    return Response(json.dumps({"prefixes": prefixes(base), "questions": known}), media_type="application/json")
+    said = {"prefixes": prefixes(base), "questions": known, "headings": {"units": UNITS, "words": WORDS}}
+    return Response(json.dumps(said), media_type="application/json")
 
 
 @cache

@@ -14,6 +14,7 @@ from starlette.routing import Route
 
 from irtwin.errors import InputError
 from irtwin.report.plant import comparison, links, overview, page, robot, sheet
+from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.plant.tariff import Tariff, read_tariff
 from irtwin.report.questions import Answers, Question
@@ -43,6 +44,7 @@ class PlantPages:
             "/run/{name}": self._run,
             "/compare": self._compare,
             "/tables/robots.{form}": self._robots_table,
+            "/tables/made.{form}": self._made_table,
             "/tables/runs.{form}": self._runs_table,
             "/tables/ledger.{form}": self._ledger_table,
             "/tables/comparison.{form}": self._comparison_table,
@@ -51,7 +53,7 @@ class PlantPages:
 
     async def _plant(self, request: Request) -> Response:
         answers = await self._asking.answers(request, page.questions(), {})
-        said = self._beside()
+        said = {**self._beside(), "number": page_number(request.query_params.get("page"))}
 
         def drawn() -> str:
             found = overview.overview(answers, said["tariff"])
@@ -63,6 +65,7 @@ class PlantPages:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
         said = {**self._beside(), "report": self._reports.of_robot(self._links.tail(iri))}
+        said["number"] = page_number(request.query_params.get("page"))
         return await html(
             lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **robot.of_robot(answers), **said)
         )
@@ -93,9 +96,13 @@ class PlantPages:
         tariff = self._beside()["tariff"]
         return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff), tariff))
 
+    async def _made_table(self, request: Request) -> Response:
+        answers = await self._asking.answers(request, {"made": page.questions()["made"]}, {})
+        return await table(request, "made", lambda: overview.made_sheet(answers))
+
     async def _runs_table(self, request: Request) -> Response:
         iri = self._individual("robot", request.query_params.get("of", ""))
-        asked = {name: page.questions("robot")[name] for name in ("robot", "runs")}
+        asked = {"robot": page.questions("robot")["robot"], "runs": robot.all_runs()}
         answers = await self._known(request, asked, {"robot": iri}, "robot")
         return await table(request, "runs", lambda: robot.runs_sheet(answers))
 

@@ -31,8 +31,11 @@ ROBOT_KEYS = (
     "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
     "arm_movement_type", "simulated", "torque_scale_uncertainty", "joint",
 )  # fmt: skip
-RUN_KEYS = ("file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started")
+RUN_KEYS = (
+    "file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started", "product", "pieces", "cycles",
+)  # fmt: skip
 TWIN_KEYS = ("effects",)
+_MOST_MADE = 10**9
 _EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
 
 
@@ -51,6 +54,11 @@ class Run:
     notes: Mapping[str, Any]
     signals: Signals = field(repr=False)
     performs: str | None = None  # name of the planned run that it carried out, here or in the workspace
+    time_scaling_of: str | None = None  # name of the measured run that a plan is, made slower
+    time_scale: float | None = None  # how many times longer the plan takes
+    product: str | None = None  # what it made
+    pieces: int | None = None  # how many of them
+    cycles: int | None = None  # how often its programme ran
 
 
 @dataclass(frozen=True)
@@ -298,8 +306,33 @@ def _runs(
             started=None if role == PLANNED else _started(table),
             notes={key: value for key, value in table.values.items() if key not in ("file", "role")},
             signals=signals,
+            **_made(table, role),
         )
+        if len(pieces) > 1 and (run.pieces or run.cycles):
+            run = replace(run, pieces=None, cycles=None)
+            repairs.append(
+                f"{file}: {table.name} pieces and cycles are left out: the run is cut at holes in time, and nothing "
+                "says what was made in which part"
+            )
         yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
+
+
+def _made(table: Table, role: str) -> dict[str, Any]:
+    """Return what a run made. Raises InputError where a number is none of whole things, or the run is a plan."""
+    made: dict[str, Any] = {"product": table.text("product")}
+    for key in ("pieces", "cycles"):
+        count = table.values.get(key)
+        if count is not None and (
+            isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= _MOST_MADE
+        ):
+            raise InputError(
+                f"{table.file}: {table.name} {key} should be a whole number of 1 or more, not {shown(count)}"
+            )
+        made[key] = count
+    said = [key for key, value in made.items() if value is not None]
+    if said and role == PLANNED:
+        raise InputError(f"{table.file}: {table.name} is planned; {said[0]} is of a run that was carried out")
+    return made
 
 
 def _torque_scale(table: Table) -> float | None:

@@ -169,15 +169,16 @@ def drop_run(session: Session, run_id: str, subject: str) -> None:
 
 
 def release_plans(session: Session, robot_id: str) -> None:
-    """Let runs of a robot that carried out a plan which is gone say no plan."""
+    """Let runs of a robot that carried out a plan which is gone say no plan, and slower plans no run that is gone."""
     there = aliased(Run)
-    gone = ~exists().where(there.run_id == Run.performs)
-    session.execute(
-        update(Run)
-        .where(Run.robot_id == robot_id, Run.performs.is_not(None), gone)
-        .values(performs=None)
-        .execution_options(synchronize_session=False)
-    )
+    for said, also in ((Run.performs, {}), (Run.time_scaling_of, {Run.time_scale: None})):
+        gone = ~exists().where(there.run_id == said)
+        session.execute(
+            update(Run)
+            .where(Run.robot_id == robot_id, said.is_not(None), gone)
+            .values({said: None, **also})
+            .execution_options(synchronize_session=False)
+        )
 
 
 def _drop_parts(session: Session, robot_id: str) -> None:

@@ -133,6 +133,13 @@ class Run(Base):
     performs: Mapped[str | None] = mapped_column(  # the planned run that it carried out
         ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
     )
+    time_scaling_of: Mapped[str | None] = mapped_column(  # the measured run that a plan is, made slower
+        ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
+    )
+    time_scale: Mapped[float | None]  # how many times longer the plan takes
+    product: Mapped[str | None]  # what it made, as the data set says
+    pieces: Mapped[int | None]  # how many of them
+    cycles: Mapped[int | None]  # how often its programme ran
     start_time: Mapped[datetime | None]  # the log's `started`, else when it was taken in; a plan has none
     start_time_from: Mapped[str | None]  # "log" or "ingest"
     run_time_s: Mapped[float]
@@ -380,6 +387,9 @@ class RunPrice(Base):
     peak_power_w: Mapped[float]
     peak_power_lower_w: Mapped[float | None]
     peak_power_upper_w: Mapped[float | None]
+    saving_j: Mapped[float | None]  # of a time scaling, against the motion as it was with waiting after it
+    saving_lower_j: Mapped[float | None]
+    saving_upper_j: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

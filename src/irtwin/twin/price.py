@@ -73,6 +73,21 @@ def cost(twin: Twin, motions: Sequence[Motion]) -> Price:
     return Price(seconds, Figure(total, widths[0]), Figure(float(powers[highest][most]), widths[1]), mean)
 
 
+def saving(twin: Twin, motion: Motion, instead: Sequence[Motion]) -> Figure:
+    """Return the electrical energy, J, that a motion saves where it takes the place of others; negative if it costs.
+
+    The interval is that of the difference: what is unsure in both alike, as the standby power, drops out.
+    """
+    less = [energy(one.time, twin.power(one)) for one in instead]
+    saved = sum(less) - energy(motion.time, twin.power(motion))
+    if twin.covariance is None:
+        return Figure(saved, None)
+    slope = -_slope(twin, motion, _weights(motion.time))
+    for one in instead:
+        slope = slope + _slope(twin, one, _weights(one.time))
+    return Figure(saved, _half_width(twin, slope))
+
+
 def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
     """Return the slope of the weighted (N,) sum of power over each of the twin's p parameters, (p,)."""
     stack = twin.stack

@@ -84,6 +84,40 @@ def could_save(answers: Answers) -> str | None:
     )
 
 
+def slower(answers: Answers) -> str | None:
+    """Return in words what the slower motion that saves most would save; None where none is known to save."""
+    rows = [row for row in answers["slower"].rows if 0 < row["lower_j"] <= row["upper_j"]]
+    if not rows:
+        return None
+    row = max(rows, key=lambda row: float(row["saving_j"]))
+    size, unit = wording.energy_unit([row["saving_j"]])
+    value, interval = wording.interval(row["saving_j"] / size, row["lower_j"] / size, row["upper_j"] / size)
+    share = row["saving_j"] / row["modelled_j"] if row["modelled_j"] else None
+    of_it = "" if share is None else f", {wording.part(share)} of what it takes"
+    return (
+        f"Made {wording.given(row['times'])} times longer, {row['run_name']} would save {value} {unit} each time "
+        f"(95 % interval {interval.replace(' … ', ' to ')} {unit}){of_it}, where the robot waits after it anyway."
+    )
+
+
+def made(answers: Answers) -> list[str]:
+    """Return in words what a piece of each product took, and a cycle; electrical and mechanical energy apart."""
+    said = []
+    for row in answers["made"].rows:
+        what = {"measured": "measured", "modelled": "by the twin"}.get(
+            row["energy_from"], "of mechanical work, by the twin"
+        )
+        product = row["product"]
+        for one, many, joules in (("piece", row["pieces"], row["pieces_j"]), ("cycle", row["cycles"], row["cycles_j"])):
+            if many:
+                each = product if product and one == "piece" else f"{one} of {product}" if product else one
+                said.append(
+                    f"Each {each} took {wording.energy(joules / many)}, {what}: the mean of {wording.decimals(many)} "
+                    f"{one}{'s' * (many != 1)}, waiting within the runs included."
+                )
+    return said
+
+
 def trust(answers: Answers) -> str:
     """Return how far the twin can be trusted, beside a constant power."""
     said = verdict.sentence(answers)

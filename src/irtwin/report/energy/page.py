@@ -20,6 +20,7 @@ from irtwin.report import colours, wording
 from irtwin.report.energy import lead, tables, verdict
 from irtwin.report.energy.figures import Figure, figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
+from irtwin.report.heading import heading
 from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
 from irtwin.resources import Resources, folder, shipped
 from irtwin.storage.files import write
@@ -81,6 +82,8 @@ def _page(
         taken=lead.taken(answers),
         could_save=lead.could_save(answers),
         saving=lead.saving(answers),
+        slower=lead.slower(answers),
+        made=lead.made(answers),
         trust=lead.trust(answers),
         constant=lead.constant_power(answers),
         torque=verdict.torque(answers),
@@ -171,7 +174,7 @@ def environment(resources: Resources) -> jinja2.Environment:
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
         wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
         wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
-        wording.shown, wording.kilowatt_hours, tables.is_unsure,
+        wording.shown, wording.kilowatt_hours, tables.is_unsure, heading,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment

@@ -128,6 +128,21 @@ def sheet(found: Overview, tariff: Tariff) -> Sheet:
     return Sheet(tuple(columns), rows)
 
 
+def made_sheet(answers: Answers) -> Sheet:
+    """Return what pieces and cycles took, a row for each robot, product and kind of energy."""
+    columns = ("robot", "iri", "product", "energy_from", "pieces", "energy_per_piece_J", "cycles", "energy_per_cycle_J")
+    return Sheet(
+        columns,
+        [
+            (
+                row["name"], row["robot"], row["product"], row["energy_from"], row["pieces"] or None,
+                share(row["pieces_j"], row["pieces"]), row["cycles"] or None, share(row["cycles_j"], row["cycles"]),
+            )
+            for row in answers["made"].rows
+        ],
+    )  # fmt: skip
+
+
 def _groups(answers: Answers, tariff: Tariff) -> list[Group]:
     known: dict[str, list[Row]] = {}
     for row in answers["energy"].rows:

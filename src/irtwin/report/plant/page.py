@@ -11,7 +11,7 @@ import jinja2
 from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.energy.page import environment
-from irtwin.report.plant import links
+from irtwin.report.plant import links, paging
 from irtwin.report.plant.tariff import JOULES
 from irtwin.report.questions import Answers, Question, read_questions
 
@@ -36,7 +36,7 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
     """Return a page; `answers` and `bindings` are shown as the questions behind it, links are those of `base`."""
     template = _templates(said.get("base", ID)).get_template(f"plant/{name}")
     rows = {question: answer.rows for question, answer in answers.items()}
-    return template.render(answers=answers, rows=rows, bindings=bindings, **said)
+    return template.render(answers=answers, rows=rows, bindings=bindings, **{"number": 1, **said})
 
 
 @cache
@@ -46,6 +46,7 @@ def _templates(base: str) -> jinja2.Environment:
     templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates.filters |= {
         "page_of": of.page_of, "individual": of.individual, "tail": of.tail, "kwh": _kwh, "spaced": _spaced,
+         "pages": paging.pages, "on_page": paging.on_page,
     }  # fmt: skip
     return templates
 

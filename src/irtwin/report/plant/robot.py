@@ -12,8 +12,8 @@ from irtwin.report.plant.overview import PLANT_TREND, states
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Question, Row
 
-MOST_RUNS = 200  # that a page shows
-_OF_THE_PLANT = ("energy", "days", "standstill", "live")  # its questions, asked of one robot
+MOST_RUNS = 5000  # that runs.rq answers
+_OF_THE_PLANT = ("energy", "days", "standstill", "live", "made")  # its questions, asked of one robot
 _RUNS = {  # columns of a table by what the question calls them
     "name": "run", "run": "iri", "began": "began_UTC", "time_s": "time_s", "payload_kg": "payload_kg",
     "energy_from": "energy_from", "energy_j": "energy_J", "power_w": "mean_power_W", "peak_w": "peak_power_W",
@@ -27,6 +27,12 @@ def questions() -> Mapping[str, Question]:
     """Return the questions of a robot's page."""
     of_the_plant = page.questions()
     return {**page.questions("robot"), **{name: replace(of_the_plant[name], bind=("robot",)) for name in _OF_THE_PLANT}}
+
+
+def all_runs() -> Question:
+    """Return the question of a robot's runs without the bound that its page has."""
+    runs = page.questions("robot")["runs"]
+    return replace(runs, text=runs.text.removesuffix(f"LIMIT {MOST_RUNS}"))
 
 
 def of_robot(answers: Answers) -> dict[str, Any]:

@@ -43,7 +43,8 @@
 
   // ---- the curve
 
-  const canvas = find("curve"), pen = canvas.getContext("2d");
+  const canvas = find("curve"), pen = canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
+  const colour = (name) => style.getPropertyValue("--" + name);
   let scale = { low: 0, high: 100 };
 
   function round(value) {
@@ -65,8 +66,8 @@
     const left = 46, bottom = height - 18, top = 8, end = newest ? newest.time : 0;
     const x = (time) => left + ((time - end + SHOWN) / SHOWN) * (width - left - 8), y = (value) => bottom - ((value - scale.low) / (scale.high - scale.low)) * (bottom - top);
     pen.font = "11px system-ui, sans-serif";
-    pen.fillStyle = "#56636f";
-    pen.strokeStyle = "#e3e8ec";
+    pen.fillStyle = colour("quiet");
+    pen.strokeStyle = colour("line");
     pen.lineWidth = 1;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
@@ -81,8 +82,8 @@
     pen.textBaseline = "alphabetic";
     for (let back = 0; back <= SHOWN; back += 10) pen.fillText(back ? "−" + back + " s" : "now", Math.min(x(end - back), width - 20), height - 4);
     pen.lineWidth = 1.5;
-    [[measured, "#1c2733"], [modelled, "#d55e00"]].forEach(([curve, colour]) => {
-      pen.strokeStyle = colour;
+    [[measured, "ink"], [modelled, "warm"]].forEach(([curve, name]) => {
+      pen.strokeStyle = colour(name);
       pen.beginPath();
       let before = null;
       curve.time.forEach((time, i) => {
@@ -239,6 +240,7 @@
     setTimeout(poll, 1000);
   }
 
+  for (const place of ["by-joint", "by-effect", "gaps"]) bars(place, []);
   const events = new EventSource(here + "/events");
   events.onmessage = take;
   build().catch((error) => { find("drawing").textContent = error.message; });

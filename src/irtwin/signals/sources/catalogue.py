@@ -47,6 +47,11 @@ def sources() -> dict[str, type[Source]]:
     return found
 
 
+def registered() -> set[str]:
+    """Return the ends of files that installed packages read."""
+    return {suffix for kind in _registered() for suffix in kind.suffixes}
+
+
 @cache
 def _registered() -> tuple[type[Source], ...]:
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)

@@ -5,7 +5,7 @@ from alembic import op
 
 revision = "0002"
 down_revision = "0001"
-TABLES = "b56375b28e013b82"  # of all columns, see tests/storage/test_migration.py
+TABLES = "b56375b28e013b82"
 BASE = "https://w3id.org/irtwin/id/"
 
 

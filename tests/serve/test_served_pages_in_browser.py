@@ -1,13 +1,18 @@
-"""The plant's pages in headless Chromium: wide and narrow, by keyboard, and fetching nothing from elsewhere."""
+"""What is served, in headless Chromium: wide and narrow, light and dark, by keyboard, and nothing fetched elsewhere."""
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterator
 from typing import Any
 
+import httpx
 import pytest
 from tests.endpoint import Server
+from tests.screens import faults, is_dark, narrow_and_dark
+
+from irtwin.report.heading import heading
 
 pytestmark = pytest.mark.system
 
@@ -18,8 +23,9 @@ ARGUMENTS = [
 ]  # fmt: skip
 PAGES = (
     "/", "/robot/Arm_A", "/robot/Arm_D", "/run/Arm_A.fit_1", "/compare?robot=Arm_A&a_to=2026-03-02&b_from=2026-03-03",
-    "/irtwin/id/run/Arm_A.fit_1",
+    "/irtwin/id/run/Arm_A.fit_1", "/query", "/live",
 )  # fmt: skip
+READY = {"/query": "#questions button", "/live": "#robots tr, #none:visible"}
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +53,75 @@ def page(browser: Any, plant: Server) -> Iterator[tuple[Any, list[str]]]:
     page.close()
 
 
-@pytest.mark.parametrize("width", [1440, 400])
-def test_no_page_is_wider_than_its_window(page: tuple[Any, list[str]], plant: Server, width: int) -> None:
+@pytest.mark.parametrize("path", PAGES)
+def test_each_page_wide_and_narrow_light_and_dark(page: tuple[Any, list[str]], plant: Server, path: str) -> None:
     page, complaints = page
-    page.set_viewport_size({"width": width, "height": 900})
-    for path in PAGES:
-        page.goto(plant.url + path)
-        assert page.evaluate("document.documentElement.scrollWidth") == width, path
-        assert page.locator("main h1").bounding_box()["x"] >= 0
+    page.goto(plant.url + path)
+    page.wait_for_selector(READY.get(path, "main h1"))
+    assert not is_dark(page)
+    assert page.evaluate("document.documentElement.scrollWidth") == 1440
+    assert faults(page) == []
+    assert narrow_and_dark(page) == []
     assert complaints == []
+
+
+def test_a_question_is_answered_under_headings_with_units_and_plotted(
+    page: tuple[Any, list[str]], plant: Server
+) -> None:
+    page, complaints = page
+    page.goto(f"{plant.url}/query")
+    page.wait_for_selector("#questions button")
+    said = httpx.get(f"{plant.url}/questions.json").json()
+    assert page.locator("#questions button").count() == len(said["questions"])
+    page.fill("#filter", "how much energy did each run take")
+    assert page.locator("#questions li:visible").count() == 1
+    page.click("#questions li:visible button")
+    page.wait_for_selector("#answer table td")
+    assert "PREFIX irt: <https://w3id.org/irtwin#>" in page.inner_text(".CodeMirror-code")
+    assert page.inner_text("#said").startswith("7 rows, in ")
+    assert page.locator("#answer thead th").all_text_contents()[4:6] == ["Energy, J", "Mean power, W"]
+    page.click("#answer summary >> text=Plot")
+    page.wait_for_selector("#answer .plot .barlayer .point")
+    assert page.locator("#answer .legendtext").all_text_contents() == ["Arm_A", "Arm_B", "Arm_C"]
+    assert page.locator("#answer .xtitle, #answer .ytitle").all_text_contents() == ["Run", "Energy, J"]
+    page.locator("#answer label", has_text="over").locator("select").select_option("payload_kg")
+    page.wait_for_selector("#answer .plot .scatterlayer .point")
+    assert page.locator("#answer .modebar-btn").first.get_attribute("data-title") == "Download plot as a PNG"
+    assert faults(page) == []
+    assert narrow_and_dark(page) == []
+    with page.expect_download() as file:
+        page.click("#answer button >> text=CSV")
+    assert file.value.path().read_text().startswith("robot,run,time_s,")
+    names = sorted({name for one in said["questions"] for name in re.findall(r"\?(\w+)", one["text"])})
+    here = page.evaluate(
+        "([names, tables]) => names.map((name) => irtwinAnswer.headingOf(name, tables))", [names, said["headings"]]
+    )
+    assert here == [heading(name) for name in names]
+    assert complaints == []
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("ASK {}", "Yes, in "),
+        ("SELECT ?x { ?x a irt:Nothing }", "No row fits, in "),
+        ("CONSTRUCT { irt:a irt:b irt:c } {}", "Triples, in "),
+        ("SELECT nothing", "not a SPARQL query: error at 1:"),
+        ("SELECT ?x ?who_J { VALUES (?x ?who_J) { (1 'a<b>') (irt:Robot true) } }", "2 rows, in "),
+    ],
+)
+def test_whatever_is_asked(page: tuple[Any, list[str]], plant: Server, query: str, said: str) -> None:
+    page, complaints = page
+    page.goto(f"{plant.url}/query")
+    page.wait_for_selector("#questions button")
+    page.evaluate("text => document.querySelector('.CodeMirror').CodeMirror.setValue(text)", query)
+    page.focus(".CodeMirror textarea")
+    page.keyboard.press("Control+Enter")
+    page.wait_for_selector(f"#said >> text={said}")
+    assert all("400 (Bad Request)" in complaint for complaint in complaints)
+    page.focus(".CodeMirror textarea")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "run"
 
 
 def test_a_long_name_of_a_file_is_broken(page: tuple[Any, list[str]], plant: Server) -> None:
@@ -101,16 +167,6 @@ def test_by_keyboard(page: tuple[Any, list[str]], plant: Server) -> None:
     page.keyboard.press("Enter")
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.closest('main') !== null")
-
-
-def test_in_the_dark(browser: Any, plant: Server) -> None:
-    page = browser.new_page(color_scheme="dark")
-    page.goto(plant.url)
-    ink, paper = page.evaluate(
-        "[getComputedStyle(document.body).color, getComputedStyle(document.body).backgroundColor]"
-    )
-    assert (ink, paper) == ("rgb(230, 235, 239)", "rgb(18, 24, 30)")
-    page.close()
 
 
 def test_a_report_cannot_ask_the_server(browser: Any, plant: Server) -> None:
