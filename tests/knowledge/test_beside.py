@@ -55,9 +55,9 @@ def together(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
 
 
 def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
-    schema = Schema(ontology)
-    assert schema.unfit is None
     try:
+        schema = Schema(ontology)
+        assert schema.unfit is None
         return (Beside(schema, facts).worth_keeping() | schema.kept) - facts
     except Contradiction:
         return None
