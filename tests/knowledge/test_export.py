@@ -49,7 +49,7 @@ def test_everything_that_is_asserted_or_inferred_is_in_it(graph: KnowledgeGraph,
     assert {str(joint) for joint in written.objects(None, IRT.dominant_Joint)} == {
         f"https://w3id.org/irtwin/id/joint/Arm_{robot}/j{number}" for robot in "AB" for number in "12"
     }
-    assert len(set(written.subjects(RDF.type, IRT.Effect))) == 38
+    assert len(set(written.subjects(RDF.type, IRT.Effect))) == 40
 
 
 def test_times_are_cut_to_what_hermit_reads(graph: KnowledgeGraph, exported: Path) -> None:
