@@ -42,7 +42,7 @@ SEEDS = {
     "test_3": 37_000_000,
     "local": 84_000_000,  # development
 }
-DRAWN = {"local": LOCAL}  # what a split's effects are, if not all that may be anywhere
+OF_THEIR_OWN = {"local": (LOCAL, (1.0, 3.0))}  # effects and levels of splits that do not draw from all
 LEVELS = (0.1, 0.3, 1.0, 3.0)
 SECONDS = 8.0
 SLIGHT_IN_DIRTY_NULL, SLIGHT_ELSEWHERE = 0.15, 0.05  # floors that each leaves
@@ -73,8 +73,8 @@ class Plan:
 def plans(split: str, count: int) -> list[Plan]:
     """Return the cases of a split: the mix is the same for any count, in an order that tells nothing."""
     rng = np.random.default_rng(SEEDS[split])
-    drawn = DRAWN.get(split, TORQUE + POWER)
-    singles = [(effect, level) for effect in drawn for level in LEVELS]
+    drawn, levels = OF_THEIR_OWN.get(split, (TORQUE + POWER, LEVELS))
+    singles = [(effect, level) for effect in drawn for level in levels]
     rng.shuffle(singles)
     kinds = _kinds(count, rng)
     made = []

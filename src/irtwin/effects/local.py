@@ -95,12 +95,12 @@ class LocalWear(LocalEffect):
         for width in (share * (upper - lower) for share in _WIDTHS):
             first, last = lower + _FLANKS * width, upper - _FLANKS * width
             places = np.linspace(first, last, 1 + round(2 * (last - first) / width))
-            found += [LocalWear(q0=float(place), w=float(width)) for place in places]
+            found += [replace(self, q0=float(place), w=float(width)) for place in places]
         return (tuple(found),)
 
     def _coarse(self, lower: float, upper: float) -> tuple[Effect, ...]:
         places = np.linspace(lower, upper, 22)
-        return self.variants(q0=tuple(map(float, places[1:-1])), w=(float(places[1] - places[0]),))
+        return replace(self, w=float(places[1] - places[0])).variants(q0=tuple(map(float, places[1:-1])))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fw."""
@@ -138,8 +138,8 @@ class JointLimitSpring(LocalEffect):
         """Return springs at the upper end of the way, and at the lower: beside one on all of it, each is the other."""
         way = upper - lower
         return (
-            tuple(JointLimitSpring(q0=lower + share * way, side=1.0) for share in _ENDS),
-            tuple(JointLimitSpring(q0=upper - share * way, side=-1.0) for share in _ENDS),
+            tuple(replace(self, q0=lower + share * way, side=1.0) for share in _ENDS),
+            tuple(replace(self, q0=upper - share * way, side=-1.0) for share in _ENDS),
         )
 
     def _coarse(self, lower: float, upper: float) -> tuple[Effect, ...]:
