@@ -195,8 +195,12 @@ def diagnose(
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
-    looked_for = [one.id for one in catalogue().values() if one.disturbance or isinstance(one, LocalEffect)]
-    silent = [one for one in catalogue().values() if one.id not in {*blamed, *looked_for}]
+    screened = (LocalEffect,) if case.shows("torque") else ()
+    silent = [
+        one
+        for one in catalogue().values()
+        if one.id not in blamed and not one.disturbance and not isinstance(one, screened)
+    ]
     lacking = untestable(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )

@@ -169,6 +169,12 @@ class Local:
     alpha: float = _threshold(
         0.01, "largest p of a place, for all joints and shapes, to be tried", _P, "decisions/gap-local-effects.md"
     )
+    least_t: float = _threshold(
+        2.3,
+        "least t, between stretches of time, of the shape that is tried",
+        _ERRORS,
+        "as `selection.least_t`",
+    )
     least_share: float = _threshold(
         0.04,
         "least that it explains of what smooth friction leaves, to be tried",

@@ -44,17 +44,17 @@ def local_effects(
 def _places(
     effect: LocalEffect, joints: Sequence[tuple[Joint, _Passed]], signs: np.ndarray, limits: Local
 ) -> Iterator[LocalEffect]:
-    """Yield the best shape of each group, at each joint, that explains enough and is beyond chance."""
+    """Yield the shape that explains most, if enough, of each group at each joint of which one is beyond chance."""
     tried = []
     for joint, passed in joints:
         lowest = effect.joint_terms(joint)[0].lowest
         tried += [(joint.name, group, passed.judged(group, signs, lowest)) for group in effect.over(*passed.way)]
     reached = np.max([judged.reached for _, _, judged in tried], axis=0, initial=0.0)
     for name, group, judged in tried:
-        p = (1 + (reached >= judged.t[:, None]).sum(axis=1)) / (1 + len(signs))
-        share = np.where(p <= limits.alpha, judged.share, 0.0)
+        p = (1 + np.sum(reached >= judged.t.max())) / (1 + len(signs))
+        share = np.where(judged.t >= limits.least_t, judged.share, 0.0)
         best = int(np.argmax(share))
-        if share[best] >= limits.least_share:
+        if p <= limits.alpha and share[best] >= limits.least_share:
             yield group[best].on(name)
 
 
