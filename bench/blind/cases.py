@@ -21,7 +21,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from blind.catalogue import POWER, REGIMES, SLIGHT, TORQUE, UNKNOWN_EFFECTS, WHOLE_ROBOT, Draw, draw
+from blind.catalogue import LOCAL, POWER, REGIMES, SLIGHT, TORQUE, UNKNOWN_EFFECTS, WHOLE_ROBOT, Draw, draw
 from blind.motions import exciting, work
 from blind.projection import STRIDE, Basis, low_pass
 from plant.arm import Payload
@@ -40,7 +40,9 @@ SEEDS = {
     "test": 25_000_000,
     "test_2": 31_000_000,
     "test_3": 37_000_000,
+    "local": 84_000_000,  # development
 }
+OF_THEIR_OWN = {"local": (LOCAL, (1.0, 3.0))}  # effects and levels of splits that do not draw from all
 LEVELS = (0.1, 0.3, 1.0, 3.0)
 SECONDS = 8.0
 SLIGHT_IN_DIRTY_NULL, SLIGHT_ELSEWHERE = 0.15, 0.05  # floors that each leaves
@@ -71,7 +73,8 @@ class Plan:
 def plans(split: str, count: int) -> list[Plan]:
     """Return the cases of a split: the mix is the same for any count, in an order that tells nothing."""
     rng = np.random.default_rng(SEEDS[split])
-    singles = [(effect, level) for effect in TORQUE + POWER for level in LEVELS]
+    drawn, levels = OF_THEIR_OWN.get(split, (TORQUE + POWER, LEVELS))
+    singles = [(effect, level) for effect in drawn for level in levels]
     rng.shuffle(singles)
     kinds = _kinds(count, rng)
     made = []
@@ -84,7 +87,7 @@ def plans(split: str, count: int) -> list[Plan]:
             effects, single = (str(chosen),), single + 1
             level = float(level) if kind == "single" else 3.0
         elif kind == "pair":
-            effects, level = tuple(str(e) for e in rng.choice(TORQUE + POWER, 2, replace=False)), 2.0
+            effects, level = tuple(str(e) for e in rng.choice(drawn, 2, replace=False)), 2.0
         elif kind == "unknown":
             effects, level = (str(rng.choice(UNKNOWN_EFFECTS)),), 3.0
         scope = "changed" if kind == "simulated" or rng.random() < 0.4 else "missing"
@@ -314,6 +317,7 @@ def _label(plan: Plan, case: Case, placed: list[Effect], gaps: list[float]) -> d
                 "gap_over_floor": gap,
                 "regimes": sorted(REGIMES.get(effect.id, ())),
                 "runs": [_run_name(index) for index in np.flatnonzero(effect.runs)],
+                **({"shape": effect.shape} if effect.id in LOCAL else {}),
             }
             for effect, gap in zip(placed, gaps, strict=True)
         ],

@@ -42,6 +42,8 @@ POWER = (
     "meter_lag",
     "meter_gain",
 )
+# about a place of a joint: in splits of their own, as one effect more would change every draw of the others
+LOCAL = ("local_wear", "joint_limit_spring")
 ALL_JOINTS = {
     "copper_loss",
     "winding_temperature",
@@ -79,6 +81,8 @@ REGIMES = {
     "bus_capacitor": {"regenerating", "braking", "accelerating"},
     "holding_brakes": {"standstill"},
     "torque_constant_error": {"loaded", "accelerating", "braking", "standstill"},
+    "local_wear": {"steady_speed", "accelerating", "braking"},
+    "joint_limit_spring": {"reversal", "low_speed", "accelerating", "braking", "standstill"},
 }
 
 
@@ -126,6 +130,14 @@ def draw(name: str, machine: Machine, runs: np.ndarray, everywhere: bool, rng: n
         guess = 0.6 * fc[j]
     elif name == "cable_drag":
         shape, guess = {"rest": rng.uniform(-0.5, 0.5)}, 0.4 * fc[j]
+    elif name == "local_wear":
+        middle, half = _range(machine, j)
+        shape = {"at": middle + half * rng.uniform(-0.4, 0.4), "width": rng.uniform(0.06, 0.18)}
+        guess, most = fc[j], 8 * fc[j]
+    elif name == "joint_limit_spring":
+        (middle, half), side = _range(machine, j), float(rng.choice([-1, 1]))
+        shape = {"at": middle + side * half * rng.uniform(0.2, 0.45), "side": side}
+        guess, most = 3 * fc[j], 200 * fc[j]
     elif name == "gravity_compensation":
         shape, guess, most = {"angle": rng.uniform(0.3, 0.8)}, 5 * fc[j], 200 * fc[j]
     elif name == "payload":
@@ -179,6 +191,13 @@ def draw(name: str, machine: Machine, runs: np.ndarray, everywhere: bool, rng: n
     return Draw(Effect(name, joints, where, guess, shape), most)
 
 
+def _range(machine: Machine, joint: int) -> tuple[float, float]:
+    """Return the middle of a joint's range, and half of what motions use of it, rad."""
+    limits = machine.drawings.limits
+    lower, upper = float(limits.lower[joint]), float(limits.upper[joint])
+    return (upper + lower) / 2, min((upper - lower) / 2, 1.6)
+
+
 def _joints(name: str, n: int, rng: np.random.Generator) -> tuple[int, ...]:
     if name in ALL_JOINTS or name in WHOLE_ROBOT or name == "cycling_fan":
         return tuple(range(n))
@@ -194,8 +213,12 @@ def _joints(name: str, n: int, rng: np.random.Generator) -> tuple[int, ...]:
         "torque_constant_error": list(range(n - 1)),
         "time_delay": list(range(3)),
         "crosstalk": [1, 2],
+        "local_wear": list(range(n - 1)),
+        "joint_limit_spring": list(range(n - 1)),
     }.get(name, list(range(n)))
     count = (
-        2 if rng.random() < 0.2 and name not in {"encoder_offset", "joint_elasticity", "backlash", "crosstalk"} else 1
+        2
+        if rng.random() < 0.2 and name not in {"encoder_offset", "joint_elasticity", "backlash", "crosstalk", *LOCAL}
+        else 1
     )
     return tuple(sorted(int(j) for j in rng.choice(eligible, size=min(count, len(eligible)), replace=False)))

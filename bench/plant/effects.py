@@ -69,12 +69,20 @@ def _strut(state: State, shape: dict[str, Any]) -> np.ndarray:
     return np.asarray(lever / (a * b) * (gas / (gas - (b + a - length))) ** 1.3)
 
 
+def _hose(state: State, shape: dict[str, Any]) -> np.ndarray:
+    """A hose that becomes tight beyond an angle, softly at first, and stiffens."""
+    beyond = shape["side"] * (state.q - shape["at"])
+    tight = 0.03 * np.logaddexp(0, beyond / 0.03)
+    return np.asarray(shape["side"] * tight * (1 + 0.4 * tight))
+
+
 # level of the bristles: what sliding friction is multiplied from
 LEVEL: dict[str, Law] = {
     "stribeck_friction": lambda s, p: 1 / (1 + (s.dq / p["speed"]) ** 2),
     "load_dependent_friction": lambda s, p: (np.sqrt(s.load**2 + 4) - 2) * (1 + 0.25 * np.tanh(s.load * s.dq)),
     "position_dependent_friction": lambda s, p: np.exp(1.2 * (np.cos(s.q - p["angle"]) - 1)) - 0.4,
     "warm_run_in": lambda s, p: np.full_like(s.q, np.exp(-s.time / 2.5)),
+    "local_wear": lambda s, p: 1 / (1 + ((s.q - p["at"]) / p["width"]) ** 4),
 }
 # torque against the motion or the pose
 PASSIVE: dict[str, Law] = {
@@ -89,6 +97,7 @@ PASSIVE: dict[str, Law] = {
     "cable_drag": lambda s, p: (s.q - p["rest"]) + 0.15 * (s.q - p["rest"]) ** 3,
     "gravity_compensation": _strut,
     "joint_coupling": _coupling,
+    "joint_limit_spring": _hose,
     "machine_shake": lambda s, p: np.full_like(s.q, np.sin(2 * np.pi * p["frequency"] * s.time)),
 }
 # what the log says of the torque, after the fact; (T, n) arrays of one run

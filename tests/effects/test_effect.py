@@ -11,6 +11,7 @@ from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
+from irtwin.effects.local import LocalEffect
 from irtwin.effects.rigid_body import NAMES
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -37,7 +38,7 @@ def test_effects_are_as_the_contract_says():
         )
         per_joint = all(term.joint for term in effect.terms(robot))
         assert per_joint == (entry["per"] != "robot" or name == "mechanical_power")
-    own = {name for name, effect in catalogue().items() if effect.disturbance}
+    own = {name for name, effect in catalogue().items() if effect.disturbance or isinstance(effect, LocalEffect)}
     assert catalogue().keys() - own == contract.keys()
 
 

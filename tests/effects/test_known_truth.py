@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from tests.flange import flange_position
 from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
-from irtwin.effects import compliance, disturbance, drive, friction, load, sensing, supply, transmission
+from irtwin.effects import compliance, disturbance, drive, friction, load, local, sensing, supply, transmission
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
@@ -303,6 +303,19 @@ CASES = [
     ),
     Case(sensing.MeterLag(T=0.2), {("T", None): 0.2}, power=lagged),
     Case(sensing.MeterGain(), {("g", None): 1.2}, power=lambda s: 0.2 * s.power, off=0.02),
+    Case(
+        local.LocalWear(q0=0.1, w=0.08, joints=J2),
+        {("Fw", "joint_2"): 3.0, ("q0", "joint_2"): 0.1, ("w", "joint_2"): 0.08},
+        lambda s: only(3 * sign(s) * np.exp(-(((s.motion.q[:, 1] - 0.1) / 0.08) ** 2))),
+        seconds=8.0,
+    ),
+    Case(
+        local.JointLimitSpring(q0=-0.3, side=-1.0, joints=J2),
+        {("k", "joint_2"): 40.0, ("q0", "joint_2"): -0.3, ("side", "joint_2"): -1.0},
+        lambda s: only(40 * np.minimum(s.motion.q[:, 1] + 0.3, 0.0)),
+        seconds=8.0,
+        off=0.05,
+    ),
     Case(
         disturbance.PeriodicDisturbance(f=2.9, joints=J2),
         {("f", "joint_2"): 2.9, ("A", "joint_2"): 5.0},

@@ -140,6 +140,13 @@ def test_effects_that_cannot_be_told_apart_are_rivals_whose_columns_agree():
     assert cause.rival_correlations[rival] == pytest.approx(1.0, abs=1e-3)
 
 
+def test_of_equals_that_is_not_taken_whose_place_screening_chose():
+    system, candidates = system_of([[1.0, 0.0], [1.0, 0.02]], [0.3, 0.0])
+    placed = replace(candidates[0].variants[0], effect=catalogue()["local_wear"])
+    (cause,) = attribute(system, [replace(candidates[0], variants=(placed,)), candidates[1]], 0, DEFAULT).causes
+    assert (cause.effect, cause.rivals) == ("effect_1", ("effect_0",))
+
+
 def test_effects_that_share_nothing_do_not_correlate():
     system, candidates = system_of(np.eye(2), [0.3, 0.0])
     (cause,) = attribute(system, candidates, seed=0, limits=DEFAULT).causes

@@ -20,6 +20,8 @@ REMEDIES = {
     ("temperature_dependent_friction", "changed"): {"check the gear oil and temperature"},
     ("temperature_dependent_friction", "missing"): {"measure cold and warm"},
     ("coulomb_friction", "changed"): {"check the gear and its brake for wear"},
+    ("local_wear", "changed"): {"check the gear and its brake for wear"},
+    ("joint_limit_spring", "missing"): {"check the hose package"},
     ("stribeck_friction", "changed"): {"check the gear and its brake for wear"},
     ("stribeck_friction", "missing"): set(),
     ("backlash", "changed"): {"check the gear for play"},

@@ -21,6 +21,7 @@ from irtwin.effects.friction import (
     ViscousFriction,
 )
 from irtwin.effects.load import BaseTilt, CableDrag, ExternalContact, GravityCompensation, Payload
+from irtwin.effects.local import JointLimitSpring, LocalWear
 from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.sensing import (
     EncoderOffset,
@@ -75,6 +76,8 @@ _OWN: tuple[type[Effect], ...] = (
     MeterGain,
     PeriodicDisturbance,
     SwitchingLoad,
+    LocalWear,
+    JointLimitSpring,
 )
 
 # The default twin: the seed paper's model, with rotor inertia and offset.

@@ -119,7 +119,8 @@ class Effect(ABC):
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
     so many seconds on either side. What is `rare` shows in some motions alone, and in these strongly.
-    What is `imitated` looks like what friction leaves, where joints turn back, if its form is not the twin's.
+    What is `imitated` looks like what friction leaves, where joints turn back, if its form is not the twin's. Where a
+    screening chooses the shape to be tried, it was `found_among` so many.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
@@ -143,6 +144,7 @@ class Effect(ABC):
     reach: ClassVar[float | None] = None
     rare: ClassVar[bool] = False
     imitated: ClassVar[bool] = False
+    found_among: ClassVar[int] = 1
     family: ClassVar[str]
     requires: ClassVar[frozenset[str]] = frozenset()
     bodies: ClassVar[bool] = False

@@ -11,6 +11,7 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Predicted
+from irtwin.effects.local import LocalEffect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
@@ -194,7 +195,12 @@ def diagnose(
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
-    silent = [one for one in catalogue().values() if one.id not in blamed and not one.disturbance]
+    screened = (LocalEffect,) if case.shows("torque") else ()
+    silent = [
+        one
+        for one in catalogue().values()
+        if one.id not in blamed and not one.disturbance and not isinstance(one, screened)
+    ]
     lacking = untestable(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )

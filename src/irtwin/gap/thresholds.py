@@ -163,6 +163,27 @@ class Ripples:
 
 
 @dataclass(frozen=True)
+class Local:
+    """Worn spots, and springs near the end of a joint's way."""
+
+    alpha: float = _threshold(
+        0.01, "largest p of a place, for all joints and shapes, to be tried", _P, "decisions/gap-local-effects.md"
+    )
+    least_t: float = _threshold(
+        2.3,
+        "least t, between stretches of time, of the shape that is tried",
+        _ERRORS,
+        "as `selection.least_t`",
+    )
+    least_share: float = _threshold(
+        0.04,
+        "least that it explains of what smooth friction leaves, to be tried",
+        _RESIDUAL,
+        "decisions/gap-local-effects.md",
+    )
+
+
+@dataclass(frozen=True)
 class Selection:
     """Which hypothesis becomes a cause."""
 
@@ -388,6 +409,7 @@ class Thresholds:
     contact: Contact = Contact()
     some_payload: SomePayload = SomePayload()
     ripples: Ripples = Ripples()
+    local: Local = Local()
     selection: Selection = Selection()
     ambiguity: Ambiguity = Ambiguity()
     changes: Changes = Changes()

@@ -36,8 +36,9 @@ class Hypothesis:
 
     @property
     def flexibility(self) -> float:
-        """How much it could fit: its coefficients, and the choice among its shapes in bits."""
-        return len(self.variants[0].columns) + float(np.log2(len(self.variants)))
+        """How much it could fit: its coefficients, and the choice among its shapes in bits, screening's too."""
+        shapes = len(self.variants) * self.variants[0].effect.found_among
+        return len(self.variants[0].columns) + float(np.log2(shapes))
 
     @property
     def of_bodies(self) -> bool:

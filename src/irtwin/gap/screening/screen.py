@@ -1,4 +1,4 @@
-"""What acts in some runs only, for a while, or at one order of many: found before any effect is tried."""
+"""What acts in some runs only, for a while, at one order or place of many: found before any effect is tried."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
+from irtwin.effects.local import LocalEffect
 from irtwin.effects.stack import Stack
 from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.data.case import Case
@@ -16,6 +18,7 @@ from irtwin.gap.regression.normal_equations import System, noise_before, twin_va
 from irtwin.gap.regression.residuals import torque_residual
 from irtwin.gap.regression.transient import Transient, is_transient
 from irtwin.gap.screening.contact import contact
+from irtwin.gap.screening.local import local_effects
 from irtwin.gap.screening.payloads import UntoldPayload, untold_payload
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.screening.ripples import fast_ripples
@@ -25,18 +28,21 @@ from irtwin.signals.motion import Motion
 
 @dataclass(frozen=True)
 class Screened:
-    """A contact, and a payload in some of the runs (None where none stands out); joints' fast ripples."""
+    """A contact and a payload in some of the runs (None: none stands out); fast ripples, and local effects."""
 
     contact: Transient | None = None
     payload: UntoldPayload | None = None
     ripples: tuple[TorqueRipple, ...] = ()
+    local: tuple[LocalEffect, ...] = ()
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects to try with those found: a contact in its place only, the others there too."""
+        """Return the effects to try with those found: contact and local ones in their place only, others there too."""
         found: list[Effect] = [
-            effect for effect in effects if not (self.contact and effect.id == self.contact.effect.id)
+            effect
+            for effect in effects
+            if not isinstance(effect, LocalEffect) and not (self.contact and effect.id == self.contact.effect.id)
         ]
-        return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples]
+        return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples, *self.local]
 
 
 def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
@@ -49,11 +55,12 @@ def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
         residual = torque_residual(stack, motion, values)
         observed = motion.run in case.observed
         left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
-    ripples = fast_ripples(case.robot, left, limits.ripples.least_share)
+    known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
     return Screened(
         contact(case.robot, left, noise, limits.contact),
         untold_payload(case.robot, system, noise, limits.some_payload, seed),
-        tuple(ripples),
+        tuple(fast_ripples(case.robot, left, limits.ripples.least_share)),
+        tuple(local_effects(case.robot, known, left, limits.local, seed)),
     )
 
 
