@@ -22,19 +22,20 @@ from irtwin.signals.motion import Motion
 class Rows:
     """g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g).
 
-    `columns` may also be g arrays (N, k_e), of the columns that each equation has by the `pattern`. Where `undecided`
-    (N, g) the equation does not hold, and is left out.
+    `columns` may also be, for each equation, the arrays (N, some) that side by side are the columns which it has by the
+    `pattern`: they are joined when few samples are left. Where `undecided` (N, g) the equation does not hold, and is
+    left out.
     """
 
-    columns: np.ndarray | Sequence[np.ndarray]
+    columns: np.ndarray | Sequence[Sequence[np.ndarray]]
     known: np.ndarray
     measured: np.ndarray
     undecided: np.ndarray | None = None
 
-    def own(self, equation: int, used: np.ndarray) -> np.ndarray:
-        """Return the columns (N, k_e) of an equation, `used` (K,) by the pattern."""
+    def own(self, equation: int, used: np.ndarray) -> Sequence[np.ndarray]:
+        """Return the columns of an equation, `used` (K,) by the pattern, as arrays (N, some) to stand side by side."""
         if isinstance(self.columns, np.ndarray):
-            return self.columns[:, equation, used]
+            return [self.columns[:, equation, used]]
         return self.columns[equation]
 
 
@@ -156,8 +157,8 @@ class _Growing:
             keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
         rows = []
         for equation, used in enumerate(self._pattern):
-            columns = decimate(sample.own(equation, used), taps, step)
-            rows.append(np.column_stack([columns, measured[:, equation]])[keep[:, equation]])
+            columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
+            rows.append(np.column_stack([*columns, measured[:, equation]])[keep[:, equation]])
         return rows
 
     def add(self, parts: Sequence[np.ndarray]) -> None:

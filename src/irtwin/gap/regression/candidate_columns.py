@@ -62,7 +62,7 @@ class Candidates:
         for place in range(len(self._effects)):
             for equation, own in zip(found, self._own(place, whole, motion), strict=True):
                 equation += own
-        return [np.concatenate(equation, axis=1) for equation in found]
+        return [_side_by_side(equation) for equation in found]
 
     def _own(self, place: int, whole: Motion, motion: Motion) -> Parts:
         """Return an effect's columns over a part of the run that is held."""
@@ -103,6 +103,11 @@ class Candidates:
         columns = free_columns(effect, robot, motion, predicted)
         by_equation = columns[:, None] if columns.ndim == 2 else columns
         return [[by_equation[:, equation, used]] for equation, used in enumerate(self._patterns[place])]
+
+
+def _side_by_side(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Return columns (N, some) of several arrays as one, each column in one stretch of memory: so it is filtered."""
+    return np.concatenate([part.T for part in parts]).T
 
 
 def free_columns(effect: Effect, robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:

@@ -72,13 +72,12 @@ def joint_equations(
     def equations(motion: Motion) -> Rows:
         own, parts, torque = stack.torque_columns(motion), shown.part(motion), predicted(motion)
         slope = power_slope(stack, motion, torque, power.values)
-        carried = np.einsum("tj,tjk->tk", slope, own[:, :, stack.real])
-        more = np.zeros((len(motion.time), len(mechanical)))
-        for joint, used in enumerate(tried):
-            more[:, used] += slope[:, [joint]] * parts[joint]
+        mine = [own[:, joint, used] for joint, used in enumerate(stack.pattern)]
+        carried = _carried(mine, slope, stack.pattern, stack.real)
+        more = _carried(parts, slope, tried, real)
         now = stack.power_columns(motion, torque)
-        rows = [np.concatenate([own[:, k, used], parts[k]], axis=1) for k, used in enumerate(stack.pattern)]
-        rows.append(np.concatenate([carried, now[:, ~stack.fixed], more[:, real], *added.part(motion)], axis=1))
+        rows = [list(pair) for pair in zip(mine, parts, strict=True)]
+        rows.append([carried, now[:, ~stack.fixed], more, *added.part(motion)])
         shift = stack.shift(motion)
         known = now[:, stack.fixed] @ fixed_values + carried @ shift[stack.real] - (slope * torque).sum(axis=1)
         return Rows(
@@ -115,6 +114,20 @@ def joint_equations(
     known = stack.prior_rows(stack.torque_terms)
     torque = System(stack.torque_terms, mechanical, of_joints, tuple(alone), *grouping.of(alone), prior_rows=known)
     return JointEquations(enough(whole), enough(torque))
+
+
+def _carried(rows: Sequence[np.ndarray], slope: np.ndarray, pattern: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Return (N, R) the power that each real column carries: what it has in each joint's `rows`, times the slope.
+
+    `slope` (N, n) of power over each joint's torque; `pattern` (n, K) which columns the rows have; `real` (K,).
+    """
+    place = np.cumsum(real) - 1
+    found = np.zeros((int(real.sum()), len(slope)))
+    for own, rise, used in zip(rows, np.ascontiguousarray(slope.T), pattern, strict=True):
+        for column, k in zip(own.T, np.flatnonzero(used), strict=True):
+            if real[k]:
+                found[place[k]] += rise * column
+    return found.T
 
 
 def _pattern(
