@@ -79,7 +79,7 @@ class Candidates:
         """Compute an effect's columns over a piece of a run, with `around` samples before and after."""
         first, last = max(0, start - around), min(stop + around, len(whole.time))
         parts = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
-        return _Held(parts, first, start if first else 0, stop if last < len(whole.time) else last)
+        return _Held(_alone(parts), first, start if first else 0, stop if last < len(whole.time) else last)
 
     def _hold(self, whole: Motion) -> None:
         self._held = {}  # let go of the run before
@@ -87,7 +87,7 @@ class Candidates:
         for place, effect in enumerate(self._effects):
             if effect.memory and effect.reach is None:
                 every = len(whole.time)
-                self._held[place] = _Held(self._columns(place, whole, self._predicted), 0, 0, every)
+                self._held[place] = _Held(_alone(self._columns(place, whole, self._predicted)), 0, 0, every)
 
     def _columns(self, place: int, motion: Motion, predicted: Predicted | None) -> Parts:
         effect, robot = self._effects[place], self._robot
@@ -103,6 +103,11 @@ class Candidates:
         columns = free_columns(effect, robot, motion, predicted)
         by_equation = columns[:, None] if columns.ndim == 2 else columns
         return [[by_equation[:, equation, used]] for equation, used in enumerate(self._patterns[place])]
+
+
+def _alone(parts: Parts) -> Parts:
+    """Return copies of columns, in memory of their own: those of joints that an effect does not act on can go."""
+    return [[np.array(columns, order="F") for columns in equation] for equation in parts]
 
 
 def _side_by_side(parts: Sequence[np.ndarray]) -> np.ndarray:

@@ -56,7 +56,7 @@ def joint_equations(
     Raises InputError where too few samples are left.
     """
     robot, (of_torque, of_power) = stack.robot, effects
-    mechanical, electrical = candidate_columns(robot, of_torque), candidate_columns(robot, of_power)
+    mechanical, supplied = candidate_columns(robot, of_torque), candidate_columns(robot, of_power)
     tried = candidate_pattern(robot, of_torque, mechanical)
     real = np.array([column.effect.channel == "torque" for column in mechanical], dtype=bool)
     free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
@@ -67,21 +67,22 @@ def joint_equations(
         return Predicted(torque, *power(whole, torque))
 
     shown = Candidates(robot, of_torque, tried, with_load(robot, below))
-    added = Candidates(robot, of_power, np.ones((1, len(electrical)), dtype=bool), drawn)
+    added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
 
     def equations(motion: Motion) -> Rows:
         own, parts, torque = stack.torque_columns(motion), shown.part(motion), predicted(motion)
         slope = power_slope(stack, motion, torque, power.values)
         mine = [own[:, joint, used] for joint, used in enumerate(stack.pattern)]
         carried = _carried(mine, slope, stack.pattern, stack.real)
-        more = _carried(parts, slope, tried, real)
-        now = stack.power_columns(motion, torque)
-        rows = [list(pair) for pair in zip(mine, parts, strict=True)]
-        rows.append([carried, now[:, ~stack.fixed], more, *added.part(motion)])
+        now, electrical = stack.power_columns(motion, torque), added.part(motion)
+
+        def of_power() -> list[np.ndarray]:
+            return [carried, now[:, ~stack.fixed], _carried(parts, slope, tried, real), *electrical]
+
         shift = stack.shift(motion)
         known = now[:, stack.fixed] @ fixed_values + carried @ shift[stack.real] - (slope * torque).sum(axis=1)
         return Rows(
-            rows,
+            [*zip(mine, parts, strict=True), of_power],
             np.column_stack([own @ shift, known]),
             np.column_stack(
                 [
@@ -97,10 +98,10 @@ def joint_equations(
             ),
         )
 
-    pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(electrical))
+    pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     alone = [replace(one, rows=one.rows[:-1], factors=one.factors[:-1]) for one in blocks if one.rows[:-1].any()]
-    terms, columns = (*stack.torque_terms, *free), (*mechanical, *electrical)
+    terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(
         terms,
         columns,
