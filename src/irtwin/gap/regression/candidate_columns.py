@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect, Predicted
+from irtwin.effects.stack import side_by_side
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -62,7 +63,7 @@ class Candidates:
         for place in range(len(self._effects)):
             for equation, own in zip(found, self._own(place, whole, motion), strict=True):
                 equation += own
-        return [_side_by_side(equation) for equation in found]
+        return [side_by_side(equation) for equation in found]
 
     def _own(self, place: int, whole: Motion, motion: Motion) -> Parts:
         """Return an effect's columns over a part of the run that is held."""
@@ -108,11 +109,6 @@ class Candidates:
 def _alone(parts: Parts) -> Parts:
     """Return copies of columns, in memory of their own: those of joints that an effect does not act on can go."""
     return [[np.array(columns, order="F") for columns in equation] for equation in parts]
-
-
-def _side_by_side(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Return columns (N, some) of several arrays as one, each column in one stretch of memory: so it is filtered."""
-    return np.concatenate([part.T for part in parts]).T
 
 
 def free_columns(effect: Effect, robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:

@@ -44,12 +44,9 @@ def torque_system(
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
-        own = stack.torque_columns(motion)
-        joined = [
-            [own[:, joint, used], added]
-            for joint, (used, added) in enumerate(zip(stack.pattern, candidates.part(motion), strict=True))
-        ]
-        return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
+        own = stack.columns_by_joint(motion)
+        columns = list(zip(own, candidates.part(motion), strict=True))
+        return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     known = stack.prior_rows(stack.torque_terms)

@@ -70,10 +70,9 @@ def joint_equations(
     added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
 
     def equations(motion: Motion) -> Rows:
-        own, parts, torque = stack.torque_columns(motion), shown.part(motion), predicted(motion)
+        own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
         slope = power_slope(stack, motion, torque, power.values)
-        mine = [own[:, joint, used] for joint, used in enumerate(stack.pattern)]
-        carried = _carried(mine, slope, stack.pattern, stack.real)
+        carried = _carried(own, slope, stack.pattern, stack.real)
         now, electrical = stack.power_columns(motion, torque), added.part(motion)
 
         def of_power() -> list[np.ndarray]:
@@ -82,8 +81,8 @@ def joint_equations(
         shift = stack.shift(motion)
         known = now[:, stack.fixed] @ fixed_values + carried @ shift[stack.real] - (slope * torque).sum(axis=1)
         return Rows(
-            [*zip(mine, parts, strict=True), of_power],
-            np.column_stack([own @ shift, known]),
+            [*zip(own, parts, strict=True), of_power],
+            np.column_stack([stack.shift_torque(motion, own), known]),
             np.column_stack(
                 [
                     np.zeros_like(motion.dq) if motion.torque is None else motion.torque,
