@@ -90,3 +90,14 @@ def test_a_part_with_its_reach_gives_what_the_whole_gives(effect):
     part = motion.part(1100, 2900)  # two seconds more on either side
     cut = effect.columns(robot, part, before.part(1100, 2900))
     np.testing.assert_allclose(cut[400:1400], whole[1500:2500], atol=1e-9)
+
+
+@pytest.mark.parametrize("effect", [Backlash(), Backlash(by_way=True), JointElasticity(), JointElasticity(8.0)])
+def test_one_joint_alone_is_as_among_others(effect):
+    robot = arm(3)
+    motion = swing(robot, 1, seconds=3.0)
+    predicted = Predicted(30 * np.sin(motion.time[:, None] + np.arange(3)))
+    (every,) = effect.samples(robot, motion, predicted)
+    (one,) = effect.on(robot.joint_names[1]).samples(robot, motion, predicted)
+    np.testing.assert_allclose(one[:, 1], every[:, 1], rtol=1e-12, atol=1e-12)
+    assert every[:, 1].any() and not one[:, [0, 2]].any()

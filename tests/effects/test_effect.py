@@ -218,3 +218,17 @@ def test_a_contribution_is_columns_by_coefficients(name):
     values = np.random.default_rng(0).uniform(0.5, 1.5, len(effect.terms(robot)))
     expected = effect.columns(robot, motion, predicted) @ values
     np.testing.assert_allclose(effect.contribution(robot, motion, values, predicted), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_columns_by_joint_are_those_of_torque_without_zeros():
+    robot = arm(3)
+    told = replace(swing(robot, 1, seconds=0.5), payload_mass=2.0)
+    contact = catalogue()["external_contact"]
+    stack = Stack(robot, [*BASELINE, "load_dependent_friction", "presliding_hysteresis", replace(contact, runs=("x",))])
+    for motion in (told, told.part(10, 30)):
+        dense = stack.torque_columns(motion)
+        columns = stack.columns_by_joint(motion)
+        for joint, used in enumerate(stack.pattern):
+            np.testing.assert_array_equal(columns[joint], dense[:, joint, used])
+        np.testing.assert_allclose(stack.shift_torque(motion, columns), dense @ stack.shift(motion), atol=1e-12)
+        assert stack.shift_torque(motion, columns).any()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
+from weakref import ref
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +12,7 @@ import pytest
 from tests.synthetic import arm, rigid_torque, swing
 
 from irtwin.effects.load import Payload
-from irtwin.effects.rigid_body import inverse_dynamics, last_body_columns, model_of, torque_slope
+from irtwin.effects.rigid_body import RigidBody, inverse_dynamics, last_body_columns, model_of, torque_slope
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])
@@ -45,3 +47,24 @@ def test_the_slope_of_an_ordinary_arm_needs_no_ballast():
     states = zip(motion.q, motion.dq, motion.ddq, strict=True)
     expected = [pin.computeRNEADerivatives(robot.model, data, *state)[0].copy() for state in states]
     np.testing.assert_array_equal(torque_slope(robot, None, motion), expected)
+
+
+def test_bodies_and_payload_share_a_regressor_that_goes_with_its_motion(monkeypatch):
+    asked, regress = [], pin.computeJointTorqueRegressor
+
+    def counted(*arguments):
+        asked.append(1)
+        return regress(*arguments)
+
+    monkeypatch.setattr(pin, "computeJointTorqueRegressor", counted)
+    robot, motion = arm(2), swing(arm(2), 0, seconds=0.2)
+    columns = RigidBody().columns(robot, motion)
+    np.testing.assert_array_equal(last_body_columns(robot, motion), columns[:, :, 10:])
+    assert len(asked) == len(motion.time)
+    other = replace(motion, q=motion.q + 0.1)  # equal in name and times
+    assert not np.array_equal(RigidBody().columns(robot, other), columns)
+    kept = ref(columns)
+    del columns, motion, other
+    RigidBody().columns(robot, swing(robot, 1, seconds=0.1))
+    gc.collect()
+    assert kept() is None

@@ -109,3 +109,17 @@ def test_runs_in_which_nothing_is_decided_are_refused():
 def test_a_factor_is_small_however_long_the_run(count):
     blocks, _ = reduced([measure(ROBOT, swing(ROBOT, k, seconds=30)) for k in range(count)])
     assert max(factor.shape[0] for block in blocks for factor in block.factors) <= len(STACK.torque_terms) + 1
+
+
+def test_columns_may_come_in_several_arrays_or_when_asked_for():
+    motions = [measure(ROBOT, swing(ROBOT, 1))]
+    whole = accumulate(motions, equations, STACK.pattern)
+
+    def apart(motion):
+        rows = equations(motion)
+        own = [rows.own(equation, used)[0] for equation, used in enumerate(STACK.pattern)]
+        return replace(rows, columns=[[own[0][:, :2], own[0][:, 2:]], *((lambda one=one: [one]) for one in own[1:])])
+
+    for one, other in zip(whole, accumulate(motions, apart, STACK.pattern), strict=True):
+        for factor, same in zip(one.factors, other.factors, strict=True):
+            np.testing.assert_allclose(same.T @ same, factor.T @ factor, rtol=1e-9, atol=1e-9)

@@ -51,7 +51,9 @@ def load_inertia(robot: Robot, motion: Motion, predicted: Predicted | None) -> n
     data = model.createData()
     every = max(1, round(_INERTIA_EVERY * motion.rate))
     rows = np.arange(-motion.start % every, len(motion.time), every)  # the same ones in any part of a run
-    known = np.array([np.diag(pin.crba(model, data, q)) for q in motion.q[rows]])
+    known = np.empty((len(rows), model.nv))
+    for row, q in enumerate(motion.q[rows]):
+        known[row] = pin.crba(model, data, q).diagonal()
     known = np.maximum(known, _LIGHTEST)
     return np.column_stack([np.interp(np.arange(len(motion.time)), rows, each) for each in known.T])
 
@@ -60,7 +62,7 @@ def transmitted(
     load: np.ndarray,
     inertia: np.ndarray,
     rate: float,
-    speed: np.ndarray,
+    speed: np.ndarray | float,
     damping: float,
     play: float = 0.0,
     start: int = 0,
@@ -68,8 +70,8 @@ def transmitted(
     """Return (N, n) the torque that passes a spring with `play` (rad) between a motor and a link that swings behind it.
 
     load: (N, n) N m, what a link stiffly joined to the measured motor would take; inertia: (N, n) kg m^2; rate: Hz;
-    speed: (N, n) rad/s, of the link's swing while the motor holds; `start`: where the first sample lies in its run, so
-    that parts of a run are computed alike. With x the motor's lead over the link,
+    speed: (N, n) rad/s, of the link's swing while the motor holds, or one for all; `start`: where the first sample lies
+    in its run, so that parts of a run are computed alike. With x the motor's lead over the link,
     x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the two-mass
     model (Spong 1987), link by link.
     """
@@ -78,39 +80,64 @@ def transmitted(
     substeps = max(1, round(_STEPS / max(rate, 1 / _WINDOW)))
     step, last = 1 / (rate * substeps), len(load) - 1
     rows = np.clip(starts + np.arange(-ahead, length + 1)[:, None], 0, last)
-    pushed = (load / inertia)[rows]
-    rises = np.diff(pushed, axis=0) / substeps
     speed = np.minimum(speed, 1 / step)  # what is stiffer swings above any band of motion, and would need finer steps
-    squares, rubs = (speed**2)[rows], (2 * damping * speed)[rows]
-    x = pushed[0] / squares[0] + np.sign(pushed[0]) * play / 2
-    v = np.zeros_like(x)
-    passed = np.empty_like(rises)
-    for push, rise, square, rub, back in zip(pushed[:-1], rises, squares, rubs, passed, strict=False):
+    # in units of a substep: x' and x'' count as what they add to x in one
+    pushed = (load / inertia)[rows] * step**2
+    pulls, rubs = (speed * step) ** 2, 2 * damping * speed * step
+    if np.ndim(speed):
+        pulls, rubs = pulls[rows], rubs[rows]
+    else:
+        pulls, rubs = (np.broadcast_to(each, pushed.shape) for each in (pulls, rubs))
+    rises = np.diff(pushed, axis=0) / substeps
+    swing = _Swing(pushed[0] / pulls[0] + np.sign(pushed[0]) * play / 2, play)
+    passed = np.empty((length, *pushed.shape[1:]))
+    for row, (push, rise, pull, rub) in enumerate(zip(pushed[:-1], rises, pulls, rubs, strict=False)):
         for substep in range(substeps):
-            force = square * x + rub * v if play == 0 else _beyond(play, x, square, rub * v)
-            if substep == 0:
-                back[:] = force
-            v += step * (push - force)
-            x += step * v
+            swing.move(push, pull, rub, passed[row - ahead] if row >= ahead and substep == 0 else None)
             push += rise
-    kept = (passed * inertia[rows[:-1]])[ahead:].transpose(1, 0, 2).reshape(-1, load.shape[1])
-    return np.asarray(kept[-starts[0] :][: len(load)])
+    kept = passed.transpose(1, 0, 2).reshape(-1, load.shape[1])[-starts[0] :][: len(load)]
+    return np.asarray(kept * inertia / step**2)
 
 
-def _beyond(play: float, x: np.ndarray, square: np.ndarray, friction: np.ndarray) -> np.ndarray:
-    give = x - np.minimum(np.maximum(x, -play / 2), play / 2)  # np.clip is slower on a few numbers
-    return np.asarray(square * give + friction * (give != 0))
+class _Swing:
+    """Links behind springs with `play`: the motor's lead `x` over each, and what it gains in a substep, both as (m, n).
+
+    All arrays are written over: a substep is a few operations on a few numbers.
+    """
+
+    def __init__(self, x: np.ndarray, play: float):
+        self._x, self._gained, self._play = x, np.zeros_like(x), play
+        self._given, self._force, self._rubbed = np.empty((3, *x.shape))
+
+    def move(self, push: np.ndarray, pull: np.ndarray, rub: np.ndarray, force: np.ndarray | None) -> None:
+        """Go on by a substep; `force` is given that of the spring, before."""
+        if self._play:
+            give, rubbed = self._given, self._rubbed
+            np.maximum(self._x, -self._play / 2, out=give)  # np.clip is slower on a few numbers
+            np.minimum(give, self._play / 2, out=give)
+            np.subtract(self._x, give, out=give)
+            np.multiply(self._gained, give != 0, out=rubbed)
+            rubbed *= rub
+        else:
+            give, rubbed = self._x, np.multiply(self._gained, rub, out=self._rubbed)
+        total = np.multiply(give, pull, out=self._force)
+        total += rubbed
+        if force is not None:
+            force[:] = total
+        self._gained += push
+        self._gained -= total
+        self._x += self._gained
 
 
-def _free(load: np.ndarray, motion: Motion, gap: float) -> np.ndarray:
+def _free(load: np.ndarray, q: np.ndarray, dq: np.ndarray, rate: float, gap: float) -> np.ndarray:
     """Return (N, n) the share of each sample in which a motor has not crossed the gap since its load changed sign."""
     rows = np.arange(len(load))[:, None]
     crossed = np.diff(np.sign(load), axis=0, prepend=np.sign(load[:1])) != 0
     last = np.maximum.accumulate(np.where(crossed, rows, -1), axis=0)
-    way = np.abs(motion.q - np.take_along_axis(motion.q, np.maximum(last, 0), axis=0))
-    step = np.maximum(np.abs(motion.dq) / motion.rate, 1e-9)
+    way = np.abs(q - np.take_along_axis(q, np.maximum(last, 0), axis=0))
+    step = np.maximum(np.abs(dq) / rate, 1e-9)
     inside = np.clip((gap - way) / step + 0.5, 0.0, 1.0)
-    return np.where((last >= 0) & (rows - last <= _WINDOW * motion.rate), inside, 0.0)
+    return np.where((last >= 0) & (rows - last <= _WINDOW * rate), inside, 0.0)
 
 
 class _Compliance(JointEffect):
@@ -122,6 +149,16 @@ class _Compliance(JointEffect):
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
     rare: ClassVar[bool] = True
+
+    def _places(self, robot: Robot) -> list[int]:
+        return [robot.index(joint.name) for joint in self.acting(robot)]
+
+
+def _at(acting: list[int], motion: Motion, samples: np.ndarray) -> np.ndarray:
+    """Return (N, n) with the samples (N, m) of the acting joints; zero at the others, which are not worked out."""
+    found = np.zeros_like(motion.dq)
+    found[:, acting] = samples
+    return found
 
 
 @dataclass(frozen=True)
@@ -154,13 +191,17 @@ class Backlash(_Compliance):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return what passes the gap beyond what passes a stiff gear."""
-        load = load_torque(robot, motion, predicted)
+        acting = self._places(robot)
+        load = load_torque(robot, motion, predicted)[:, acting]
         if self.by_way:
-            return (-load * _free(load, motion, self.b),)
-        inertia = load_inertia(robot, motion, predicted)
-        load, inertia = load - self.rotor_share * inertia * motion.ddq, (1 - self.rotor_share) * inertia
-        speed = np.full_like(load, 2 * np.pi * _CONTACT)
-        return (transmitted(load, inertia, motion.rate, speed, _CONTACT_DAMPING, self.b, motion.start) - load,)
+            free = _free(load, motion.q[:, acting], motion.dq[:, acting], motion.rate, self.b)
+            return (_at(acting, motion, -load * free),)
+        inertia = load_inertia(robot, motion, predicted)[:, acting]
+        load = load - self.rotor_share * inertia * motion.ddq[:, acting]
+        inertia = (1 - self.rotor_share) * inertia
+        speed = 2 * np.pi * _CONTACT
+        passed = transmitted(load, inertia, motion.rate, speed, _CONTACT_DAMPING, self.b, motion.start)
+        return (_at(acting, motion, passed - load),)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
@@ -199,12 +240,14 @@ class JointElasticity(_Compliance):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return what a unit of the coefficient adds."""
-        load = load_torque(robot, motion, predicted)
+        acting = self._places(robot)
+        load = load_torque(robot, motion, predicted)[:, acting]
         if self.frequency == 0:
-            return (differentiate(differentiate(load, motion.rate), motion.rate),)
-        inertia = load_inertia(robot, motion, predicted)
-        speed = 2 * np.pi * self.frequency * np.sqrt(_middle_inertia(robot) / inertia)
-        return (transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start) - load,)
+            return (_at(acting, motion, differentiate(differentiate(load, motion.rate), motion.rate)),)
+        inertia = load_inertia(robot, motion, predicted)[:, acting]
+        speed = 2 * np.pi * self.frequency * np.sqrt(_middle_inertia(robot)[acting] / inertia)
+        passed = transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start)
+        return (_at(acting, motion, passed - load),)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
@@ -224,7 +267,7 @@ class JointElasticity(_Compliance):
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how soft the acting joint that moves least can be."""
-        inertia = _middle_inertia(robot)[[robot.index(joint.name) for joint in self.acting(robot)]]
+        inertia = _middle_inertia(robot)[self._places(robot)]
         softest = (2 * np.pi * _SLOWEST) ** 2 * float(inertia.min())
         return {"K": Possible(softest, np.inf, f"softer, the link would swing at less than {_SLOWEST:g} Hz")}
 

@@ -262,9 +262,9 @@ class PreslidingHysteresis(JointEffect):
         return (Term("Fc", force_unit(joint), joint.name, spread=15.0, lowest=0.0),)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return z - s."""
+        """Return z - s, at the acting joints."""
         column = np.zeros_like(motion.dq)
-        for joint in range(column.shape[1]):
+        for joint in (robot.index(each.name) for each in self.acting(robot)):
             signs = direction(motion.dq[:, joint])
             column[:, joint] = self._lag(motion.q[:, joint], signs)
         return (column,)

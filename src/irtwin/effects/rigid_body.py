@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
+from weakref import ReferenceType, ref
 
 import numpy as np
 import pinocchio as pin
@@ -48,13 +49,7 @@ class RigidBody(Effect):
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return the (N, n, 10 n) torque regressor."""
-        model = robot.model
-        data = model.createData()
-        regressor = np.empty((len(motion.time), model.nv, 10 * model.nv))
-        regress = pin.computeJointTorqueRegressor
-        for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-            regressor[row] = regress(model, data, *state)
-        return regressor
+        return _regressor(robot, motion)
 
     def contribution(
         self, robot: Robot, motion: Motion, values: np.ndarray, predicted: Predicted | None = None
@@ -151,16 +146,47 @@ def _slope(model: pin.Model, motion: Motion) -> np.ndarray:
 
 def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
     """Return (N, n, 10) the regressor of the body that carries the flange; zeros where no joint moves it."""
+    carrier = flange_frame(robot).parentJoint
+    if carrier == 0:
+        return np.zeros((*motion.q.shape, 10))
+    return _regressor(robot, motion)[:, :, 10 * (carrier - 1) : 10 * carrier]
+
+
+class _Last:
+    """The regressor that was asked for last: bodies and payload ask for that of the same part of a run in turn."""
+
+    def __init__(self) -> None:
+        self._known: tuple[ReferenceType[Robot], ReferenceType[Motion], np.ndarray] | None = None
+
+    def of(self, robot: Robot, motion: Motion) -> np.ndarray | None:
+        known = self._known
+        return known[2] if known and known[0]() is robot and known[1]() is motion else None
+
+    def keep(self, robot: Robot, motion: Motion, regressor: np.ndarray) -> None:
+        self._known = ref(robot), ref(motion, self._forget), regressor
+
+    def _forget(self, motion: ReferenceType[Motion]) -> None:
+        if self._known and self._known[1] is motion:
+            self._known = None
+
+
+_last = _Last()
+
+
+def _regressor(robot: Robot, motion: Motion) -> np.ndarray:
+    """Return the (N, n, 10 n) torque regressor of all bodies, not to be written to."""
+    found = _last.of(robot, motion)
+    if found is not None:
+        return found
     model = robot.model
     data = model.createData()
-    carrier = flange_frame(robot).parentJoint
-    columns = np.zeros((*motion.q.shape, 10))
-    if carrier == 0:
-        return columns
-    first = 10 * (carrier - 1)
+    regressor = np.empty((len(motion.time), model.nv, 10 * model.nv))
+    regress = pin.computeJointTorqueRegressor
     for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-        columns[row] = np.atleast_2d(pin.computeJointTorqueRegressor(model, data, *state))[:, first : first + 10]
-    return columns
+        regressor[row] = regress(model, data, *state)
+    regressor.flags.writeable = False
+    _last.keep(robot, motion, regressor)
+    return regressor
 
 
 def to_body(placement: pin.SE3) -> np.ndarray:

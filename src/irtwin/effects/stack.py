@@ -145,6 +145,34 @@ class Stack:
         parts = [self.columns(effect, motion, below.get(effect.stage)) for effect in self._torque]
         return np.concatenate([np.zeros((*motion.dq.shape, 0)), *parts], axis=2)
 
+    def columns_by_joint(self, motion: Motion, values: np.ndarray | None = None) -> list[np.ndarray]:
+        """Return, for each joint, the columns (N, k) of the coefficients that can act on it, by `pattern`.
+
+        It is `torque_columns` without the zeros, which are most of it; `values` as there.
+        """
+        below = self._torques(motion, values).below if self.coupled else {}
+        found: list[list[np.ndarray]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
+        for effect, own in self._torque_places:
+            if isinstance(effect, JointEffect) and effect.acts_in(motion) and not effect.memory:
+                before = below.get(effect.stage)
+                stop = motion.start + len(motion.time)
+                samples = effect.samples(self.robot, motion, before and before.part(motion.start, stop))
+                for joint in effect.acting(self.robot):
+                    place = self.robot.index(joint.name)
+                    found[place] += [sample[:, place : place + 1] for sample in samples]
+            else:
+                columns = self.columns(effect, motion, below.get(effect.stage))
+                for place, used in enumerate(self.pattern[:, own]):
+                    found[place].append(columns[:, place, used])
+        return [side_by_side(columns) for columns in found]
+
+    def shift_torque(self, motion: Motion, columns: Sequence[np.ndarray]) -> np.ndarray:
+        """Return the torque (N, n), N m, of what is known to be added, by the columns of each joint."""
+        shift = self.shift(motion)
+        if not shift.any():
+            return np.zeros(motion.dq.shape)
+        return np.column_stack([own @ shift[used] for own, used in zip(columns, self.pattern, strict=True)])
+
     def undecided(self, motion: Motion) -> np.ndarray:
         """Return (N, n) where some effect cannot say the joint's torque."""
         undecided = np.zeros(motion.dq.shape, dtype=bool)
@@ -314,3 +342,8 @@ def _slices(effects: Sequence[Effect], robot: Robot) -> Iterator[tuple[Effect, s
         stop = start + len(effect.terms(robot))
         yield effect, slice(start, stop)
         start = stop
+
+
+def side_by_side(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Return columns (N, some) of several arrays as one, each column in one stretch of memory: so it is filtered."""
+    return np.concatenate([part.T for part in parts]).T

@@ -22,20 +22,22 @@ from irtwin.signals.motion import Motion
 class Rows:
     """g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g).
 
-    `columns` may also be g arrays (N, k_e), of the columns that each equation has by the `pattern`. Where `undecided`
-    (N, g) the equation does not hold, and is left out.
+    `columns` may also be, for each equation, the arrays (N, some) that side by side are the columns which it has by the
+    `pattern`: they are joined when few samples are left. A function that returns them is called beside the work on the
+    next part. Where `undecided` (N, g) the equation does not hold, and is left out.
     """
 
-    columns: np.ndarray | Sequence[np.ndarray]
+    columns: np.ndarray | Sequence[Sequence[np.ndarray] | Callable[[], Sequence[np.ndarray]]]
     known: np.ndarray
     measured: np.ndarray
     undecided: np.ndarray | None = None
 
-    def own(self, equation: int, used: np.ndarray) -> np.ndarray:
-        """Return the columns (N, k_e) of an equation, `used` (K,) by the pattern."""
+    def own(self, equation: int, used: np.ndarray) -> Sequence[np.ndarray]:
+        """Return the columns of an equation, `used` (K,) by the pattern, as arrays (N, some) to stand side by side."""
         if isinstance(self.columns, np.ndarray):
-            return self.columns[:, equation, used]
-        return self.columns[equation]
+            return [self.columns[:, equation, used]]
+        given = self.columns[equation]
+        return given() if callable(given) else given
 
 
 Equations = Callable[[Motion], Rows]
@@ -80,13 +82,13 @@ def accumulate_any(motions: Sequence[Motion], equations: Equations, pattern: np.
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
     found = [_Growing(motion, *stretch, pattern) for motion in motions for stretch in _stretches(motion, total)]
-    with ThreadPoolExecutor(1) as other:  # while the next part's columns are computed
+    with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
         for one in found:
-            for part in one.parts(equations):
+            for sample in one.samples(equations):
                 if adding:
                     adding.result()
-                adding = other.submit(one.add, part)
+                adding = other.submit(one.add, sample)
         if adding:
             adding.result()
     return [one.block() for one in found if one.rows.any()]
@@ -133,22 +135,29 @@ class _Growing:
 
     def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray):
         self._motion, self._start, self._stop, self._pattern = motion, start, stop, pattern
+        self._taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
+        self._step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
         self._factors = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
         self.rows = np.zeros(len(pattern), dtype=int)
 
-    def parts(self, equations: Equations) -> Iterator[list[np.ndarray]]:
-        """Yield each equation's rows of [columns | measurement], filtered and decimated, part by part."""
-        motion = self._motion
-        taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
-        step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
-        half = len(taps) // 2
+    def samples(self, equations: Equations) -> Iterator[Rows]:
+        """Yield the equations part by part, each with half a kernel more at either end."""
+        motion, half, step = self._motion, len(self._taps) // 2, self._step
         size = step * max(1, min(_CHUNK // step, _ROWS))
         end = min(self._stop, len(motion.time) - half)
         for first in range(max(self._start, half), end, size):
             last = min(first + size, end)
-            yield self._part(equations(motion.part(first - half, last + half)), taps, step)
+            yield equations(motion.part(first - half, last + half))
 
-    def _part(self, sample: Rows, taps: np.ndarray, step: int) -> list[np.ndarray]:
+    def add(self, sample: Rows) -> None:
+        """Take in a part, filtered and decimated."""
+        parts = self._reduced(sample)
+        self.rows += [len(part) for part in parts]
+        self._factors = [triangle(np.concatenate(pair)) for pair in zip(self._factors, parts, strict=True)]
+
+    def _reduced(self, sample: Rows) -> list[np.ndarray]:
+        """Return each equation's rows of [columns | measurement], filtered and decimated."""
+        taps, step = self._taps, self._step
         half = len(taps) // 2
         measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
         keep = np.ones(measured.shape, dtype=bool)
@@ -156,14 +165,9 @@ class _Growing:
             keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
         rows = []
         for equation, used in enumerate(self._pattern):
-            columns = decimate(sample.own(equation, used), taps, step)
-            rows.append(np.column_stack([columns, measured[:, equation]])[keep[:, equation]])
+            columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
+            rows.append(np.column_stack([*columns, measured[:, equation]])[keep[:, equation]])
         return rows
-
-    def add(self, parts: Sequence[np.ndarray]) -> None:
-        """Take in each equation's rows."""
-        self.rows += [len(part) for part in parts]
-        self._factors = [triangle(np.concatenate(pair)) for pair in zip(self._factors, parts, strict=True)]
 
     def block(self) -> Block:
         """Return what the block has become."""

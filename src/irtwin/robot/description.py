@@ -80,7 +80,7 @@ class Robot:
         """The Pinocchio model, nq = nv = n, built from `urdf`."""
         return build_model(self.urdf)
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names in the order of `q`."""
         return tuple(joint.name for joint in self.joints)

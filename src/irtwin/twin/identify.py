@@ -176,8 +176,9 @@ def _solve_torque(stack: Stack, motions: Sequence[Motion]) -> tuple[list[Block],
 def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
-        columns = stack.torque_columns(motion, values)
-        return Rows(columns, columns @ stack.shift(motion), motion.torque, stack.undecided(motion))
+        columns = stack.columns_by_joint(motion, values)
+        shifted = stack.shift_torque(motion, columns)
+        return Rows([[own] for own in columns], shifted, motion.torque, stack.undecided(motion))
 
     return equations
 

@@ -68,7 +68,9 @@ def find_beside_power(
     power = TwinPower(stack, case.with_power, case.grouping, explained)
     left = floor_left(case, floor, explained, power)
     if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * noise_before(power.system)[0]:
-        equations = about(explained, power, _best_shapes(equations.whole, both))
+        shapes = _best_shapes(equations.whole, both)
+        del equations  # before as much memory is taken once more
+        equations = about(explained, power, shapes)
     elif left is floor:
         return first, floor
     return _find(case, equations, left, seed, without)[0], left

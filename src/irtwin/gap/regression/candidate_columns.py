@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect, Predicted
+from irtwin.effects.stack import side_by_side
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -62,7 +63,7 @@ class Candidates:
         for place in range(len(self._effects)):
             for equation, own in zip(found, self._own(place, whole, motion), strict=True):
                 equation += own
-        return [np.concatenate(equation, axis=1) for equation in found]
+        return [side_by_side(equation) for equation in found]
 
     def _own(self, place: int, whole: Motion, motion: Motion) -> Parts:
         """Return an effect's columns over a part of the run that is held."""
@@ -79,7 +80,7 @@ class Candidates:
         """Compute an effect's columns over a piece of a run, with `around` samples before and after."""
         first, last = max(0, start - around), min(stop + around, len(whole.time))
         parts = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
-        return _Held(parts, first, start if first else 0, stop if last < len(whole.time) else last)
+        return _Held(_alone(parts), first, start if first else 0, stop if last < len(whole.time) else last)
 
     def _hold(self, whole: Motion) -> None:
         self._held = {}  # let go of the run before
@@ -87,7 +88,7 @@ class Candidates:
         for place, effect in enumerate(self._effects):
             if effect.memory and effect.reach is None:
                 every = len(whole.time)
-                self._held[place] = _Held(self._columns(place, whole, self._predicted), 0, 0, every)
+                self._held[place] = _Held(_alone(self._columns(place, whole, self._predicted)), 0, 0, every)
 
     def _columns(self, place: int, motion: Motion, predicted: Predicted | None) -> Parts:
         effect, robot = self._effects[place], self._robot
@@ -103,6 +104,11 @@ class Candidates:
         columns = free_columns(effect, robot, motion, predicted)
         by_equation = columns[:, None] if columns.ndim == 2 else columns
         return [[by_equation[:, equation, used]] for equation, used in enumerate(self._patterns[place])]
+
+
+def _alone(parts: Parts) -> Parts:
+    """Return copies of columns, in memory of their own: those of joints that an effect does not act on can go."""
+    return [[np.array(columns, order="F") for columns in equation] for equation in parts]
 
 
 def free_columns(effect: Effect, robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:

@@ -44,12 +44,9 @@ def torque_system(
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
-        own = stack.torque_columns(motion)
-        joined = [
-            np.concatenate([own[:, joint, used], added], axis=1)
-            for joint, (used, added) in enumerate(zip(stack.pattern, candidates.part(motion), strict=True))
-        ]
-        return Rows(joined, own @ stack.shift(motion), motion.torque, stack.undecided(motion))
+        own = stack.columns_by_joint(motion)
+        columns = list(zip(own, candidates.part(motion), strict=True))
+        return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion))
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     known = stack.prior_rows(stack.torque_terms)
@@ -82,8 +79,8 @@ def power_system(
         assert motion.power is not None
         own = stack.power_columns(motion, predicted(motion))
         known = own[:, stack.fixed] @ fixed_values
-        joined = np.concatenate([own[:, ~stack.fixed], *candidates.part(motion)], axis=1)
-        return Rows([joined], known[:, None], motion.power[:, None])
+        columns = [own[:, ~stack.fixed], *candidates.part(motion)]
+        return Rows([columns], known[:, None], motion.power[:, None])
 
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     known = stack.prior_rows(free)

@@ -94,11 +94,9 @@ def scores(
     for block in range(len(system.blocks)):
         vector = np.zeros(len(total))
         for equation, level in enumerate(noise):
-            factor, used = system.factor(block, equation)
-            places = np.append(used, len(total) - 1)
-            left = factor @ rest[places]
+            left, products = system.scored(block, equation, rest)
             loud = np.sqrt(left @ left / max(system.blocks[block].rows[equation], 1)) / level
-            vector[places] += factor.T @ left / level**2 / max(float(loud), _QUIET)
+            vector += products / level**2 / max(float(loud), _QUIET)
         found[block] = (vector - weights.T @ vector[inside])[:-1]
     return found, total - total[inside].T @ weights
 

@@ -49,23 +49,25 @@ def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]], seed: int) -> t
     """
     gaps = [(part, floor, part.rmse(part.before) > floor) for part, floor in parts]
 
-    def fraction(generator: np.random.Generator | None) -> float:
-        above, below = 0.0, 0.0
-        for part, floor, gap in gaps:
-            groups = len(part.rows)
-            pick = np.arange(groups) if generator is None else generator.integers(groups, size=groups)
-            rows = np.maximum(part.rows[pick].sum(axis=0), 1)
-            above += float(np.sum((part.before[pick].sum(axis=0) / rows / floor**2 - 1)[gap]))
-            below += float(np.sum((part.after[pick].sum(axis=0) / rows / floor**2 - 1)[gap]))
-        return min(1 - below / above, 1.0) if above > 0 else np.nan
+    def fractions(picks: Sequence[np.ndarray]) -> np.ndarray:
+        """Return the fraction (R,) of each of R choices of groups, (R, G) of each part; NaN without a gap."""
+        above, below = np.zeros((2, len(picks[0])))
+        for (part, floor, gap), pick in zip(gaps, picks, strict=True):
+            rows = np.maximum(part.rows[pick].sum(axis=1), 1)
+            above += (part.before[pick].sum(axis=1) / rows / floor**2 - 1)[:, gap].sum(axis=1)
+            below += (part.after[pick].sum(axis=1) / rows / floor**2 - 1)[:, gap].sum(axis=1)
+        some = above > 0
+        return np.where(some, np.minimum(1 - below / np.where(some, above, 1.0), 1.0), np.nan)
 
-    value, groups = fraction(None), len(parts[0][0].rows)
+    counts = [len(part.rows) for part, _ in parts]
+    value, groups = float(fractions([np.arange(count)[None] for count in counts])[0]), counts[0]
     if not np.isfinite(value):
         return None
     if groups < 2:
         return value, [value, value]
     generator = np.random.default_rng(seed)
-    drawn = np.array([fraction(generator) for _ in range(_RESAMPLED)])
+    picks = [[generator.integers(count, size=count) for count in counts] for _ in range(_RESAMPLED)]
+    drawn = fractions([np.array(own) for own in zip(*picks, strict=True)])
     deviation = drawn[np.isfinite(drawn)].std(ddof=1) * np.sqrt(groups / (groups - 1))
     half = float(student_t.ppf(0.975, groups - 1) * deviation)
     return value, [value - half, min(value + half, 1.0)]

@@ -56,7 +56,7 @@ def joint_equations(
     Raises InputError where too few samples are left.
     """
     robot, (of_torque, of_power) = stack.robot, effects
-    mechanical, electrical = candidate_columns(robot, of_torque), candidate_columns(robot, of_power)
+    mechanical, supplied = candidate_columns(robot, of_torque), candidate_columns(robot, of_power)
     tried = candidate_pattern(robot, of_torque, mechanical)
     real = np.array([column.effect.channel == "torque" for column in mechanical], dtype=bool)
     free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
@@ -67,23 +67,22 @@ def joint_equations(
         return Predicted(torque, *power(whole, torque))
 
     shown = Candidates(robot, of_torque, tried, with_load(robot, below))
-    added = Candidates(robot, of_power, np.ones((1, len(electrical)), dtype=bool), drawn)
+    added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
 
     def equations(motion: Motion) -> Rows:
-        own, parts, torque = stack.torque_columns(motion), shown.part(motion), predicted(motion)
+        own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
         slope = power_slope(stack, motion, torque, power.values)
-        carried = np.einsum("tj,tjk->tk", slope, own[:, :, stack.real])
-        more = np.zeros((len(motion.time), len(mechanical)))
-        for joint, used in enumerate(tried):
-            more[:, used] += slope[:, [joint]] * parts[joint]
-        now = stack.power_columns(motion, torque)
-        rows = [np.concatenate([own[:, k, used], parts[k]], axis=1) for k, used in enumerate(stack.pattern)]
-        rows.append(np.concatenate([carried, now[:, ~stack.fixed], more[:, real], *added.part(motion)], axis=1))
+        carried = _carried(own, slope, stack.pattern, stack.real)
+        now, electrical = stack.power_columns(motion, torque), added.part(motion)
+
+        def of_power() -> list[np.ndarray]:
+            return [carried, now[:, ~stack.fixed], _carried(parts, slope, tried, real), *electrical]
+
         shift = stack.shift(motion)
         known = now[:, stack.fixed] @ fixed_values + carried @ shift[stack.real] - (slope * torque).sum(axis=1)
         return Rows(
-            rows,
-            np.column_stack([own @ shift, known]),
+            [*zip(own, parts, strict=True), of_power],
+            np.column_stack([stack.shift_torque(motion, own), known]),
             np.column_stack(
                 [
                     np.zeros_like(motion.dq) if motion.torque is None else motion.torque,
@@ -98,10 +97,10 @@ def joint_equations(
             ),
         )
 
-    pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(electrical))
+    pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
     alone = [replace(one, rows=one.rows[:-1], factors=one.factors[:-1]) for one in blocks if one.rows[:-1].any()]
-    terms, columns = (*stack.torque_terms, *free), (*mechanical, *electrical)
+    terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(
         terms,
         columns,
@@ -115,6 +114,20 @@ def joint_equations(
     known = stack.prior_rows(stack.torque_terms)
     torque = System(stack.torque_terms, mechanical, of_joints, tuple(alone), *grouping.of(alone), prior_rows=known)
     return JointEquations(enough(whole), enough(torque))
+
+
+def _carried(rows: Sequence[np.ndarray], slope: np.ndarray, pattern: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Return (N, R) the power that each real column carries: what it has in each joint's `rows`, times the slope.
+
+    `slope` (N, n) of power over each joint's torque; `pattern` (n, K) which columns the rows have; `real` (K,).
+    """
+    place = np.cumsum(real) - 1
+    found = np.zeros((int(real.sum()), len(slope)))
+    for own, rise, used in zip(rows, np.ascontiguousarray(slope.T), pattern, strict=True):
+        for column, k in zip(own.T, np.flatnonzero(used), strict=True):
+            if real[k]:
+                found[place[k]] += rise * column
+    return found.T
 
 
 def _pattern(

@@ -144,6 +144,28 @@ class System:
             used = np.append(used, used[later] + len(self.columns))
         return np.column_stack([columns * self.scale[used], target]), used
 
+    def scored(self, block: int, equation: int, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `weights` (D + 1,) leave of an equation in a block, (r,), and its products with all, (D + 1,).
+
+        These are `factor @ weights` and `factor.T` of that, without the factor's copies of columns.
+        """
+        used, twice = np.flatnonzero(self.pattern[equation]), self.both and bool(self.observed[block])
+        factor, own, later = self.blocks[block].factors[equation], used[used < self.base], used[used >= self.base]
+        changed = later + len(self.columns)
+        scaled = weights[:-1] * self.scale
+        each = np.append(scaled[used], weights[-1])
+        each[: len(own)] -= weights[-1] * self.expected[own]
+        if twice:
+            each[len(own) : -1] += scaled[changed]
+        left = factor @ each
+        products = factor.T @ left
+        found = np.zeros(self._size + 1)
+        found[used] = products[:-1] * self.scale[used]
+        found[-1] = products[-1] - products[: len(own)] @ self.expected[own]
+        if twice:
+            found[changed] = products[len(own) : -1] * self.scale[changed]
+        return left, found
+
     @cached_property
     def _products(self) -> list[list[tuple[np.ndarray, np.ndarray]]]:
         """Per group and equation: the indices of its columns, the measurement's (D) last, and their products."""
@@ -153,11 +175,26 @@ class System:
             blocks = np.flatnonzero(self.group == group)
             own = []
             for equation in range(len(self.pattern)):
-                factors = [self.factor(int(block), equation) for block in blocks]
-                stacked = np.concatenate([factor for factor, _ in factors])
-                own.append(self._spread(np.append(factors[0][1], self._size), stacked.T @ stacked))
+                own.append(self._spread(*self._products_of(blocks, equation)))
             found.append(own)
         return found
+
+    def _products_of(self, blocks: np.ndarray, equation: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the indices of an equation's columns, the measurement last, and their products over a group's blocks.
+
+        Of columns that stand there twice the products are worked out once.
+        """
+        used = np.flatnonzero(self.pattern[equation])
+        own, places = used[used < self.base], np.arange(len(used))
+        stacked = np.concatenate([self.blocks[block].factors[equation] for block in blocks])
+        stacked[:, -1] -= stacked[:, : len(own)] @ self.expected[own]
+        if self.both and self.observed[blocks[0]]:
+            places = np.append(places, places[len(own) :])
+            used = np.append(used, used[len(own) :] + len(self.columns))
+        places, scale = np.append(places, -1), np.append(self.scale[used], 1.0)
+        products = (stacked.T @ stacked)[np.ix_(places, places)]
+        products *= scale[:, None] * scale
+        return np.append(used, self._size), products
 
     def _fits_in_memory(self) -> None:
         """Refuse what would take too much, before any is taken."""
@@ -184,12 +221,18 @@ class System:
         return [self._weighted(group, noise) for group in range(self.groups)]
 
     def _weighted(self, group: int, noise: np.ndarray) -> np.ndarray:
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        every = [len(places) > self._size for places, _ in self._products[group]]
         total = np.zeros((self._size + 1, self._size + 1))
-        for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
-            if len(places) == len(total):
-                total += products / float(level) ** 2
+        for nth, k in enumerate(np.flatnonzero(every)):
+            _, products = self._products[group][k]
+            if nth == 0:
+                np.multiply(products, weights[k], out=total)
             else:
-                total[np.ix_(places, places)] += products / float(level) ** 2
+                total += products * weights[k]
+        for k in np.flatnonzero(~np.array(every)):
+            places, products = self._products[group][k]
+            total[np.ix_(places, places)] += products * weights[k]
         return total
 
     def _weighted_among(
