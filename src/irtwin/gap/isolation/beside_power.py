@@ -27,7 +27,7 @@ from irtwin.gap.regression.normal_equations import System, noise_before
 from irtwin.gap.regression.progress import Tell
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.estimators import Estimate
-from irtwin.twin.identify import power_slope
+from irtwin.identification.power_line import power_slope
 
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 

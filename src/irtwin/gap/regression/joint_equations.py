@@ -17,8 +17,8 @@ from irtwin.gap.regression.hypotheses import Variant, candidate_columns
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.progress import Tell, with_progress
 from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.identification.power_line import power_line, rows_of_both
 from irtwin.signals.motion import Motion
-from irtwin.twin.identify import power_slope
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,6 @@ def joint_equations(
     tried = candidate_pattern(robot, of_torque, mechanical)
     real = np.array([column.effect.channel == "torque" for column in mechanical], dtype=bool)
     free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
-    fixed_values = power.values[stack.fixed]
 
     def drawn(whole: Motion) -> Predicted:
         torque = predicted(whole)
@@ -71,32 +70,13 @@ def joint_equations(
 
     def equations(motion: Motion) -> Rows:
         own, parts, torque = stack.torque_columns(motion), shown.part(motion), predicted(motion)
-        slope = power_slope(stack, motion, torque, power.values)
-        carried = np.einsum("tj,tjk->tk", slope, own[:, :, stack.real])
+        line = power_line(stack, motion, own, torque, stack.power_columns(motion, torque), power.values)
         more = np.zeros((len(motion.time), len(mechanical)))
         for joint, used in enumerate(tried):
-            more[:, used] += slope[:, [joint]] * parts[joint]
-        now = stack.power_columns(motion, torque)
+            more[:, used] += line.slope[:, [joint]] * parts[joint]
         rows = [np.concatenate([own[:, k, used], parts[k]], axis=1) for k, used in enumerate(stack.pattern)]
-        rows.append(np.concatenate([carried, now[:, ~stack.fixed], more[:, real], *added.part(motion)], axis=1))
-        shift = stack.shift(motion)
-        known = now[:, stack.fixed] @ fixed_values + carried @ shift[stack.real] - (slope * torque).sum(axis=1)
-        return Rows(
-            rows,
-            np.column_stack([own @ shift, known]),
-            np.column_stack(
-                [
-                    np.zeros_like(motion.dq) if motion.torque is None else motion.torque,
-                    np.zeros_like(known) if motion.power is None else motion.power,
-                ]
-            ),
-            np.column_stack(
-                [
-                    np.ones(motion.dq.shape, bool) if motion.torque is None else stack.undecided(motion),
-                    np.full(len(motion.time), motion.power is None),
-                ]
-            ),
-        )
+        rows.append(np.concatenate([line.carried, line.free, more[:, real], *added.part(motion)], axis=1))
+        return rows_of_both(stack, motion, rows, (own @ stack.shift(motion), line.known))
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(electrical))
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
