@@ -37,6 +37,12 @@ class JointEquations:
         ]
         return replace(variant, columns=tuple(moved))
 
+    def in_whole(self, column: int) -> int:
+        """Return the index of a candidate column of torque alone among those of both."""
+        if column < self.torque.changed:
+            return column + self.whole.base - self.torque.base
+        return column - self.torque.changed + self.whole.changed
+
 
 def joint_equations(
     stack: Stack,
