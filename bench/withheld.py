@@ -45,7 +45,7 @@ PUBLISHED = {
     "coulomb_friction": ("Fc", "N m", (7.14, 8.26, 6.34, 2.48, 3.03, 0.28)),
 }
 PUBLISHED_COUPLING = {"Ia": 0.0096, "Fv": 0.616, "Fc": 1.95}
-MATTERS = 1.05  # times the RMS residual that a joint's fit leaves with the effect, where it leaves that without it
+MATTERS = 1.05  # times the RMS residual that is left at a joint with the effect, where that is left without it
 
 
 @dataclass(frozen=True)
@@ -166,19 +166,36 @@ def nulls(data_set: DataSet, full: Twin) -> dict[str, tuple[Twin, bool]]:
 
 
 def where_it_matters(data_set: DataSet, effect: str, twin: Sequence[str | Effect] = BASELINE) -> tuple[str, ...]:
-    """Return the joints whose torque a twin of some effects fits worse without this one, by MATTERS."""
+    """Return the joints at which a twin of some effects needs this one: without it there, some joint fits worse.
+
+    Joint by joint: where an effect is left out of all, bodies and friction that make up for it spoil joints that never
+    needed it.
+    """
     if catalogue()[effect].signal != "torque":
         return ()
-    cutoff = choose_cutoff(data_set.runs)
-    motions = [condition(run, data_set.robot, cutoff) for run in data_set.runs]
+    robot, cutoff = data_set.robot, choose_cutoff(data_set.runs)
+    motions = [condition(run, robot, cutoff) for run in data_set.runs]
 
     def left(effects: Sequence[str | Effect]) -> np.ndarray:
-        fits = validate(identify(data_set.robot, motions, effects), motions)
+        fits = validate(identify(robot, motions, effects), motions)
         return np.sqrt(np.mean([fit.torque_rmse**2 for fit in fits if fit.torque_rmse is not None], axis=0))
 
-    others = [each for each in twin if (each if isinstance(each, str) else each.id) != effect]
-    ratio = left(others) / left(twin)
-    return tuple(name for name, value in zip(data_set.robot.joint_names, ratio, strict=True) if value >= MATTERS)
+    whole = left(twin)
+    worse = {name: (left(_without(twin, effect, name, robot.joint_names)) / whole).max() for name in robot.joint_names}
+    return tuple(name for name, ratio in worse.items() if ratio >= MATTERS)
+
+
+def _without(twin: Sequence[str | Effect], effect: str, joint: str, joints: Sequence[str]) -> list[str | Effect]:
+    """Return the effects of a twin, this one at the other joints alone."""
+    found: list[str | Effect] = []
+    for each in twin:
+        if (each if isinstance(each, str) else each.id) != effect:
+            found.append(each)
+            continue
+        one = catalogue()[each] if isinstance(each, str) else each
+        rest = [name for name in one.joints or joints if name != joint]
+        found += [one.on(*rest)] if rest else []
+    return found
 
 
 def page(robots: Sequence[Robot], missing: Sequence[str], command: str) -> str:
@@ -195,8 +212,8 @@ def page(robots: Sequence[Robot], missing: Sequence[str], command: str) -> str:
         "",
         "## Each effect withheld from the default twin",
         "",
-        f"A joint counts where leaving the effect out of the default twin raises the RMS residual of its fit by "
-        f"{100 * (MATTERS - 1):.0f} % or more. New are causes that the whole twin's diagnosis does not give.",
+        f"A joint counts where leaving the effect out there raises the RMS residual of the default twin at some joint "
+        f"by {100 * (MATTERS - 1):.0f} % or more. New are causes that the whole twin's diagnosis does not give.",
         "",
         "| robot | withheld | verdict | place | among new | joints right | missed | besides | confidence "
         "| not told apart from | gap closed, 95 % interval | s |",

@@ -74,6 +74,7 @@ def test_an_effect_matters_where_the_fit_gets_worse_without_it():
     assert where_it_matters(logged(), "coulomb_friction") == ("joint_1", "joint_2")
     assert where_it_matters(logged(lambda m: -dry * np.sign(m.dq)), "coulomb_friction") == ("joint_1",)
     assert where_it_matters(logged(), "standby_power") == ()
+    assert "joint_1" not in where_it_matters(logged(), "rotor_inertia")  # its link's inertia says the same
     assert where_it_matters(logged(), "coulomb_friction", fitted(logged()).effects) == ("joint_1", "joint_2")
 
 

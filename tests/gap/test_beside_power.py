@@ -13,7 +13,8 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.beside_power import find_beside_power
-from irtwin.gap.isolation.finding import find
+from irtwin.gap.isolation.estimates import estimate_of
+from irtwin.gap.isolation.finding import find, keeping
 from irtwin.gap.isolation.verdict import AMBIGUOUS, ATTRIBUTED, verdict_of
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.cross_fitted import LeftOut
@@ -28,8 +29,13 @@ DRAWN = ("meter_gain", "iron_loss")
 FLOOR = Floor(np.full(2, NOISE), NOISE, None)
 
 
-def case(*, real: float = 0.0, shown: float = 0.0, changed: bool = False, gain: float = 1.0) -> Case:
-    """Runs in which a constant torque, N m, acts on joint 2 or is only shown there; `changed`: not in half of them."""
+def case(
+    *, real: float = 0.0, shown: float = 0.0, changed: bool = False, gain: float = 1.0, cable: float = 0.0
+) -> Case:
+    """Runs in which a constant torque, N m, acts on joint 2 or is only shown there; `changed`: not in half of them.
+
+    A cable pulls at joint 1, N m/rad.
+    """
     motions, runs = {}, []
     for k in range(12 if changed else 6):
         observed = k < 6
@@ -37,6 +43,7 @@ def case(*, real: float = 0.0, shown: float = 0.0, changed: bool = False, gain: 
         plain = measure(ROBOT, motion, noise=NOISE, seed=k)
         more = np.zeros_like(motion.dq)
         more[:, 1] = real * observed
+        more[:, 0] = cable * motion.q[:, 0]
         current = plain.current
         loss = truth(ROBOT)["R"] * ((2 * current + more / 8.0) * more / 8.0)
         power = gain * (plain.power + (more * motion.dq + loss).sum(axis=1))
@@ -69,6 +76,17 @@ def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     terms = [(effect.id, term.joint) for effect, term in finding.system.terms]
     offset = finding.estimate.values[terms.index(("torque_offset", "joint_2"))]
     assert offset == pytest.approx(truth(ROBOT)["c"][1], abs=0.3)  # of the sensor alone
+
+
+def test_what_is_kept_is_fitted_with_power_again():
+    finding = found(case(real=3.0, cable=6.0))
+    assert sorted(names(finding)) == ["asymmetric_friction missing joint_2", "cable_drag missing joint_1"]
+    kept = keeping(finding, [cause for cause in finding.causes if cause.effect == "asymmetric_friction"], 0)
+    terms = [(effect.id, term.joint) for effect, term in kept.system.terms]
+    place, true = terms.index(("torque_offset", "joint_2")), truth(ROBOT)["c"][1]
+    alone = estimate_of(kept.system, kept.chosen).values[place]  # by torque alone
+    assert abs(kept.estimate.values[place] - true) < abs(alone - true) / 2
+    assert kept.attribution.noise[0] > 2 * finding.attribution.noise[0]  # of the cable
 
 
 def test_an_offset_of_a_sensor_costs_none():

@@ -53,6 +53,23 @@ def test_noisy_equations_count_less():
     np.testing.assert_allclose(found.noise, [10, 0.01], rtol=0.1)
 
 
+def test_each_signal_counts_by_how_long_its_own_residuals_remember():
+    """Two equations of one coefficient: the first's residuals are held for 50 samples, the second's for none."""
+    rng = np.random.default_rng(3)
+    columns, blocks = np.ones((5000, 1)), []
+    slow = np.repeat(rng.standard_normal(100), 50)
+    fast = 0.3 + rng.standard_normal(5000)
+    for one, other in zip(np.array_split(slow, 20), np.array_split(fast, 20), strict=True):
+        rows = columns[: len(one)]
+        factors = tuple(triangle(np.column_stack([rows, measured])) for measured in (one, other))
+        blocks.append(Block("run", 0.0, 1.0, np.array([len(one), len(one)]), factors))
+    pattern, terms = np.ones((2, 1), dtype=bool), [Term("a", "", spread=10)]
+    alike, apart = estimate(blocks, pattern, terms), estimate(blocks, pattern, terms, signals=[0, 1])
+    assert alike.values[0] == pytest.approx((slow.mean() + fast.mean()) / 2, abs=0.02)
+    assert abs(apart.values[0] - fast.mean()) < abs(alike.values[0] - fast.mean()) / 3
+    assert apart.covariance[0, 0] < alike.covariance[0, 0]
+
+
 def test_what_the_data_leave_open_stays_as_expected():
     rng = np.random.default_rng(2)
     one = rng.standard_normal((500, 1))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth, with_constants
 
-from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.errors import InputError
 from irtwin.signals.conditioning import condition
 from irtwin.twin.identify import identify
@@ -153,6 +153,71 @@ def test_runs_may_lack_what_others_have():
     twin = identify(robot, [torque_only, full])
     assert values(twin, "standby_power")[0] > 0
     assert twin.fitted == ("swing_2", "swing_1")
+
+
+def both_signals(robot, seed, gain=1.0, harder=0.0, told=None):
+    """What a robot of the truth shows whose joint 2 has an own gain, and is harder to move forwards than back, N m.
+
+    `told`: what power is that the robot takes, by that which it would.
+    """
+    rng, true = np.random.default_rng(seed), truth(robot)
+    motion = measure(robot, swing(robot, seed, seconds=10.0))
+    torque = motion.torque - true["c"]
+    torque[:, 1] += harder * (motion.dq[:, 1] > 0)
+    power = true["P0"] + (torque * motion.dq).sum(axis=1) + (true["R"] * (torque / 8.0) ** 2).sum(axis=1)
+    shown = torque * [1.0, gain, 1.0] + true["c"] + 0.5 * rng.standard_normal(torque.shape)
+    power = power if told is None else told(power)
+    return replace(motion, torque=shown, power=power + 2 * rng.standard_normal(len(power)))
+
+
+def at_joint_2(twin, effect, name):
+    return next(p for p in twin.parameters if (p.effect, p.joint, p.name) == (effect, "joint_2", name))
+
+
+def test_power_tells_friction_from_an_offset():
+    robot = with_constants(arm(3))
+    motions = [both_signals(robot, seed, harder=4.0) for seed in (1, 2)]
+    effects = (*ALL, catalogue()["asymmetric_friction"].on("joint_2"))
+    blind = identify(robot, [replace(motion, power=None) for motion in motions], effects)
+    assert at_joint_2(blind, "torque_offset", "c").lower is None  # torque cannot tell
+    twin = identify(robot, motions, effects)
+    offset, friction = at_joint_2(twin, "torque_offset", "c"), at_joint_2(twin, "asymmetric_friction", "a")
+    assert offset.upper - offset.lower < 0.4
+    assert offset.value == pytest.approx(0.0, abs=0.2)
+    assert friction.value == pytest.approx(2.0, abs=0.6)  # gravity is constant too, nearly
+
+
+def test_power_tells_a_torque_constant_that_is_off():
+    robot = with_constants(arm(3))
+    motions = [both_signals(robot, seed, gain=1.1) for seed in (1, 2)]
+    twin = identify(robot, motions, (*ALL, catalogue()["torque_constant_error"].on("joint_2")))
+    gain = at_joint_2(twin, "torque_constant_error", "g - 1")
+    assert gain.lower < 0.1 < gain.upper
+    assert gain.upper - gain.lower < 0.06
+    assert at_joint_2(twin, "viscous_friction", "Fv").value == pytest.approx(truth(robot)["Fv"][1], rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("effects", "told"),
+    [(BASELINE, None), (ALL, lambda power: np.maximum(power, 150.0)), (ALL, lambda power: power / 0.9)],
+    ids=["no copper loss", "braking is burnt", "mains"],
+)
+def test_what_the_twin_lacks_of_power_does_not_look_like_an_offset(effects, told):
+    robot = with_constants(arm(3))
+    twin = identify(robot, [both_signals(robot, seed, told=told) for seed in (1, 2)], effects)
+    true = truth(robot)
+    np.testing.assert_allclose(values(twin, "torque_offset"), true["c"], atol=0.25)
+    np.testing.assert_allclose(values(twin, "coulomb_friction"), true["Fc"], rtol=0.03)
+    np.testing.assert_allclose(values(twin, "viscous_friction"), true["Fv"], rtol=0.03)
+
+
+def test_power_without_work_says_nothing_of_torque():
+    robot = with_constants(arm(2))
+    motion = measure(robot, swing(robot, 1, seconds=6.0), noise=0.3)
+    effects = [effect for effect in ALL if effect != "mechanical_power"]
+    blind = identify(robot, [replace(motion, power=None)], effects)
+    twin = identify(robot, [motion], effects)
+    np.testing.assert_array_equal(values(twin, "torque_offset"), values(blind, "torque_offset"))
 
 
 def test_nothing_to_fit():

@@ -171,7 +171,11 @@ class Stack:
         shift = self.shift(motion)
         if not shift.any():
             return np.zeros(motion.dq.shape)
-        return np.column_stack([own @ shift[used] for own, used in zip(columns, self.pattern, strict=True)])
+        return self.sum_by_joint(columns, shift)
+
+    def sum_by_joint(self, columns: Sequence[np.ndarray], values: np.ndarray) -> np.ndarray:
+        """Return the torque (N, n), N m, of coefficients (K,) by the columns of each joint."""
+        return np.column_stack([own @ values[used] for own, used in zip(columns, self.pattern, strict=True)])
 
     def undecided(self, motion: Motion) -> np.ndarray:
         """Return (N, n) where some effect cannot say the joint's torque."""

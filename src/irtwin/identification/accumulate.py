@@ -17,6 +17,8 @@ from irtwin.errors import InputError
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
 
+Given = Sequence[np.ndarray] | Callable[[], Sequence[np.ndarray]]  # an equation's columns
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -27,7 +29,7 @@ class Rows:
     next part. Where `undecided` (N, g) the equation does not hold, and is left out.
     """
 
-    columns: np.ndarray | Sequence[Sequence[np.ndarray] | Callable[[], Sequence[np.ndarray]]]
+    columns: np.ndarray | Sequence[Given]
     known: np.ndarray
     measured: np.ndarray
     undecided: np.ndarray | None = None

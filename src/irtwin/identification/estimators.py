@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -31,7 +31,11 @@ class Estimate:
 
 
 def estimate(
-    blocks: Sequence[Block], pattern: np.ndarray, terms: Sequence[Term], prior_rows: np.ndarray | None = None
+    blocks: Sequence[Block],
+    pattern: np.ndarray,
+    terms: Sequence[Term],
+    prior_rows: np.ndarray | None = None,
+    signals: Sequence[int] | None = None,
 ) -> Estimate:
     """Estimate the coefficients of `terms` (K) from g equations a sample.
 
@@ -39,8 +43,9 @@ def estimate(
     `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that they
     show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Where more is known of the
     terms together, `prior_rows` (K, K) say it instead: rows on their deviations, in units of their spread, of noise
-    one. As samples depend on each other, they count against it by their design effect only. Bounds hold (`lowest`). The
-    covariance is explained in `uncertainty`.
+    one. As samples depend on each other, they count against it by their design effect only; where `signals` (g,) says
+    which equations are of one, each signal by its own. Bounds hold (`lowest`). The covariance is explained in
+    `uncertainty`.
     """
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
     count = np.maximum(sum(block.rows for block in blocks), 1)
@@ -57,11 +62,20 @@ def estimate(
         values = _solve(factors, noise, expected, spread, lowest, prior)
         residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
         noise = np.maximum(residual / np.sqrt(count), least)
-    _, effect = covariance(blocks, pattern, factors, values, noise, spread, prior)
-    level = noise * np.sqrt(effect)
+    level = noise.copy()
+    alike = np.zeros(len(pattern), dtype=int) if signals is None else np.array(signals)
+    for signal in np.unique(alike):
+        own = np.flatnonzero(alike == signal)
+        mine = blocks if len(own) == len(pattern) else [_only(block, own) for block in blocks]
+        _, effect = covariance(mine, pattern[own], [factors[e] for e in own], values, noise[own], spread, prior)
+        level[own] *= np.sqrt(effect)
     values = _solve(factors, level, expected, spread, lowest, prior)
     sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
     return Estimate(values, sureness, noise, len(blocks))
+
+
+def _only(block: Block, equations: np.ndarray) -> Block:
+    return replace(block, rows=block.rows[equations], factors=tuple(block.factors[e] for e in equations))
 
 
 def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:

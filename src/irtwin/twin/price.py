@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.identification.power_line import power_slope
 from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.signals.motion import Motion
-from irtwin.twin.identify import power_slope
 from irtwin.twin.twin import Twin
 
 _PIECE = 4096  # samples whose regressor is held at once

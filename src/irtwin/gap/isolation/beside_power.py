@@ -12,22 +12,20 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.estimates import BesidePower
 from irtwin.gap.isolation.explained import ExplainedTorque
-from irtwin.gap.isolation.finding import Finding, Without, attributed, estimate_of
+from irtwin.gap.isolation.finding import Finding, Without, attributed, finding_of
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.forward_selection import Attribution
-from irtwin.gap.isolation.shares import closed_squares
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.cross_validation import attempt
-from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.gap.regression.normal_equations import System, noise_before
 from irtwin.gap.regression.progress import Tell
 from irtwin.gap.regression.transient import Transient
-from irtwin.identification.estimators import Estimate
-from irtwin.twin.identify import power_slope
+from irtwin.identification.power_line import power_slope
 
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
@@ -111,20 +109,14 @@ def _find(
 ) -> tuple[Finding, Attribution]:
     """Return what both equations show of torque, and all that they show."""
     whole, torque = equations.whole, equations.torque
-    n = len(torque.pattern)
-    levels = [np.zeros(n) if floor.torque is None else floor.torque, [floor.power or 0.0]]
+    levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
     both = attributed(case, whole, np.concatenate(levels), seed, without)
-    found = _of_torque(both, equations)
-    chosen = [k for cause in found.causes for k in cause.columns]
-    judged = held_out(torque, noise_before(torque), found.noise, chosen)
-    closed = closed_squares(torque, found, seed)
-    mine = _causes_of_torque(both)
-    beside = [cause for cause in both.causes if cause not in mine]
-    fitted = estimate_of(whole, [k for cause in (*mine, *beside) for k in cause.columns])
-    used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
-    fitted = Estimate(fitted.values[used], fitted.covariance[np.ix_(used, used)], fitted.noise[:n], fitted.blocks)
-    names = case.robot.joint_names
-    return Finding("torque", names, case.observed, torque, found, judged, floor.torque, fitted, closed), both
+    of_torque = _causes_of_torque(both)
+    of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
+    beside = BesidePower(equations, tuple(of_power), both.noise)
+    where = "torque", case.robot.joint_names, case.observed
+    found = finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
+    return found, both
 
 
 def _causes_of_torque(found: Attribution) -> list[Cause]:

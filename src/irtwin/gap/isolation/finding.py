@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
@@ -15,13 +14,14 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.changes import shown_before
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
+from irtwin.gap.isolation.estimates import BesidePower, estimate_of
 from irtwin.gap.isolation.forward_selection import Attribution, attribute
 from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
-from irtwin.identification.estimators import Estimate, estimate
+from irtwin.identification.estimators import Estimate
 
 _NO_NOISE = 1e-9
 Without = str | tuple[str, str | None]
@@ -36,7 +36,7 @@ class Finding:
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
     each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
     of each; `part`: theirs of all that is closed, beside what does not repeat; `plain`: power's equation on the torque
-    of the twin as it is, where `system` stands on torque that causes explain.
+    of the twin as it is, where `system` stands on torque that causes explain; `beside`: power's, if both were fitted.
     """
 
     name: str
@@ -51,6 +51,7 @@ class Finding:
     power_balances: tuple[PowerBalance, ...] = ()
     part: float = 1.0
     plain: System | None = None
+    beside: BesidePower | None = None
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -146,22 +147,24 @@ def find(
     """
     places = (None,) if name == "power" else case.robot.joint_names
     found = attributed(case, system, floor, seed, without)
-    return _finding(name, places, case.observed, system, found, floor, seed, plain)
+    return finding_of(name, places, case.observed, system, found, floor, seed, plain)
 
 
 def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
     """Return a finding with some of its causes alone, all fitted again."""
     if len(causes) == len(finding.causes):
         return finding
-    system, found = finding.system, finding.attribution
-    noise = system.residual_rms([k for cause in causes for k in cause.columns], found.noise)
+    chosen, found = [k for cause in causes for k in cause.columns], finding.attribution
+    beside = finding.beside and finding.beside.keeping(chosen)
+    noise = finding.system.residual_rms(chosen, found.noise) if beside is None else beside.noise[:-1]
     found = replace(found, causes=tuple(causes), noise=noise)
-    kept = _finding(finding.name, finding.places, finding.observed, system, found, finding.floor, seed, finding.plain)
+    where = finding.name, finding.places, finding.observed
+    kept = finding_of(*where, finding.system, found, finding.floor, seed, finding.plain, beside)
     said = tuple(balance for cause in causes if (balance := finding.balance(cause)) is not None)
     return replace(kept, power_balances=said)
 
 
-def _finding(
+def finding_of(
     name: str,
     places: tuple[str | None, ...],
     observed: frozenset[str],
@@ -169,13 +172,15 @@ def _finding(
     found: Attribution,
     floor: np.ndarray | None,
     seed: int,
-    plain: System | None,
+    plain: System | None = None,
+    beside: BesidePower | None = None,
 ) -> Finding:
-    """Return the finding of an attribution: judged on groups left out, its coefficients estimated."""
+    """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain)
-    closed, fitted = closed_squares(system, found, seed), estimate_of(system, chosen)
-    return Finding(name, places, observed, system, found, judged, floor, fitted, closed, plain=plain)
+    closed = closed_squares(system, found, seed)
+    fitted = estimate_of(system, chosen) if beside is None else beside.estimate(chosen)
+    return Finding(name, places, observed, system, found, judged, floor, fitted, closed, plain=plain, beside=beside)
 
 
 def attributed(
@@ -209,25 +214,3 @@ def _hypotheses(system: System, inside: Set[tuple[str, str | None]], without: Se
     if system.both:
         found += hypotheses(system.columns, system.changed, CHANGED)
     return [one for one in found if not {one.effect, (one.effect, one.joint)} & without]
-
-
-def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
-    """Estimate the twin's terms and the causes' together, with bounds and intervals."""
-    used = [*range(system.base), *chosen]
-    terms = [system.all_terms[k] for k in used]
-    source = [k - len(system.columns) if k >= system.changed else k for k in used]
-    pattern = system.pattern[:, source]
-    blocks = []
-    for block, observed in zip(system.blocks, system.observed, strict=True):
-        factors = []
-        for equation, factor in enumerate(block.factors):
-            place = {int(k): p for p, k in enumerate(np.flatnonzero(system.pattern[equation]))}
-            parts = [
-                factor[:, place[s]] * (observed or k < system.changed)
-                for k, s in zip(used, source, strict=True)
-                if s in place
-            ]
-            factors.append(np.column_stack([*parts, factor[:, -1]]))
-        blocks.append(replace(block, factors=tuple(factors)))
-    rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
-    return estimate(blocks, pattern, terms, rows)

@@ -16,9 +16,9 @@ from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Variant, candidate_columns
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.progress import Tell, with_progress
-from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.identification.accumulate import Given, Rows, accumulate
+from irtwin.identification.power_line import carried, power_line, rows_of_both
 from irtwin.signals.motion import Motion
-from irtwin.twin.identify import power_slope
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,12 @@ class JointEquations:
             for k in variant.columns
         ]
         return replace(variant, columns=tuple(moved))
+
+    def in_whole(self, column: int) -> int:
+        """Return the index of a candidate column of torque alone among those of both."""
+        if column < self.torque.changed:
+            return column + self.whole.base - self.torque.base
+        return column - self.torque.changed + self.whole.changed
 
 
 def joint_equations(
@@ -60,7 +66,6 @@ def joint_equations(
     tried = candidate_pattern(robot, of_torque, mechanical)
     real = np.array([column.effect.channel == "torque" for column in mechanical], dtype=bool)
     free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
-    fixed_values = power.values[stack.fixed]
 
     def drawn(whole: Motion) -> Predicted:
         torque = predicted(whole)
@@ -71,31 +76,14 @@ def joint_equations(
 
     def equations(motion: Motion) -> Rows:
         own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
-        slope = power_slope(stack, motion, torque, power.values)
-        carried = _carried(own, slope, stack.pattern, stack.real)
-        now, electrical = stack.power_columns(motion, torque), added.part(motion)
+        line = power_line(stack, motion, own, torque, stack.power_columns(motion, torque), power.values)
+        electrical = added.part(motion)
 
         def of_power() -> list[np.ndarray]:
-            return [carried, now[:, ~stack.fixed], _carried(parts, slope, tried, real), *electrical]
+            return [line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
 
-        shift = stack.shift(motion)
-        known = now[:, stack.fixed] @ fixed_values + carried @ shift[stack.real] - (slope * torque).sum(axis=1)
-        return Rows(
-            [*zip(own, parts, strict=True), of_power],
-            np.column_stack([stack.shift_torque(motion, own), known]),
-            np.column_stack(
-                [
-                    np.zeros_like(motion.dq) if motion.torque is None else motion.torque,
-                    np.zeros_like(known) if motion.power is None else motion.power,
-                ]
-            ),
-            np.column_stack(
-                [
-                    np.ones(motion.dq.shape, bool) if motion.torque is None else stack.undecided(motion),
-                    np.full(len(motion.time), motion.power is None),
-                ]
-            ),
-        )
+        rows: list[Given] = [*zip(own, parts, strict=True), of_power]
+        return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, with_progress(equations, motions, tell), pattern)
@@ -114,20 +102,6 @@ def joint_equations(
     known = stack.prior_rows(stack.torque_terms)
     torque = System(stack.torque_terms, mechanical, of_joints, tuple(alone), *grouping.of(alone), prior_rows=known)
     return JointEquations(enough(whole), enough(torque))
-
-
-def _carried(rows: Sequence[np.ndarray], slope: np.ndarray, pattern: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Return (N, R) the power that each real column carries: what it has in each joint's `rows`, times the slope.
-
-    `slope` (N, n) of power over each joint's torque; `pattern` (n, K) which columns the rows have; `real` (K,).
-    """
-    place = np.cumsum(real) - 1
-    found = np.zeros((int(real.sum()), len(slope)))
-    for own, rise, used in zip(rows, np.ascontiguousarray(slope.T), pattern, strict=True):
-        for column, k in zip(own.T, np.flatnonzero(used), strict=True):
-            if real[k]:
-                found[place[k]] += rise * column
-    return found.T
 
 
 def _pattern(

@@ -10,8 +10,9 @@ import numpy as np
 from irtwin.effects.effect import Effect, Term
 from irtwin.effects.stack import Stack
 from irtwin.effects.supply import MechanicalPower
+from irtwin.identification.fits import fit_through_power
+from irtwin.identification.power_line import power_line
 from irtwin.signals.motion import Motion
-from irtwin.twin.identify import fit_through_power, power_slope
 
 _PIECE = 8192  # samples whose columns of torque are held at once
 Terms = tuple[tuple[Effect, Term], ...]
@@ -28,7 +29,7 @@ class ThroughPower(Stack):
     def __init__(self, stack: Stack, motions: Sequence[Motion]):
         """Fit the effects of `stack` to the power of the motions."""
         self._own = stack
-        self._values = fit_through_power(stack, motions)
+        self._values = fit_through_power(stack, motions)[:2]
         super().__init__(stack.robot, stack.effects, stack.prior)
 
     def _check(self) -> None:
@@ -53,7 +54,6 @@ class ThroughPower(Stack):
     def _columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
         torque_values, power_values = self._values
         own = self._own.predicted_power_columns(motion, torque_values, power_values)
-        slope = power_slope(self._own, motion, torque, power_values)
-        columns = self._own.torque_columns(motion, torque_values)[:, :, self.real]
-        carried = np.einsum("tj,tjk->tk", slope, columns)
+        columns = self._own.columns_by_joint(motion, torque_values)
+        carried = power_line(self._own, motion, columns, torque, own, power_values).carried
         return np.column_stack([carried, own, -carried @ torque_values[self.real]])

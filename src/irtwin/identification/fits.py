@@ -1,0 +1,202 @@
+"""The fits of a robot's effects to what was measured: to torque, to power on top of it, to both, to power alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from irtwin.effects.drive import CopperLoss
+from irtwin.effects.effect import Effect, Term
+from irtwin.effects.stack import Stack
+from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
+from irtwin.identification.estimators import Estimate, estimate
+from irtwin.identification.power_line import power_line, rows_of_both
+from irtwin.signals.motion import Motion
+
+Terms = Sequence[tuple[Effect, Term]]
+
+_STEPS = 20  # of Gauss-Newton, at most
+_CONVERGED = 1e-3  # of the prior spread
+_SETTLED = 0.1  # of a standard deviation: closer to it, a further step says nothing that the data know
+_REPEATS = 8  # of fit and prediction, at most
+_SCALE = Term("scale", "1", spread=0.05)  # of real over logged torque, less one: drives' constants are nominal
+
+
+def fit_torque(stack: Stack, motions: Sequence[Motion]) -> tuple[list[Block], Estimate]:
+    """Fit the coefficients of torque to measured torque; return them with the equations, reduced."""
+    terms, known = _of(stack.torque_terms), stack.prior_rows(stack.torque_terms)
+
+    def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
+        blocks = accumulate(motions, _torque_equations(stack, values), stack.pattern)
+        return blocks, estimate(blocks, stack.pattern, terms, known)
+
+    blocks, found = fit(_alone(stack, motions) if stack.coupled else None)
+    for _ in range(_REPEATS if stack.coupled else 0):
+        before = found.values
+        blocks, found = fit(before)
+        if _converged(found.values, before, terms):
+            break
+    return blocks, found
+
+
+def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Estimate:
+    """Fit the free coefficients of power on top of the torque that was found."""
+    free = free_terms(stack)
+
+    def fit(values: np.ndarray) -> Estimate:
+        def equations(motion: Motion) -> Rows:
+            assert motion.power is not None
+            columns = stack.predicted_power_columns(motion, torque_values, values)
+            known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+            return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
+
+        return _of_one(motions, equations, free, stack.prior_rows(free))
+
+    values = _expected(stack.power_terms)
+    found = fit(values)
+    for _ in range(_REPEATS if stack.power_coupled else 0):
+        before = found.values
+        values = values.copy()
+        values[~stack.fixed] = before
+        found = fit(values)
+        if _converged(found.values, before, _of(free)):
+            break
+    return found
+
+
+def fit_both(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Estimate:
+    """Fit the coefficients of torque to torque and power at once, starting from those that torque alone gives.
+
+    A real torque acts in both signals, what a sensor shows in torque alone. Power is linear about the torque that is
+    predicted, by Gauss-Newton. Each signal is weighed by its own residual, and by how long that remembers. So that what
+    the twin lacks of power does not look like friction, heat of windings and how real work stands to that of logged
+    torque are found beside, and samples in which the joints give power back are left out of power: it may be burnt.
+    """
+    if CopperLoss.id not in stack.ids:
+        stack = stack.with_effects([*stack.effects, CopperLoss()])
+    power = fit_power(stack, [motion for motion in motions if motion.power is not None], torque_values)
+    free, count = free_terms(stack), len(stack.torque_terms)
+    terms = [*_of(stack.torque_terms), *_of(free), _SCALE]
+    known = stack.prior_rows([*stack.torque_terms, *free])
+    if known is not None:
+        known = np.pad(known, (0, 1))
+        known[-1, -1] = 1.0
+    joints = len(stack.pattern)
+    pattern = np.ones((joints + 1, len(terms)), dtype=bool)
+    pattern[:joints] = np.pad(stack.pattern, ((0, 0), (0, len(free) + 1)))
+    pattern[joints, :count] = stack.real
+    values = np.concatenate([torque_values, power.values, [0.0]])
+    for _ in range(_STEPS):
+        before = values
+        blocks = accumulate(motions, _both_equations(stack, values), pattern)
+        found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
+        values, sure = found.values, np.sqrt(np.diag(found.covariance))
+        if np.all(np.abs(values - before)[:count] < _SETTLED * sure[:count]):
+            break
+    return Estimate(values[:count], found.covariance[:count, :count], found.noise[:joints], found.blocks)
+
+
+def _both_equations(stack: Stack, values: np.ndarray) -> Equations:
+    """Return the equations of torque and of power about the coefficients of torque, of power, and the scale."""
+    torque_values, free, scale = np.split(values, [len(stack.torque_terms), len(values) - 1])
+    power_values = _expected(stack.power_terms)
+    power_values[stack.fixed] *= 1 + scale
+    power_values[~stack.fixed] = free
+
+    def equations(motion: Motion) -> Rows:
+        own = stack.columns_by_joint(motion, torque_values)
+        torque = stack.sum_by_joint(own, np.where(stack.real, torque_values + stack.shift(motion), 0.0))
+        now = stack.predicted_power_columns(motion, torque_values, power_values)
+        line = power_line(stack, motion, own, torque, now, power_values)
+        work = now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+        rows = [*([columns] for columns in own), [line.carried, line.free, work[:, None]]]
+        return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known), work < 0)
+
+    return equations
+
+
+def free_terms(stack: Stack) -> Terms:
+    """Return the terms of power that are not fixed."""
+    return [(effect, term) for effect, term in stack.power_terms if not term.fixed]
+
+
+def real_terms(stack: Stack) -> Terms:
+    """Return the terms of real torque."""
+    return [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
+
+
+def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray, Estimate]:
+    """Fit the coefficients of torque and power together to measured power, which torque carries into it.
+
+    Return the coefficients of torque (K,) and of power (L,), those not free as expected; and the estimate of
+    `real_terms` and `free_terms`. Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from
+    no torque, where the first step is that of a robot without such losses.
+    """
+    real, free = real_terms(stack), free_terms(stack)
+    torque_values, power_values = np.zeros(len(stack.torque_terms)), _expected(stack.power_terms)
+    before = np.full(len(real) + len(free), np.inf)
+    for _ in range(_STEPS):
+        equations = _power_equations(stack, torque_values.copy(), power_values.copy())
+        found = _of_one(motions, equations, [*real, *free], stack.prior_rows([*real, *free]))
+        torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
+        if _converged(found.values, before, _of([*real, *free])):
+            break
+        before = found.values
+    return torque_values, power_values, found
+
+
+def _power_equations(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
+    """Return the equation of power alone, linear about coefficients.
+
+    Effects that need predicted power take it as it is with these.
+    """
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.power is not None
+        columns, torque = stack.columns_by_joint(motion, torque_values), stack.real_torque(motion, torque_values)
+        power = stack.predicted_power_columns(motion, torque_values, power_values)
+        line = power_line(stack, motion, columns, torque, power, power_values)
+        joined = np.concatenate([line.carried, line.free], axis=1)
+        return Rows(joined[:, None], line.known[:, None], motion.power[:, None])
+
+    return equations
+
+
+def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
+    def equations(motion: Motion) -> Rows:
+        assert motion.torque is not None
+        columns = stack.columns_by_joint(motion, values)
+        shifted = stack.shift_torque(motion, columns)
+        return Rows([[own] for own in columns], shifted, motion.torque, stack.undecided(motion))
+
+    return equations
+
+
+def _alone(stack: Stack, motions: Sequence[Motion]) -> np.ndarray:
+    """Return the coefficients of the effects that need no prediction, fitted without the others, which are none."""
+    direct = Stack(stack.robot, [effect for effect in stack.effects if effect.signal == "torque" and not effect.needs])
+    values = np.zeros(len(stack.torque_terms))
+    if direct.torque_terms:
+        blocks = accumulate(motions, _torque_equations(direct, None), direct.pattern)
+        found = estimate(blocks, direct.pattern, _of(direct.torque_terms))
+        values[[not effect.needs for effect, _ in stack.torque_terms]] = found.values
+    return values
+
+
+def _converged(values: np.ndarray, before: np.ndarray, terms: Sequence[Term]) -> bool:
+    return bool(np.all(np.abs(values - before) < _CONVERGED * np.array([term.spread for term in terms])))
+
+
+def _of_one(motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None) -> Estimate:
+    """Estimate the terms of one equation a sample."""
+    pattern = np.ones((1, len(terms)), dtype=bool)
+    return estimate(accumulate(motions, equations, pattern), pattern, _of(terms), prior_rows)
+
+
+def _of(terms: Terms) -> list[Term]:
+    return [term for _, term in terms]
+
+
+def _expected(terms: Terms) -> np.ndarray:
+    return np.array([term.expected for _, term in terms], dtype=float)

@@ -1,0 +1,114 @@
+"""Power as a line in the joint torque about one: what a coefficient of real torque carries into power."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.effects.effect import JointEffect
+from irtwin.effects.stack import Stack
+from irtwin.identification.accumulate import Given, Rows
+from irtwin.signals.motion import Motion
+
+Columns = Sequence[np.ndarray]
+
+_STEP = 1e-2  # N m, exact for what is quadratic in torque
+
+
+@dataclass(frozen=True)
+class PowerLine:
+    """The equation of power of N samples: carried @ x + free @ p + known = power, of r coefficients x of real torque.
+
+    slope: (N, n) W/(N m), of power over each joint's torque; carried: (N, r); free: (N, F), of the coefficients p of
+    power that are not fixed; known: (N,) W.
+    """
+
+    slope: np.ndarray
+    carried: np.ndarray
+    free: np.ndarray
+    known: np.ndarray
+
+
+def power_line(
+    stack: Stack, motion: Motion, columns: Columns, torque: np.ndarray, power: np.ndarray, values: np.ndarray
+) -> PowerLine:
+    """Return the equation of power, linear in the coefficients of torque about the real `torque` (N, n).
+
+    columns: of torque, for each joint (N, k) by the stack's pattern; power: (N, L) those of power on that torque;
+    values: (L,) its coefficients.
+    """
+    slope = power_slope(stack, motion, torque, values)
+    real = carried(columns, slope, stack.pattern, stack.real)
+    fixed = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
+    known = power[:, stack.fixed] @ fixed + real @ stack.shift(motion)[stack.real] - (slope * torque).sum(axis=1)
+    return PowerLine(slope, real, power[:, ~stack.fixed], known)
+
+
+def carried(rows: Columns, slope: np.ndarray, pattern: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Return (N, R) the power that each real column carries: what it has in each joint's `rows`, times the slope.
+
+    `slope` (N, n) of power over each joint's torque; `pattern` (n, K) which columns the rows have; `real` (K,).
+    """
+    place = np.cumsum(real) - 1
+    found = np.zeros((int(real.sum()), len(slope)))
+    for own, rise, used in zip(rows, np.ascontiguousarray(slope.T), pattern, strict=True):
+        for column, k in zip(own.T, np.flatnonzero(used), strict=True):
+            if real[k]:
+                found[place[k]] += rise * column
+    return found.T
+
+
+def power_slope(stack: Stack, motion: Motion, torque: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the slope of power over each joint's torque, (N, n) W/(N m), about `torque` (N, n); values: (L,)."""
+    names = stack.robot.joint_names
+    within = np.array([isinstance(effect, JointEffect) for effect, _ in stack.power_terms], dtype=bool)
+    of_joint = np.array([[term.joint == name for name in names] for _, term in stack.power_terms], dtype=float)
+    of_joint = of_joint.reshape(len(within), len(names)) * within[:, None]
+    slope = _rise(stack, motion, torque, np.ones(len(names))) @ (of_joint * values[:, None])
+    if any(
+        effect.needs == "torque" and not inside for (effect, _), inside in zip(stack.power_terms, within, strict=True)
+    ):
+        others = np.where(within, 0.0, values)
+        for joint in range(len(names)):
+            slope[:, joint] += _rise(stack, motion, torque, np.eye(len(names))[joint]) @ others
+    return np.asarray(slope)
+
+
+def _rise(stack: Stack, motion: Motion, torque: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return the slope of the columns of power, (N, L), where the joints' torques rise `along` (n,)."""
+    step = _STEP * along
+    rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
+    return np.asarray(rise / (2 * _STEP))
+
+
+def rows_of_both(
+    stack: Stack,
+    motion: Motion,
+    columns: Sequence[Given],
+    known: tuple[np.ndarray, np.ndarray],
+    unsure: np.ndarray | bool = False,
+) -> Rows:
+    """Return the rows of the n equations of torque and, last, that of power; what was not measured is undecided.
+
+    columns: those of each equation, as `Rows` takes them; known: (N, n) N m and (N,) W; unsure: (N,) where power does
+    not hold.
+    """
+    torque, power = motion.torque, motion.power
+    return Rows(
+        columns,
+        np.column_stack(known),
+        np.column_stack(
+            [
+                np.zeros_like(motion.dq) if torque is None else torque,
+                np.zeros_like(known[1]) if power is None else power,
+            ]
+        ),
+        np.column_stack(
+            [
+                np.ones(motion.dq.shape, dtype=bool) if torque is None else stack.undecided(motion),
+                np.full(len(motion.time), power is None) | unsure,
+            ]
+        ),
+    )
