@@ -16,7 +16,7 @@ from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import Branch, branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals
+from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals, where_runs_are_few
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
@@ -80,14 +80,15 @@ def cause(
     weights: Confidence,
     scale: TorqueScale | None,
 ) -> document.Cause:
-    """Return a cause, `name` its id, with its parameters and evidence; `gains` are those of all causes."""
+    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named."""
     closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
+    sure = confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained)
     return document.Cause(
         id=name,
         effect=one.effect,
         joints=acted_on(robot, one),
         scope=one.scope,
-        confidence=confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained),
+        confidence=where_runs_are_few(sure, one.p_remembered, one.repeats, weights),
         parameters=parameters(robot, finding, one, scale),
         indistinguishable_from=one.rivals,
         evidence=_evidence(finding, one, closed),
@@ -153,6 +154,8 @@ def _evidence(finding: Finding, one: Cause, closed: float) -> document.Evidence:
         gain_on_groups_left_out=one.gain,
         t_between_groups=one.t,
         p_adjusted_for_the_catalogue=one.p,
+        p_where_residuals_remember=one.p_remembered,
+        part_that_repeats=one.repeats,
         gain_of_rivals=one.rival_gains,
         correlation_with_rivals=one.rival_correlations,
         **_balance(finding, one),
