@@ -318,6 +318,9 @@ class Confidence:
     least_of_repeats: float = _threshold(
         0.1, "what is left of it where halves of the time contradict each other", "share", _JUDGEMENT
     )
+    not_in_each_half: float = _threshold(
+        0.5, "what is left of it where not every half of the time shows a cause", "share", "even odds; judgement"
+    )
     of_rivals: float = _threshold(
         0.5, "what rivals have of what the cause's confidence leaves", "share", "judgement, not calibrated"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Confidence, Thresholds
 from irtwin.robot.description import Robot
+
+_HALVES = ("first", "last")
 
 
 def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> document.Gap:
@@ -88,7 +91,7 @@ def cause(
         effect=one.effect,
         joints=acted_on(robot, one),
         scope=one.scope,
-        confidence=where_runs_are_few(sure, one.p_remembered, one.repeats, weights),
+        confidence=where_runs_are_few(sure, one.p_remembered, one.repeats, one.in_halves, weights),
         parameters=parameters(robot, finding, one, scale),
         indistinguishable_from=one.rivals,
         evidence=_evidence(finding, one, closed),
@@ -156,6 +159,7 @@ def _evidence(finding: Finding, one: Cause, closed: float) -> document.Evidence:
         p_adjusted_for_the_catalogue=one.p,
         p_where_residuals_remember=one.p_remembered,
         part_that_repeats=one.repeats,
+        halves_that_show_it=None if one.in_halves is None else tuple(compress(_HALVES, one.in_halves)),
         gain_of_rivals=one.rival_gains,
         correlation_with_rivals=one.rival_correlations,
         **_balance(finding, one),

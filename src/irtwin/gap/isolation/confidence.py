@@ -26,16 +26,20 @@ def confidence(
     return 1 / (1 + math.exp(-logit - weights.unexplained * unexplained))
 
 
-def where_runs_are_few(own: float, p: float | None, repeats: float | None, weights: Confidence) -> float:
+def where_runs_are_few(
+    own: float, p: float | None, repeats: float | None, in_halves: Sequence[bool] | None, weights: Confidence
+) -> float:
     """Return the chance that a cause is right where its own is `own` in a full set of runs.
 
     Two things more have to be true. It is no chance: of that a p tells at most 1 / (1 - e p ln p), at even odds
-    (Sellke, Bayarri and Berger 2001). And it is there in each half of the time, as the part of it that `repeats`.
-    None: not judged.
+    (Sellke, Bayarri and Berger 2001). And it is there all the time: as the part of it that `repeats`, and with even
+    odds at most where one of the halves does not show it by itself. None: not judged.
     """
     if p is not None:
         own *= _beyond_chance(p)
-    return own if repeats is None else own * max(repeats, weights.least_of_repeats)
+    if repeats is not None:
+        own *= max(repeats, weights.least_of_repeats)
+    return own if in_halves is None or all(in_halves) else own * weights.not_in_each_half
 
 
 def _beyond_chance(p: float) -> float:

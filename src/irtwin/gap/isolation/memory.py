@@ -72,7 +72,9 @@ def _judged(
         p = min(p, repeats.p)
     if p > limits.alpha_where_remembered:
         return None
-    return replace(cause, p_remembered=p, repeats=None if repeats is None else repeats.part)
+    if repeats is None:
+        return replace(cause, p_remembered=p)
+    return replace(cause, p_remembered=p, repeats=repeats.part, in_halves=repeats.shown)
 
 
 def _shrunk(alike: np.ndarray, group: np.ndarray) -> float:

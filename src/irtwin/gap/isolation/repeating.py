@@ -7,13 +7,16 @@ share less. As in stability selection they are complementary (Shah and Samworth 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
 
+from irtwin.gap.isolation.ambiguity_groups import as_one
+from irtwin.gap.isolation.cause import between_groups, gains, judged, rows
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.cholesky import factored, solved
+from irtwin.gap.regression.cross_validation import attempt
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Selection
 
@@ -23,14 +26,16 @@ _PAIRS = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))  # of halves, by
 
 @dataclass(frozen=True)
 class Repeats:
-    """The sizes of a cause in pairs of halves, (P, 2), as shares of its size in all data; `tried`: how many it beat.
+    """How a cause fares in halves of the time.
 
-    k, how many coefficients it has.
+    sizes: (P, 2) in pairs of halves, as shares of its size in all data; `coefficients` it has, and how many hypotheses
+    were `tried`; `shown`: whether the first and the last half by themselves show it as a cause has to be shown.
     """
 
     sizes: np.ndarray
     coefficients: int
     tried: int
+    shown: tuple[bool, bool] = (True, True)
 
     @property
     def part(self) -> float:
@@ -64,8 +69,9 @@ def repeating(finding: Finding, limits: Selection) -> tuple[Repeats | None, ...]
     system = finding.system
     inside = np.array([*range(system.base), *finding.chosen], dtype=int)
     quarters = _quarters(system, inside, finding.attribution.noise)
+    shown = [_shown(finding, half, limits) for half in _PAIRS[0]]
     found = []
-    for cause in finding.causes:
+    for place, cause in enumerate(finding.causes):
         own = np.flatnonzero(np.isin(inside, cause.columns))
         rest = np.setdiff1d(np.arange(len(inside)), own)
         prior = system.prior(inside[rest][system.base :])
@@ -77,7 +83,8 @@ def repeating(finding: Finding, limits: Selection) -> tuple[Repeats | None, ...]
             if min(said) > limits.speaks * max(said):
                 sizes.append([half.right @ numbers / each for half, each in zip(halves, said, strict=True)])
         tried = len(finding.attribution.hypotheses)
-        found.append(Repeats(np.array(sizes), len(own), tried) if sizes else None)
+        seen = (shown[0][place], shown[1][place])
+        found.append(Repeats(np.array(sizes), len(own), tried, seen) if sizes else None)
     return tuple(found)
 
 
@@ -96,6 +103,31 @@ class _Left:
     def said(self, numbers: np.ndarray) -> float:
         """Return the squares that (k,) coefficients add, beyond what the rest imitates."""
         return float(numbers @ self.among @ numbers)
+
+
+def _shown(finding: Finding, half: tuple[int, int], limits: Selection) -> list[bool]:
+    """Return of each cause whether a half by itself shows it beside the others: enough gain, by enough t."""
+    system, causes = _part(finding.system, half), finding.causes
+    noise = system.residual_rms(finding.chosen, finding.attribution.noise)
+    moments = system.moments(noise)
+    found = []
+    for cause in causes:
+        others = [k for one in causes if one is not cause for k in one.columns]
+        trial = attempt(system, moments, others, [[as_one(cause.variants)]])
+        mine = judged(system, cause.scope)
+        gain, said = gains(system, trial)[0, mine], (trial.said[0] / rows(system))[mine]
+        t = between_groups(gain, said, limits) if len(gain) else 0.0
+        enough = len(gain) > 0 and np.average(gain, weights=rows(system)[mine]) >= limits.least_gain
+        found.append(bool(enough and t >= limits.least_t))
+    return found
+
+
+def _part(system: System, half: tuple[int, int]) -> System:
+    """Return the equations of some quarters of the runs' time."""
+    kept = np.flatnonzero(np.isin(_quarter(system), half))
+    _, group = np.unique(system.group[kept], return_inverse=True)
+    blocks = tuple(system.blocks[k] for k in kept)
+    return replace(system, blocks=blocks, group=group, observed=system.observed[kept], transient=None)
 
 
 def _left(products: np.ndarray, rest: np.ndarray, own: np.ndarray, prior: np.ndarray) -> _Left:
