@@ -140,8 +140,15 @@ def _joints(robot: Robot, branch: Branch) -> tuple[str, ...]:
 
 
 def _members(cause: document.Cause, weights: Confidence) -> list[document.Member]:
-    """Return a cause and what the data cannot tell from it."""
-    rivals = of_rivals(cause.confidence, cause.indistinguishable_from, cause.evidence.gain_of_rivals, weights)
+    """Return a cause and what the data cannot tell from it.
+
+    What few runs leave open is open for its rivals as well.
+    """
+    why = cause.evidence
+    shown = None if why.halves_that_show_it is None else [half in why.halves_that_show_it for half in _HALVES]
+    there = where_runs_are_few(1.0, why.p_where_residuals_remember, why.part_that_repeats, shown, weights)
+    of_form = of_rivals(min(cause.confidence / there, 1.0), cause.indistinguishable_from, why.gain_of_rivals, weights)
+    rivals = {rival: sure * there for rival, sure in of_form.items()}
     return [
         document.Member(cause=cause.id, effect=effect, family=catalogue()[effect].family, confidence=sure)
         for effect, sure in {cause.effect: cause.confidence, **rivals}.items()
