@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals
+from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals, where_runs_are_few
 from irtwin.gap.thresholds import DEFAULT
 
 PLENTY = {"t": 8.0, "gain": 0.5, "closed": 0.9, "share": 1.0, "count": 1, "weights": DEFAULT.confidence}
@@ -53,3 +53,25 @@ def test_rivals_share_by_their_gains() -> None:
 
 def test_what_calibration_adds_raises_a_family() -> None:
     assert of_family([0.5], replace(DEFAULT.confidence, family_more=1.0)) == pytest.approx(0.731, abs=1e-3)
+
+
+@given(own=st.floats(0, 1), p=st.floats(0, 1), repeats=st.floats(0, 1), halves=st.tuples(st.booleans(), st.booleans()))
+def test_chance_and_halves_that_differ_only_lower_it(own, p, repeats, halves) -> None:
+    weights = DEFAULT.confidence
+    by_chance, by_size = (where_runs_are_few(own, p, each, None, weights) for each in (None, repeats))
+    assert 0 <= where_runs_are_few(own, p, repeats, halves, weights) <= by_size <= by_chance <= own
+    assert where_runs_are_few(own, None, None, None, weights) == own
+
+
+def test_a_p_value_leaves_what_it_can_tell_at_most() -> None:
+    told = [where_runs_are_few(1.0, p, None, None, DEFAULT.confidence) for p in (0.0, 0.001, 0.01, 0.05, 0.1, 0.5)]
+    assert told == pytest.approx([1.0, 0.982, 0.889, 0.711, 0.615, 0.5], abs=1e-3)
+
+
+def test_what_does_not_repeat_is_no_certain_error() -> None:
+    assert where_runs_are_few(0.9, None, 0.0, None, DEFAULT.confidence) == pytest.approx(0.09)
+
+
+@pytest.mark.parametrize("halves, left", [((True, True), 0.9), ((True, False), 0.45), ((False, False), 0.45)])
+def test_what_one_half_does_not_show_is_not_sure(halves, left) -> None:
+    assert where_runs_are_few(0.9, None, None, halves, DEFAULT.confidence) == pytest.approx(left)

@@ -130,9 +130,17 @@ def test_an_effect_that_the_search_does_not_know_is_neither_named_nor_a_rival():
 def test_one_run_without_power_is_cut_in_time():
     (run, *_) = runs(1, change=on_joint(2, lambda m: 2 * np.sin(5 * m.q[:, 2])))
     run = replace(run, signals=replace(run.signals, power=None))
-    document = valid(diagnose(data_set([run])))
+    diagnosis = diagnose(data_set([run]))
+    document = valid(diagnosis)
     assert document["gap"].get("power") is None
     assert {"effect": "copper_loss", "why": "no power was measured"} in document["not_testable"]
+    (cause,) = document["causes"]
+    evidence = cause["evidence"]
+    assert evidence["part_that_repeats"] > 0.8
+    assert evidence["p_where_residuals_remember"] <= 0.1
+    (torque,) = diagnosis.channels
+    (beside,) = replace(diagnosis, channels=(replace(torque, fallen=torque.causes),)).document.causes
+    assert beside.confidence < cause["confidence"] - 0.03  # one that chance reaches was named, too
 
 
 def test_json_has_the_form_of_the_contract():

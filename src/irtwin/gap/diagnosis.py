@@ -97,11 +97,14 @@ class Diagnosis:
     def document(self) -> Document:
         """The diagnosis as it is handed out: in JSON, in the graph, on a page."""
         robot, gains = self.description, [cause.gain for _, cause in self.causes]
+        fallen = [cause.gain for channel in self.channels for cause in channel.fallen]
         acted_on = [(cause.effect, writing.acted_on(robot, cause)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         weights = self.thresholds.confidence
-        written = tuple(writing.cause(robot, *one, gains, self.verdict, weights, self.scale) for one in named)
+        written = tuple(
+            writing.cause(robot, *one, [*gains, *fallen], self.verdict, weights, self.scale) for one in named
+        )
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
         found = writing.findings(robot, self.channels, named, written, self.thresholds)
         causes = apart.causes(written, weights)

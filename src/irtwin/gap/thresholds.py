@@ -336,6 +336,12 @@ class Confidence:
     per_share: float = _threshold(0.356, "per natural logarithm of the gain over the largest", _LOGIT, _FITTED)
     per_count: float = _threshold(-2.416, "per natural logarithm of the number of causes", _LOGIT, _FITTED)
     unexplained: float = _threshold(-2.640, "beside the verdict `unexplained`", _LOGIT, _FITTED)
+    least_of_repeats: float = _threshold(
+        0.1, "what is left of it where halves of the time contradict each other", "share", _JUDGEMENT
+    )
+    not_in_each_half: float = _threshold(
+        0.5, "what is left of it where not every half of the time shows a cause", "share", "even odds; judgement"
+    )
     of_rivals: float = _threshold(
         0.5, "what rivals have of what the cause's confidence leaves", "share", "judgement, not calibrated"
     )

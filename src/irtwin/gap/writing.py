@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import Branch, branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals
+from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals, where_runs_are_few
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
@@ -29,6 +30,8 @@ from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Confidence, Thresholds
 from irtwin.robot.description import Robot
+
+_HALVES = ("first", "last")
 
 
 def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> document.Gap:
@@ -80,14 +83,15 @@ def cause(
     weights: Confidence,
     scale: TorqueScale | None,
 ) -> document.Cause:
-    """Return a cause, `name` its id, with its parameters and evidence; `gains` are those of all causes."""
+    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named."""
     closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
+    sure = confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained)
     return document.Cause(
         id=name,
         effect=one.effect,
         joints=acted_on(robot, one),
         scope=one.scope,
-        confidence=confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained),
+        confidence=where_runs_are_few(sure, one.p_remembered, one.repeats, one.in_halves, weights),
         parameters=parameters(robot, finding, one, scale),
         indistinguishable_from=one.rivals,
         evidence=_evidence(finding, one, closed),
@@ -136,8 +140,15 @@ def _joints(robot: Robot, branch: Branch) -> tuple[str, ...]:
 
 
 def _members(cause: document.Cause, weights: Confidence) -> list[document.Member]:
-    """Return a cause and what the data cannot tell from it."""
-    rivals = of_rivals(cause.confidence, cause.indistinguishable_from, cause.evidence.gain_of_rivals, weights)
+    """Return a cause and what the data cannot tell from it.
+
+    What few runs leave open is open for its rivals as well.
+    """
+    why = cause.evidence
+    shown = None if why.halves_that_show_it is None else [half in why.halves_that_show_it for half in _HALVES]
+    there = where_runs_are_few(1.0, why.p_where_residuals_remember, why.part_that_repeats, shown, weights)
+    of_form = of_rivals(min(cause.confidence / there, 1.0), cause.indistinguishable_from, why.gain_of_rivals, weights)
+    rivals = {rival: sure * there for rival, sure in of_form.items()}
     return [
         document.Member(cause=cause.id, effect=effect, family=catalogue()[effect].family, confidence=sure)
         for effect, sure in {cause.effect: cause.confidence, **rivals}.items()
@@ -153,6 +164,9 @@ def _evidence(finding: Finding, one: Cause, closed: float) -> document.Evidence:
         gain_on_groups_left_out=one.gain,
         t_between_groups=one.t,
         p_adjusted_for_the_catalogue=one.p,
+        p_where_residuals_remember=one.p_remembered,
+        part_that_repeats=one.repeats,
+        halves_that_show_it=None if one.in_halves is None else tuple(compress(_HALVES, one.in_halves)),
         gain_of_rivals=one.rival_gains,
         correlation_with_rivals=one.rival_correlations,
         **_balance(finding, one),

@@ -85,6 +85,9 @@ class Evidence:
     between groups; `p` is adjusted for the whole catalogue. Rivals are all effects that compete, by id.
     `power_says`: whether power takes what a cause adds to torque ("mechanical"), only the sensor shows it ("sensor"),
     or neither is sure ("undecided"); `power_on_explained_torque_says`: of a cause of power, "electrical" or "meter".
+    Where runs are few: `p_where_residuals_remember`, the less of what random signs and halves of the time say;
+    `part_that_repeats`: of what a cause closes in a half of the time, what it closes with the size that it has in the
+    other; `halves_that_show_it` by themselves.
     `runs` and `window` (s of the clock): where it acts in some runs, or for a while, only.
     """
 
@@ -100,6 +103,9 @@ class Evidence:
     power_says: str | None = None
     gain_in_power_if_mechanical: float | None = None
     t_in_power_between_groups: float | None = None
+    p_where_residuals_remember: Share | None = None
+    part_that_repeats: Share | None = None
+    halves_that_show_it: tuple[Annotated[str, OneOf("first", "last")], ...] | None = None
     runs: tuple[str, ...] | None = None
     window: Interval | None = field(default=None, metadata=goes_with("runs"))
 

@@ -73,10 +73,10 @@ def _cause(
     competing = _competing(system, moments, candidates, members, others)
     sides = [mine, *(parts for _, parts in competing)]
     own = judged(system, scope)
-    trial = attempt(system, moments, others, [[_joined(parts)] for parts in sides])
+    trial = attempt(system, moments, others, [[as_one(parts)] for parts in sides])
     gain, said = gains(system, trial)[:, own], (trial.said[0] / rows(system))[own]
     mean = np.average(gain, axis=1, weights=rows(system)[own])
-    alike = canonical_correlation(system, reduce(np.add, moments), others, [_joined(parts).columns for parts in sides])
+    alike = canonical_correlation(system, reduce(np.add, moments), others, [as_one(parts).columns for parts in sides])
     known: dict[str, float] = {}
     correlations: dict[str, float] = {}
     equal: list[str] = []
@@ -137,6 +137,7 @@ def _competing(
     return competing
 
 
-def _joined(parts: Sequence[Variant]) -> Variant:
+def as_one(parts: Sequence[Variant]) -> Variant:
+    """Return one variant with the columns of several, of one effect."""
     columns = tuple(k for part in parts for k in part.columns)
     return Variant(parts[0].effect, columns, tuple(term for part in parts for term in part.terms))

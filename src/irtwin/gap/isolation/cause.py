@@ -29,6 +29,9 @@ class Cause:
 
     gain: of weighted squares, a row; t: of the gain, between groups; p: adjusted for the whole catalogue; `rivals`: the
     effects that explain it as well; `rival_gains` and `rival_correlations` (canonical, 0 to 1) of all that compete.
+    Where runs are few: `p_remembered` as p, where residuals remember; `repeats`, 0 to 1: of what it closes in a half of
+    the time, what it closes with the other half's size; `in_halves`: whether the first and the last half show it by
+    themselves. None: not judged.
     """
 
     effect: str
@@ -41,6 +44,9 @@ class Cause:
     rivals: tuple[str, ...] = ()
     rival_gains: dict[str, float] = field(default_factory=dict)
     rival_correlations: dict[str, float] = field(default_factory=dict)
+    p_remembered: float | None = None
+    repeats: float | None = None
+    in_halves: tuple[bool, bool] | None = None
 
     @property
     def of_bodies(self) -> bool:

@@ -26,6 +26,27 @@ def confidence(
     return 1 / (1 + math.exp(-logit - weights.unexplained * unexplained))
 
 
+def where_runs_are_few(
+    own: float, p: float | None, repeats: float | None, in_halves: Sequence[bool] | None, weights: Confidence
+) -> float:
+    """Return the chance that a cause is right where its own is `own` in a full set of runs.
+
+    Two things more have to be true. It is no chance: of that a p tells at most 1 / (1 - e p ln p), at even odds
+    (Sellke, Bayarri and Berger 2001). And it is there all the time: as the part of it that `repeats`, and with even
+    odds at most where one of the halves does not show it by itself. None: not judged.
+    """
+    if p is not None:
+        own *= _beyond_chance(p)
+    if repeats is not None:
+        own *= max(repeats, weights.least_of_repeats)
+    return own if in_halves is None or all(in_halves) else own * weights.not_in_each_half
+
+
+def _beyond_chance(p: float) -> float:
+    against = -math.e * p * math.log(p) if 0 < p < 1 / math.e else float(p > 0)
+    return 1 / (1 + against)
+
+
 def of_rivals(own: float, rivals: Sequence[str], gains: Mapping[str, float], weights: Confidence) -> dict[str, float]:
     """Return the chance of each effect that the data cannot tell from a cause, whose own is given.
 

@@ -36,7 +36,8 @@ class Finding:
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
     each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
     of each; `part`: theirs of all that is closed, beside what does not repeat; `plain`: power's equation on the torque
-    of the twin as it is, where `system` stands on torque that causes explain; `beside`: power's, if both were fitted.
+    of the twin as it is, where `system` stands on torque that causes explain; `beside`: power's, if both were fitted;
+    `fallen`: causes that the search named and chance reaches.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Finding:
     part: float = 1.0
     plain: System | None = None
     beside: BesidePower | None = None
+    fallen: tuple[Cause, ...] = ()
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -152,16 +154,23 @@ def find(
 
 def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
     """Return a finding with some of its causes alone, all fitted again."""
+    system, found = finding.system, finding.attribution
     if len(causes) == len(finding.causes):
-        return finding
-    chosen, found = [k for cause in causes for k in cause.columns], finding.attribution
+        return replace(finding, attribution=replace(found, causes=tuple(causes)))
+    places = {(cause.effect, cause.scope) for cause in causes}
+    fallen = tuple(cause for cause in finding.causes if (cause.effect, cause.scope) not in places)
+    chosen = [k for cause in causes for k in cause.columns]
     beside = finding.beside and finding.beside.keeping(chosen)
-    noise = finding.system.residual_rms(chosen, found.noise) if beside is None else beside.noise[:-1]
+    noise = system.residual_rms(chosen, found.noise) if beside is None else beside.noise[:-1]
     found = replace(found, causes=tuple(causes), noise=noise)
     where = finding.name, finding.places, finding.observed
-    kept = finding_of(*where, finding.system, found, finding.floor, seed, finding.plain, beside)
-    said = tuple(balance for cause in causes if (balance := finding.balance(cause)) is not None)
-    return replace(kept, power_balances=said)
+    kept = finding_of(*where, system, found, finding.floor, seed, finding.plain, beside)
+    said = tuple(
+        balance
+        for cause, balance in zip(finding.causes, finding.power_balances, strict=False)
+        if (cause.effect, cause.scope) in places
+    )
+    return replace(kept, power_balances=said, fallen=fallen)
 
 
 def finding_of(

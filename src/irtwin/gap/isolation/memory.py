@@ -1,19 +1,22 @@
 """Whether causes stand where residuals remember and runs are few: stretches of a run are then fewer than they look.
 
 The search draws signs for blocks of time, and compares stretches of a run, as if these were independent. A cause that
-passes is judged again, with blocks as alike as what is left without it is correlated. Where each programmed motion is a
+passes is judged again, with blocks as alike as what is left without it is correlated, and by whether halves of the time
+agree on it. Where each programmed motion is a
 group, runs that know nothing of each other agree on a cause, and nothing is to be judged again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import Explained
 from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.repeating import Repeats, repeating
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.regression.cross_validation import scores
@@ -25,21 +28,23 @@ from irtwin.gap.thresholds import Selection
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
+_DRAWS = 3999  # so that another seed moves a p of 0.1 by 0.005, one standard deviation
+
 
 def standing(
     explained: Explained, motions: Sequence[Motion], torque: Torque, limits: Selection, seed: int
 ) -> tuple[Cause, ...]:
-    """Return the causes that chance does not reach where residuals remember; `torque` as for the channel's traces.
+    """Return the causes that chance does not reach where residuals remember, with what was found of each.
 
-    An episode is not judged: joints agree on it, not blocks. Nor are bodies, nor what is so rare that no t tells.
+    `torque` as for the channel's traces. An episode is not judged: joints agree on it, not blocks. Nor are bodies, nor
+    what is so rare that no t tells.
     """
     finding = explained.finding
     if not finding.causes or not _cut(finding):
         return finding.causes
+    told = zip(finding.causes, memory(explained, motions, torque), repeating(finding, limits), strict=True)
     return tuple(
-        cause
-        for cause, memories in zip(finding.causes, memory(explained, motions, torque), strict=True)
-        if _stands(finding, cause, memories, limits, seed)
+        one for cause, memories, repeats in told if (one := _judged(finding, cause, memories, repeats, limits, seed))
     )
 
 
@@ -49,14 +54,27 @@ def _cut(finding: Finding) -> bool:
     return any(one & other for k, one in enumerate(groups) for other in groups[:k])
 
 
-def _stands(finding: Finding, cause: Cause, memories: np.ndarray, limits: Selection, seed: int) -> bool:
+def _judged(
+    finding: Finding, cause: Cause, memories: np.ndarray, repeats: Repeats | None, limits: Selection, seed: int
+) -> Cause | None:
+    """Return a cause with its p and how far it repeats, None where it may be chance.
+
+    It is none where random signs, alike where residuals are, seldom reach it, or where halves of the time agree on it
+    as they seldom would on the best of as many by chance.
+    """
     system, effect = finding.system, cause.variants[0].effect
     if cause.of_bodies or is_transient(effect) or (effect.rare and cause.t < limits.least_t):
-        return True
+        return cause
     alike = likeness(system.blocks, float(memories[system.equations(cause.columns)].max()))
-    if cause.t >= limits.least_t > cause.t * _shrunk(alike, system.group):
-        return False
-    return _p(finding, cause, alike, seed) <= limits.alpha_where_remembered
+    short = cause.t >= limits.least_t > cause.t * _shrunk(alike, system.group)
+    p = 1.0 if short else _p(finding, cause, alike, seed)
+    if repeats is not None:
+        p = min(p, repeats.p)
+    if p > limits.alpha_where_remembered:
+        return None
+    if repeats is None:
+        return replace(cause, p_remembered=p)
+    return replace(cause, p_remembered=p, repeats=repeats.part, in_halves=repeats.shown)
 
 
 def _shrunk(alike: np.ndarray, group: np.ndarray) -> float:
@@ -97,4 +115,4 @@ def _p(finding: Finding, cause: Cause, alike: np.ndarray, seed: int) -> float:
         if not any(set(variant.columns) & {*others, *columns} for variant in one.variants)
     ]
     block_scores, products = scores(system, system.moments(noise), noise, others)
-    return float(p_values(block_scores, products, [whole, *rest], seed, alike)[0])
+    return float(p_values(block_scores, products, [whole, *rest], seed, alike, _DRAWS)[0])

@@ -1,0 +1,22 @@
+"""What a diagnosis writes of a cause and of what the data cannot tell from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from tests.gap_cases import document
+
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.gap.writing import _members
+
+
+def test_what_few_runs_leave_open_is_open_for_rivals_too():
+    cause = next(one for one in document("ambiguous").causes if one.indistinguishable_from)
+    sure = replace(cause, confidence=0.8)
+    once = replace(sure.evidence, halves_that_show_it=("first",), part_that_repeats=0.5)
+    open_still = replace(sure, confidence=0.2, evidence=once)
+    told = [member.confidence for member in _members(sure, DEFAULT.confidence)]
+    assert [member.confidence for member in _members(open_still, DEFAULT.confidence)] == pytest.approx(
+        [one / 4 for one in told]
+    )
