@@ -208,10 +208,8 @@ def slow(
         robot, run, times, workspace, name=name or f"{run}_{times:g}_slower", database=database, graph_url=graph_url
     )
     by = "" if saved.half_width is None else f" +- {saved.half_width:.2g}"
-    said = f"saves {saved.value:.3g}{by} J" if saved.value >= 0 else f"takes {-saved.value:.3g}{by} J more"
-    click.echo(
-        f"{_where(None, kept)}: {said} than {run} with waiting after it; +- 95 % interval of the twin's parameters"
-    )
+    said = f"takes {abs(saved.value):.3g}{by} J {'less' if saved.value >= 0 else 'more'}"
+    click.echo(f"{_where(None, kept)}: {said} than {run} followed by waiting (95 % interval of the twin's parameters)")
 
 
 @click.command()
