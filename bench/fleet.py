@@ -24,7 +24,7 @@ from pyoxigraph import DefaultGraph, Quad, Store
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import ID, PREFIXES
+from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.resources import folder, shipped
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import METER, Base
@@ -72,7 +72,7 @@ def _robot(draw: random.Random, number: int, runs: int) -> Iterator[Row]:
     drift = draw.choice([0.0, 0.0, 0.0, 0.08, 0.15])  # of the energy, by the last run
     names = [f"{robot_id}.cycle_{k + 1:04d}" for k in range(runs)]
     identification = f"identification.{robot_id}"
-    yield from _activity(identification, robot_id, "identification", f"{ID}robot/{robot_id}", [])
+    yield from _activity(identification, robot_id, "identification", f"robot/{robot_id}", [])
     yield from _twin(draw, robot_id, twin_id, identification, standby, burns)
     for k, run_id in enumerate(names):
         yield from _run(draw, robot_id, run_id, twin_id, k, runs, standby, drift * k / runs, burns, identification)
@@ -142,7 +142,7 @@ def _run(
             "series_id": series_id, "run_id": run_id, "kind": kind, "path": f"series/{series_id}.parquet",
             "row_count": int(seconds / 0.012), "columns": columns, "activity_id": made,
         }  # fmt: skip
-    yield from _activity(state, robot_id, "run_state", f"{ID}run/{run_id}", [f"{ID}run/{run_id}"])
+    yield from _activity(state, robot_id, "run_state", f"run/{run_id}", [f"run/{run_id}"])
     yield "run_state", {"run_id": run_id, "current_state": "standstill", "idle_share": idle, "activity_id": state}
     for joint in JOINTS:
         yield "joint_state", {
@@ -156,8 +156,8 @@ def _run(
             "rmse_nm": rmse, "r_squared": 1.0 - rmse / 20.0, "activity_id": fitted_by,
         }  # fmt: skip
     yield "twin_run", {"twin_id": twin_id, "run_id": run_id, "part": part, "activity_id": fitted_by}
-    yield from _activity(energy, robot_id, "energy", f"{ID}run/{run_id}", [f"{ID}run/{run_id}", f"{ID}twin/{twin_id}"])
-    yield from _activity(meter, robot_id, METER, f"{ID}run/{run_id}", [f"{ID}series/{series[0]}"])
+    yield from _activity(energy, robot_id, "energy", f"run/{run_id}", [f"run/{run_id}", f"twin/{twin_id}"])
+    yield from _activity(meter, robot_id, METER, f"run/{run_id}", [f"series/{series[0]}"])
     ledger = _ledger(draw, standby * seconds, burns)
     modelled = sum(ledger.values())
     measured = modelled * (1.0 + drift + draw.gauss(0.0, 0.02))
@@ -195,8 +195,8 @@ def _diagnosis(draw: random.Random, robot_id: str, verdict: str, names: list[str
     diagnosis_id = f"{robot_id}.{draw.getrandbits(48):012x}"
     of = {"diagnosis_id": diagnosis_id, "activity_id": made}
     at = of | {"robot_id": robot_id}
-    used = [f"{ID}run/{run_id}" for run_id in names[:40]]
-    yield from _activity(made, robot_id, "diagnosis", f"{ID}robot/{robot_id}", used)
+    used = [f"run/{run_id}" for run_id in names[:40]]
+    yield from _activity(made, robot_id, "diagnosis", f"robot/{robot_id}", used)
     checksum = f"{draw.getrandbits(256):064x}"
     yield "gap_diagnosis", at | {
         "verdict": verdict, "created": _text(BEGIN + timedelta(days=91)),

@@ -1,4 +1,4 @@
-"""Reasoning part by part: each is closed and ruled beside the ontology alone, and one is held at a time.
+"""Reasoning part by part: each is closed and ruled beside the ontology alone, and few are held at once.
 
 Where a part turns out to bear on others (see `parts`) it cannot be done so, and all of the graph is to be reasoned
 over; what was written until then is written anew.
@@ -6,7 +6,7 @@ over; what was written until then is written anew.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from pyoxigraph import Literal, NamedNode, Quad, Triple
@@ -20,6 +20,7 @@ from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, term
 
+MOST_TOGETHER = 20_000  # triples of small parts that are concluded of together
 MOST_WAITING = 200_000  # quads that wait to be written
 _CONTRADICTION = NamedNode(term("Contradiction"))
 
@@ -64,21 +65,59 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region
     if ontology.schema.unfit is not None:
         raise Joined
     changes, minted = Changes(graph, whole), set[parts.Name]()
-    for region in regions:
-        if region is None:
-            raise Joined
-        new = _conclude(ontology, region).quads()
-        nodes = {node for quad in new if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
-        nodes -= region.nodes
-        if not minted.isdisjoint(nodes) or any(graph.about(node) for node in nodes):
-            raise Joined
-        minted |= nodes
-        changes.take(region.concluded, new)
+    for some in _together(regions):
+        for region, found in _conclude(ontology, some):
+            new = found.quads()
+            nodes = {node for quad in new if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
+            nodes -= region.nodes
+            if not minted.isdisjoint(nodes) or any(graph.about(node) for node in nodes):
+                raise Joined
+            minted |= nodes
+            changes.take(region.concluded, new)
     return changes
 
 
-def _conclude(ontology: Ontology, region: Region) -> Conclusions:
-    """Conclude of one part; where it contradicts itself nothing but that."""
+def _together(regions: Iterable[Region | None]) -> Iterator[list[Region]]:
+    """Yield parts, small ones some at a time: what is done for the ontology is done once for these."""
+    some, size = list[Region](), 0
+    for region in regions:
+        if region is None:
+            raise Joined
+        if not region.nodes:
+            yield [region]
+            continue
+        some.append(region)
+        size += len(region.asserted)
+        if size > MOST_TOGETHER:
+            yield some
+            some, size = [], 0
+    if some:
+        yield some
+
+
+def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
+    """Conclude of some parts as of one; of a part that contradicts itself nothing but that."""
+    region = regions[0] if len(regions) == 1 else _one(regions)
+    try:
+        yield region, _conclude_of_one(ontology, region)
+    except Contradiction as clash:
+        if len(regions) == 1:
+            yield region, _set_aside(ontology, region, clash)
+            return
+        for alone in regions:
+            yield from _conclude(ontology, [alone])
+
+
+def _one(regions: Iterable[Region]) -> Region:
+    whole = Region()
+    for region in regions:
+        whole.nodes |= region.nodes
+        whole.asserted |= region.asserted
+        whole.concluded |= region.concluded
+    return whole
+
+
+def _conclude_of_one(ontology: Ontology, region: Region) -> Conclusions:
     if not region.nodes:
         return Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
     if not region.asserted:
@@ -92,8 +131,6 @@ def _conclude(ontology: Ontology, region: Region) -> Conclusions:
         _check(ontology, closure)
     except Equality as same:
         raise Joined from same
-    except Contradiction as clash:
-        return _set_aside(ontology, region, clash)
     found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     return found
 
