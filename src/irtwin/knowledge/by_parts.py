@@ -20,7 +20,6 @@ from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, term
 
-MOST_TOGETHER = 20_000  # triples of small parts that are concluded of together
 MOST_WAITING = 200_000  # quads that wait to be written
 _CONTRADICTION = NamedNode(term("Contradiction"))
 
@@ -65,7 +64,9 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region
     if ontology.schema.unfit is not None:
         raise Joined
     changes, minted = Changes(graph, whole), set[parts.Name]()
-    for some in _together(regions):
+    for some in parts.together(regions):
+        if some is None:
+            raise Joined
         for region, found in _conclude(ontology, some):
             new = found.quads()
             nodes = {node for quad in new if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
@@ -77,27 +78,9 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region
     return changes
 
 
-def _together(regions: Iterable[Region | None]) -> Iterator[list[Region]]:
-    """Yield parts, small ones some at a time: what is done for the ontology is done once for these."""
-    some, size = list[Region](), 0
-    for region in regions:
-        if region is None:
-            raise Joined
-        if not region.nodes:
-            yield [region]
-            continue
-        some.append(region)
-        size += len(region.asserted)
-        if size > MOST_TOGETHER:
-            yield some
-            some, size = [], 0
-    if some:
-        yield some
-
-
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
     """Conclude of some parts as of one; of a part that contradicts itself nothing but that."""
-    region = regions[0] if len(regions) == 1 else _one(regions)
+    region = regions[0] if len(regions) == 1 else parts.one(regions)
     try:
         yield region, _conclude_of_one(ontology, region)
     except Contradiction as clash:
@@ -106,15 +89,6 @@ def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Regio
             return
         for alone in regions:
             yield from _conclude(ontology, [alone])
-
-
-def _one(regions: Iterable[Region]) -> Region:
-    whole = Region()
-    for region in regions:
-        whole.nodes |= region.nodes
-        whole.asserted |= region.asserted
-        whole.concluded |= region.concluded
-    return whole
 
 
 def _conclude_of_one(ontology: Ontology, region: Region) -> Conclusions:

@@ -47,6 +47,8 @@ from irtwin.knowledge.vocabulary import (
 
 Name = NamedNode | BlankNode
 
+MOST_TOGETHER = 20_000  # triples of small parts that are looked at together
+
 _TYPE = NamedNode(RDF + "type")
 _INVERSE_FUNCTIONAL = NamedNode(OWL + "InverseFunctionalProperty")
 _ROBOT = NamedNode(term("Industrial_Robot"))
@@ -162,6 +164,35 @@ def each(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
         left.update(nodes)
     known = np.isin(_hashes(left), np.concatenate(seen))
     yield from some(graph, ontology, {node for node, is_known in zip(left, known, strict=True) if not is_known})
+
+
+def together(regions: Iterable[Region | None]) -> Iterator[list[Region] | None]:
+    """Yield parts, small ones some at a time, so that what is done for the ontology is done once for these."""
+    some, size = list[Region](), 0
+    for region in regions:
+        if region is None:
+            yield None
+            return
+        if not region.nodes:  # that of the ontology alone
+            yield [region]
+            continue
+        some.append(region)
+        size += len(region.asserted)
+        if size > MOST_TOGETHER:
+            yield some
+            some, size = [], 0
+    if some:
+        yield some
+
+
+def one(regions: Iterable[Region]) -> Region:
+    """Return some parts as one."""
+    whole = Region()
+    for region in regions:
+        whole.nodes |= region.nodes
+        whole.asserted |= region.asserted
+        whole.concluded |= region.concluded
+    return whole
 
 
 def _of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:

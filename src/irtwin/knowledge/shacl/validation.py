@@ -88,7 +88,8 @@ def _by_parts(
 ) -> rdflib.Graph | None:
     """Put what is found in some parts in the place of what a report says of them; None where all is to be checked."""
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
-    for region in regions:
+    for some in parts.together(regions):
+        region = None if some is None else parts.one(some)
         if region is None or any(isinstance(node, BlankNode) for node in region.nodes):
             return None
         nodes = {rdflib.URIRef(node.value) for node in region.nodes or ontology.terms if isinstance(node, NamedNode)}
