@@ -157,7 +157,7 @@ def _run(
         }  # fmt: skip
     yield "twin_run", {"twin_id": twin_id, "run_id": run_id, "part": part, "activity_id": fitted_by}
     yield from _activity(energy, robot_id, "energy", f"run/{run_id}", [f"run/{run_id}", f"twin/{twin_id}"])
-    yield from _activity(meter, robot_id, METER, f"run/{run_id}", [f"series/{series[0]}"])
+    yield from _activity(meter, robot_id, METER, f"run/{run_id}", [f"series/{series[0]}/{run_id}"])
     ledger = _ledger(draw, standby * seconds, burns)
     modelled = sum(ledger.values())
     measured = modelled * (1.0 + drift + draw.gauss(0.0, 0.02))

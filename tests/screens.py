@@ -21,7 +21,11 @@ def narrow_and_dark(page: Any) -> list[tuple[str, list[Any]]]:
     page.set_viewport_size({"width": 400, "height": 900})
     page.emulate_media(color_scheme="dark")
     wrong: list[tuple[str, list[Any]]] = [] if is_dark(page) else [("light", [])]
-    if (width := page.evaluate("document.documentElement.scrollWidth")) != 400:
+    for _ in range(20):  # plots follow the window a moment later
+        if (width := page.evaluate("document.documentElement.scrollWidth")) == 400:
+            break
+        page.wait_for_timeout(100)
+    else:
         wrong.append(("wide", [width]))
     rules = "only => axe.run({ runOnly: { type: 'rule', values: only }, resultTypes: ['violations'] })"
     return wrong + _told(page.evaluate(rules, list(OF_THE_SCREEN)))

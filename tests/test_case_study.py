@@ -15,6 +15,7 @@ from irtwin import case_study
 from irtwin.asking import ask
 from irtwin.errors import InputError
 from irtwin.planning.plan import Plan
+from irtwin.report.wording import percent
 from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
 from tests.screens import faults, narrow_and_dark
@@ -55,7 +56,7 @@ def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not
     part = "PREFIX irt: <https://w3id.org/irtwin#> SELECT ?part { ?run irt:performs ?plan ; irt:Part_In_Twin ?part }"
     assert [found["part"] for found in ask(part, done[1]).rows] == ["held_out"]
     assert f"planned to take {row['planned_J']:.1f} J and took {row['measured_J']:.1f} J" in text
-    assert f"off by {abs(row['difference_percent']):.1f} %" in text and "off by 6.54 %" in text
+    assert f"off by {' '.join(percent(abs(row['difference_percent'])).split())}" in text and "off by 6.54 %" in text
 
 
 @pytest.mark.parametrize(

@@ -55,8 +55,7 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Filled, Filled]:
 
 
 def _filled(place: Path, base: str | None) -> Filled:
-    with pytest.MonkeyPatch.context() as patch, Workspace(place, base=base) as workspace:
-        patch.setattr("irtwin.knowledge.reasoning.java", lambda: None)  # Pellet takes seconds to start
+    with Workspace(place, base=base) as workspace:
         small_fleet.fill(workspace)
         with KnowledgeGraph(place / "graph", base=workspace.base) as graph:
             graph.load_ontology()
@@ -127,7 +126,7 @@ class Asked(Asking):
 
 
 def test_individuals_answer_at_their_iris(two: tuple[Filled, Filled]) -> None:
-    app = Starlette(routes=individuals.routes(Asked(two[1].graph)), exception_handlers={Refusal: _status})
+    app = Starlette(routes=individuals.routes(Asked(two[1].graph), two[1].graph.resources), exception_handlers={Refusal: _status})
 
     def got(path: str, accept: str) -> httpx.Response:
         async def get() -> httpx.Response:

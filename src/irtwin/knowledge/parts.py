@@ -32,7 +32,7 @@ from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.rules import Fact, Number
 from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.store.changes import is_asserted
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_CHANGED,
@@ -212,7 +212,7 @@ def _unread(graph: KnowledgeGraph, read: Counter[str]) -> Iterator[Quad]:
     kinds = {kind for kind, count in held.items() if kind and count > read[kind] and kind != GRAPH_ONTOLOGY}
     for name in graph.graphs() if kinds else ():
         if _kind(name) in kinds:
-            yield from in_graph(graph.triples(name), name)
+            yield from graph.quads_in(name)
 
 
 def _kind(name: str) -> str:

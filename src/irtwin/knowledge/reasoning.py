@@ -35,14 +35,7 @@ from irtwin.knowledge.vocabulary import (
     term,
 )
 
-_COUNT = f"""
-SELECT ?owl_rl ?by_rules
-WHERE {{
-  {{ SELECT (COUNT(*) AS ?owl_rl) {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }} }}
-  {{ SELECT (COUNT(*) AS ?by_rules) {{
-    {{ SELECT DISTINCT ?s ?p ?o {{ GRAPH ?g {{ ?s ?p ?o }}
-       FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}") || STRSTARTS(STR(?g), "{GRAPH_SWRL}")) }} }} }} }}
-}}"""
+_COUNT = f"SELECT (COUNT(*) AS ?count) {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }}"
 
 _SET_ASIDE = f"""
 SELECT ?robot ?why WHERE {{ GRAPH <{GRAPH_REASONED}> {{ ?robot <{term("Contradiction")}> ?why }} }} ORDER BY ?robot"""
@@ -230,12 +223,11 @@ def engine_of(graph: KnowledgeGraph) -> str:
 
 
 def _count(graph: KnowledgeGraph, changed: Iterable[str], joined_by: str | None = None) -> Inferences:
-    counts = graph.query(_COUNT).rows[0]
     names = set(changed) - {GRAPH_REASONED, GRAPH_CHANGED}
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
     return Inferences(
-        counts["owl_rl"],
-        counts["by_rules"],
+        graph.query(_COUNT).rows[0]["count"],
+        len(graph.triples(GRAPH_SHACL, GRAPH_SWRL)),
         tuple(sorted(names)),
         joined_by,
         tuple(aside),

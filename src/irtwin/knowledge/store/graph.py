@@ -232,6 +232,10 @@ class KnowledgeGraph:
             return {quad.triple for quad in self._store.quads_for_pattern(None, None, None, DefaultGraph())}
         return {triple for name in self.graphs(*below) for triple in _read(self._store, name)}
 
+    def quads_in(self, name: str) -> Iterator[Quad]:
+        """Yield the quads of one named graph, by its whole IRI, as the store gives them."""
+        return self._store.quads_for_pattern(None, None, None, NamedNode(name))
+
     @telling
     def query(self, text: str, bindings: Mapping[str, str | Literal] | None = None) -> Table:
         """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
