@@ -126,7 +126,9 @@ class Asked(Asking):
 
 
 def test_individuals_answer_at_their_iris(two: tuple[Filled, Filled]) -> None:
-    app = Starlette(routes=individuals.routes(Asked(two[1].graph), two[1].graph.resources), exception_handlers={Refusal: _status})
+    app = Starlette(
+        routes=individuals.routes(Asked(two[1].graph), two[1].graph.resources), exception_handlers={Refusal: _status}
+    )
 
     def got(path: str, accept: str) -> httpx.Response:
         async def get() -> httpx.Response:
