@@ -113,6 +113,21 @@ def test_declared_types_reach_through_a_query(tmp_path: Path) -> None:
     }
 
 
+def test_a_table_that_changed_is_looked_at_again(tmp_path: Path) -> None:
+    mapping = person('rr:objectMap [ rr:column "v" ]')
+    for declared, expected in (("INTEGER", '"1"^^<http://www.w3.org/2001/XMLSchema#integer>'), ("TEXT", '"1"')):
+        sql = f"DROP TABLE IF EXISTS person; CREATE TABLE person (id, v {declared}); INSERT INTO person VALUES (1, '1');"
+        (quad,) = mapped(tmp_path, mapping, sql)
+        assert quad.endswith(expected)
+
+
+def test_a_document_that_is_gone_is_missed(tmp_path: Path) -> None:
+    mapped(tmp_path, person("rr:object ex:o"))
+    (tmp_path / "a.r2rml.ttl").unlink()
+    with pytest.raises(InputError, match=r"a\.r2rml\.ttl"):
+        list(map_database(open_engine(f"sqlite:///{tmp_path}/a.db"), [tmp_path / "a.r2rml.ttl"]))
+
+
 def test_a_query_may_hold_percent_colon_and_semicolon(tmp_path: Path) -> None:
     query = "rr:sqlQuery \"SELECT id, name || ' :x; %s ?' AS n FROM person WHERE name LIKE 'A%' -- ; not the end\""
     found = mapped(tmp_path, person('rr:objectMap [ rr:column "n" ]', table=query))

@@ -8,8 +8,8 @@ import jinja2
 
 from irtwin.errors import InputError
 from irtwin.knowledge import extensions
-from irtwin.report.energy.page import environment
 from irtwin.report.questions import read_questions
+from irtwin.report.templates import environment
 from irtwin.resources import Files, Resource, Resources, shipped
 
 _REPORTS = {"energy": {"robot", "twin"}, "gap": {"robot", "diagnosis"}, "layout": set[str]()}  # what is bound in each

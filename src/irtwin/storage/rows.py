@@ -100,9 +100,10 @@ def recorded_rows(session: Session, robot_id: str) -> Rows:
 
 def modelled_of_live_runs(session: Session, robot_id: str) -> Rows:
     """Return the rows of what a robot's twin says of its live runs."""
-    made = _of_live(robot_id)
+    made = set(session.scalars(_of_live(robot_id)))
     return {
-        table.name: [dict(row) for row in session.execute(_made_by(table, made)).mappings()] for table in _made_tables()
+        table.name: [dict(row) for row in session.execute(_made_by(table, made)).mappings()] if made else []
+        for table in _made_tables()
     }
 
 
@@ -188,6 +189,8 @@ def _drop_parts(session: Session, robot_id: str) -> None:
 
 def drop_activities(session: Session, activities: set[str]) -> None:
     """Drop activities with all that they made."""
+    if not activities:
+        return
     for table in reversed(_made_tables()):
         session.execute(delete(table).where(table.columns["activity_id"].in_(activities)))
 
@@ -237,7 +240,7 @@ def _of_live(robot_id: str) -> Select[Any]:
     return energies.where(RunEnergy.twin_id.is_not(None))
 
 
-def _made_by(table: Table, activities: Select[Any]) -> Select[Any]:
+def _made_by(table: Table, activities: Select[Any] | AbstractSet[str]) -> Select[Any]:
     return select(table).where(table.columns["activity_id"].in_(activities))
 
 

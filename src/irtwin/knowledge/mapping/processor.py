@@ -13,10 +13,14 @@ from sqlalchemy import Connection, Engine
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.plan import Statement, plan
 from irtwin.knowledge.mapping.reader import read_document
-from irtwin.knowledge.mapping.source import read, snapshot
+from irtwin.knowledge.mapping.source import declarations, read, snapshot
 from irtwin.knowledge.vocabulary import ID
 from irtwin.storage import files
 from irtwin.storage.engine import open_engine
+
+_Planned = tuple[tuple[str, ...] | None, str | None, tuple[tuple[Path, bytes], ...]]  # tables, base IRI, documents
+
+_KEPT: dict[_Planned, tuple[Statement, ...]] = {}
 
 
 def map_database(
@@ -39,16 +43,28 @@ def map_database(
 @contextmanager
 def planned(
     engine: Engine, documents: Sequence[Path], base_iri: str | None = None, seconds: float = math.inf
-) -> Iterator[tuple[Connection, list[Statement]]]:
+) -> Iterator[tuple[Connection, tuple[Statement, ...]]]:
     """Give a read-only snapshot of a database, and the statements that documents make of it."""
-    checked = [read_document(path) for path in documents]
     with snapshot(engine, seconds) as connection:
-        statements = [
-            statement
-            for document in checked
-            for statement in plan(connection, document, base_iri or document.base_iri or ID)
-        ]
-        yield connection, statements
+        yield connection, _statements(connection, documents, base_iri)
+
+
+def _statements(connection: Connection, documents: Sequence[Path], base_iri: str | None) -> tuple[Statement, ...]:
+    """Return the statements of documents: those of before where neither the documents nor the tables changed."""
+    tables = declarations(connection)
+    known_by = (tables, base_iri, tuple((path, path.read_bytes() if path.is_file() else b"") for path in documents))
+    if known_by in _KEPT:
+        return _KEPT[known_by]
+    checked = [read_document(path) for path in documents]
+    made = tuple(
+        statement
+        for document in checked
+        for statement in plan(connection, document, base_iri or document.base_iri or ID)
+    )
+    if tables is not None:
+        _KEPT.clear()  # a process maps the same documents again and again
+        _KEPT[known_by] = made
+    return made
 
 
 def map_to_file(

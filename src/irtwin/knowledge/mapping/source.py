@@ -84,6 +84,14 @@ def schema_version(connection: Connection) -> str:
     return str(connection.exec_driver_sql("PRAGMA main.schema_version").scalar())
 
 
+def declarations(connection: Connection) -> tuple[str, ...] | None:
+    """Return what declares the tables and views of a database in SQLite; None in others, which are asked each time."""
+    if connection.dialect.name != "sqlite":
+        return None
+    rows = connection.exec_driver_sql("SELECT sql FROM main.sqlite_master WHERE sql IS NOT NULL ORDER BY type, name")
+    return tuple(rows.scalars())
+
+
 def describe(connection: Connection, table: LogicalTable) -> Source:
     """Find a logical table's columns. Raises InputError where it is not there or the query is not valid."""
     sql = _from_item(connection, table)

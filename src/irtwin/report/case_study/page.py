@@ -12,9 +12,10 @@ from markupsafe import Markup
 from irtwin.errors import InputError
 from irtwin.packing import Fragment, packed_scripts
 from irtwin.report.case_study.figures import figures
-from irtwin.report.energy.page import DrawScene, content_policy, page_data, plotly, style, written
+from irtwin.report.energy.page import DrawScene, content_policy, page_data, plotly
 from irtwin.report.explorer import Columns, ReadSeries
 from irtwin.report.questions import Answers, Graph, ask, questions_of
+from irtwin.report.templates import style, written
 from irtwin.resources import folder, shipped
 from irtwin.storage.files import write
 

@@ -10,18 +10,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
 
 from irtwin.errors import InputError
 from irtwin.packing import Fragment, embedded_json, packed_scripts
-from irtwin.report import colours, wording
+from irtwin.report import colours
 from irtwin.report.energy import lead, tables, verdict
 from irtwin.report.energy.figures import Figure, figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
-from irtwin.report.heading import heading
 from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
+from irtwin.report.templates import style, written
 from irtwin.resources import Resources, folder, shipped
 from irtwin.storage.files import write
 
@@ -134,47 +132,3 @@ def _digest(script: str) -> str:
     # A browser hashes what its parser made of the text, which reads \r\n as \n.
     normal = script.replace("\r\n", "\n").replace("\r", "\n")
     return base64.b64encode(hashlib.sha256(normal.encode("utf-8")).digest()).decode("ascii")
-
-
-def style(resources: Resources, name: str = "layout/style.css") -> Markup:
-    """Return a style sheet of the reports."""
-    return Markup(resources.path("reports", name).read_text(encoding="utf-8"))
-
-
-def written(resources: Resources, template: str, **values: Any) -> str:
-    """Return the page that a template makes of values. InputError where an extension is why it cannot be made."""
-    try:
-        return environment(resources).get_template(template).render(**values)
-    except jinja2.TemplateError as error:
-        if not any(file.is_extension for file in resources.of("reports")):
-            raise
-        raise InputError(
-            f"{resources.path('reports', template)}: {error}; see the files that extend reports/"
-        ) from error
-
-
-def environment(resources: Resources) -> jinja2.Environment:
-    """Return the templates of reports, with the filters that pages use.
-
-    They run in a sandbox, as a workspace from elsewhere may bring some.
-    """
-
-    def source(name: str) -> tuple[str, str, Callable[[], bool]] | None:
-        known = {file.name: file.path for file in resources.of("reports", ".html.jinja")}
-        return (known[name].read_text(encoding="utf-8"), str(known[name]), lambda: True) if name in known else None
-
-    environment = SandboxedEnvironment(
-        loader=jinja2.FunctionLoader(source),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    words = (
-        wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
-        wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
-        wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
-        wording.shown, wording.kilowatt_hours, tables.is_unsure, heading,
-    )  # fmt: skip
-    environment.filters |= {function.__name__: function for function in words}
-    return environment

@@ -19,13 +19,14 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.providers.records import identifier, ingest, robot_iri
 from irtwin.report import wording
-from irtwin.report.energy.page import content_policy, figure_scripts, page_data, style, written
+from irtwin.report.energy.page import content_policy, figure_scripts, page_data
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import counted
 from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
+from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace

@@ -14,8 +14,9 @@ from pyoxigraph import NamedNode, RdfFormat, Store, parse
 
 from irtwin.knowledge.store.table import to_python
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS, shorten
-from irtwin.report.energy.page import content_policy, environment, style
+from irtwin.report.energy.page import content_policy
 from irtwin.report.ontology.class_tree import Node, class_tree
+from irtwin.report.templates import environment, style
 from irtwin.resources import Resource, Resources, folder, shipped
 from irtwin.storage.files import check_place, write
 

@@ -10,10 +10,10 @@ import jinja2
 
 from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
-from irtwin.report.energy.page import environment
 from irtwin.report.plant import links, paging
 from irtwin.report.plant.tariff import JOULES
 from irtwin.report.questions import Answers, Question, read_questions
+from irtwin.report.templates import environment
 
 FOLDER = resources.folder("reports") / "plant"
 

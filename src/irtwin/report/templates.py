@@ -1,0 +1,79 @@
+"""The templates of pages: those that ship and those that extend them, with the filters that pages use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jinja2
+from jinja2.bccache import Bucket
+from jinja2.sandbox import SandboxedEnvironment
+from markupsafe import Markup
+
+from irtwin.errors import InputError
+from irtwin.report import wording
+from irtwin.report.energy import tables
+from irtwin.report.heading import heading
+from irtwin.resources import Resources
+
+
+class _CompiledTemplates(jinja2.BytecodeCache):
+    """Templates compiled in this process; one whose text changed is compiled again."""
+
+    def __init__(self) -> None:
+        self.kept: dict[str, bytes] = {}  # of each template, as bytes that tell which text it is of
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        if bucket.key in self.kept:
+            bucket.bytecode_from_string(self.kept[bucket.key])
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        self.kept[bucket.key] = bucket.bytecode_to_string()
+
+
+_COMPILED = _CompiledTemplates()
+
+
+def written(resources: Resources, template: str, **values: Any) -> str:
+    """Return the page that a template makes of values. InputError where an extension is why it cannot be made."""
+    try:
+        return environment(resources).get_template(template).render(**values)
+    except jinja2.TemplateError as error:
+        if not any(file.is_extension for file in resources.of("reports")):
+            raise
+        raise InputError(
+            f"{resources.path('reports', template)}: {error}; see the files that extend reports/"
+        ) from error
+
+
+def environment(resources: Resources) -> jinja2.Environment:
+    """Return the templates of reports, with the filters that pages use.
+
+    They run in a sandbox, as a workspace from elsewhere may bring some.
+    """
+
+    def source(name: str) -> tuple[str, str, Callable[[], bool]] | None:
+        known = {file.name: file.path for file in resources.of("reports", ".html.jinja")}
+        return (known[name].read_text(encoding="utf-8"), str(known[name]), lambda: True) if name in known else None
+
+    environment = SandboxedEnvironment(
+        loader=jinja2.FunctionLoader(source),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        bytecode_cache=_COMPILED,
+    )
+    words = (
+        wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
+        wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
+        wording.short_checksum, wording.notes, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
+        wording.shown, wording.kilowatt_hours, tables.is_unsure, heading,
+    )  # fmt: skip
+    environment.filters |= {function.__name__: function for function in words}
+    return environment
+
+
+def style(resources: Resources, name: str = "layout/style.css") -> Markup:
+    """Return a style sheet of the reports."""
+    return Markup(resources.path("reports", name).read_text(encoding="utf-8"))
