@@ -19,7 +19,7 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.special import expit
 
 from blind.compare import answers
-from blind.score import calibration, ranked
+from blind.score import calibration, calibration_of_true_confidences, ranked
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.confidence import confidence
 from irtwin.gap.thresholds import DEFAULT, Confidence
@@ -136,7 +136,9 @@ def main() -> None:
         print(f"{name} = {getattr(weights, name):.3f}  (shipped: {getattr(DEFAULT.confidence, name):.3f})")
     shipped = error(causes, [DEFAULT.confidence] * len(causes))
     fitted = error(causes, cross_validated(causes))
+    mean, most = calibration_of_true_confidences([expit(one.logit(DEFAULT.confidence)) for one in causes])
     print(f"expected calibration error: shipped {shipped:.3f}, fitted and cross-validated {fitted:.3f}")
+    print(f"as many true confidences would have {mean:.3f}, up to {most:.3f}")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import argparse
 import hashlib
 import json
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +123,13 @@ def calibration(pairs: Iterable[tuple[float, bool]], bins: int = 10) -> tuple[fl
     return float(error), [(float(c), float(s), n) for c, s, n in table]
 
 
+def calibration_of_true_confidences(confidences: Sequence[float], draws: int = 2000) -> tuple[float, float]:
+    """Return the error that confidences would have if each were true, as causes are few: its mean and 95 % point."""
+    rng, given = np.random.default_rng(0), np.asarray(confidences)
+    errors = [calibration(zip(given, rng.random(len(given)) < given, strict=True))[0] for _ in range(draws)]
+    return float(np.mean(errors)), float(np.quantile(errors, 0.95))
+
+
 def closed_by_true_form(diagnosis: dict[str, Any], healthy: dict[str, Any]) -> float:
     """Return the closed fraction of a refit with the true form: it leaves what the healthy robot's twin leaves.
 
@@ -185,8 +192,7 @@ def page(
     first = [score for score in AIMS if score in scores]
     for score in first + sorted(set(scores) - set(first)):
         lines.append(_row(score, scores[score]))
-    aim = AIMS["expected calibration error"]
-    lines.append(f"| expected calibration error | {error:.3f} | | {aim} | {len(confident)} causes |")
+    lines += _calibration_rows(error, confident)
     if closed:
         lines.append(f"| closed fraction, median | {np.median(closed):.2f} | | | {len(closed)} |")
     if of_closable:
@@ -201,6 +207,15 @@ def page(
     lines += ["", "| confidence given | share right | causes |", "| --- | --- | --- |"]
     lines += [f"| {c:.2f} | {s:.2f} | {n} |" for c, s, n in table]
     return "\n".join(lines) + "\n"
+
+
+def _calibration_rows(error: float, confident: Sequence[tuple[float, bool]]) -> list[str]:
+    aim, causes = AIMS["expected calibration error"], f"{len(confident)} causes"
+    rows = [f"| expected calibration error | {error:.3f} | | {aim} | {causes} |"]
+    if confident:
+        mean, most = calibration_of_true_confidences([given for given, _ in confident])
+        rows.append(f"| that of true confidences, as few | {mean:.3f} | up to {most:.3f} | | {causes} |")
+    return rows
 
 
 def _row(score: str, values: list[float]) -> str:

@@ -116,7 +116,9 @@ def test_declared_types_reach_through_a_query(tmp_path: Path) -> None:
 def test_a_table_that_changed_is_looked_at_again(tmp_path: Path) -> None:
     mapping = person('rr:objectMap [ rr:column "v" ]')
     for declared, expected in (("INTEGER", '"1"^^<http://www.w3.org/2001/XMLSchema#integer>'), ("TEXT", '"1"')):
-        sql = f"DROP TABLE IF EXISTS person; CREATE TABLE person (id, v {declared}); INSERT INTO person VALUES (1, '1');"
+        sql = (
+            f"DROP TABLE IF EXISTS person; CREATE TABLE person (id, v {declared}); INSERT INTO person VALUES (1, '1');"
+        )
         (quad,) = mapped(tmp_path, mapping, sql)
         assert quad.endswith(expected)
 
