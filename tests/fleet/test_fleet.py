@@ -9,6 +9,8 @@ from irtwin.fleet.fleet import batches_of
 
 pytestmark = pytest.mark.slow
 
+BASE = "https://plant.example/energy/"
+
 
 @pytest.fixture(scope="module")
 def robots(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -27,7 +29,8 @@ def out(robots: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, out: Path) -> None:
-    first = data_sets.irtwin("fleet", "run", robots, "--out", out, "--workers", 2)
+    command = ("fleet", "run", robots, "--out", out, "--workers", 2, "--base", BASE)
+    first = data_sets.irtwin(*command)
     assert first.status == 3, first.err
     assert first.out == "done     2\nrefused  1\n"
     assert "nam" in first.err and "Traceback" not in first.err
@@ -36,9 +39,22 @@ def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, out: Path) -
     pages = [page for place in workspaces for page in place.glob("reports/*.html")]
     assert len(pages) == 2
     written = {page: page.stat().st_mtime_ns for page in pages}
-    again = data_sets.irtwin("fleet", "run", robots, "--out", out, "--workers", 2)
+    again = data_sets.irtwin(*command)
     assert again.out == first.out
     assert {page: page.stat().st_mtime_ns for page in pages} == written
+
+
+def test_a_fleet_has_one_base_of_iris(robots: Path, out: Path) -> None:
+    asked = "SELECT ?robot { ?robot a irt:Industrial_Robot }"
+    places = [batch.folder / "workspace" for batch in batches_of(out)]
+    said = [data_sets.irtwin("query", asked, "--workspace", place).out for place in places if place.is_dir()]
+    assert said and all(lines.count(f"{BASE}robot/") == 2 for lines in said)
+    other = data_sets.irtwin("fleet", "run", robots, "--out", out)
+    assert other.status == 2
+    assert f"the IRIs of this fleet begin with {BASE}; give --base {BASE}, or another --out" in other.err
+    none = data_sets.irtwin("fleet", "run", robots, "--out", out, "--base", "plant")
+    assert none.status == 2
+    assert none.err.startswith("irtwin: --base: ")
 
 
 def test_status_says_what_became_of_each(out: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import announce, say
+from irtwin.cli.options import announce, base_option, say
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -47,9 +47,10 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
 @fleet.command()
 @_options
 @click.option("--batch", type=click.IntRange(1, 1000), default=100, show_default=True, help="Robots in one workspace.")
-def run(source: str, out: Path, workers: int | None, scheduler: str | None, batch: int) -> None:
+@base_option
+def run(source: str, out: Path, workers: int | None, scheduler: str | None, batch: int, base: str | None) -> None:
     """Build twins, graphs and reports: one workspace for each batch of robots."""
-    _work(source, out, "run", workers, scheduler, batch)
+    _work(source, out, "run", workers, scheduler, batch, base)
 
 
 @fleet.command()
@@ -71,12 +72,19 @@ def status(folder: Path) -> None:
     _show(status_of(batches))
 
 
-def _work(source: str, out: Path, kind: str, workers: int | None, scheduler: str | None, batch: int) -> None:
+def _work(
+    source: str,
+    out: Path,
+    kind: str,
+    workers: int | None,
+    scheduler: str | None,
+    batch: int,
+    base: str | None = None,
+) -> None:
     from irtwin.fleet.fleet import work
 
-    found = work(
-        source, out, kind, batch=batch, workers=workers or os.cpu_count() or 1, scheduler=scheduler, announce=announce
-    )
+    workers = workers or os.cpu_count() or 1
+    found = work(source, out, kind, batch=batch, workers=workers, scheduler=scheduler, base=base, announce=announce)
     _show(found)
     if found.set_aside:
         sys.exit(3)

@@ -51,15 +51,22 @@ class Batch:
     folder: Path
 
     @classmethod
-    def create(cls, folder: Path, kind: str, places: Sequence[str]) -> Batch:
-        """Write down which data sets a new batch has."""
-        write(folder / _SETS, json.dumps({"kind": kind, "data_sets": list(places)}, indent=1).encode())
+    def create(cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None) -> Batch:
+        """Write down which data sets a new batch has, and what the IRIs of its workspace begin with."""
+        said = {"kind": kind, "base": base, "data_sets": list(places)}
+        write(folder / _SETS, json.dumps(said, indent=1).encode())
         return cls(folder)
 
     @property
     def kind(self) -> str:
         """`run` or `diagnose`."""
         return str(self._sets()["kind"])
+
+    @property
+    def base(self) -> str | None:
+        """What the IRIs of its workspace begin with, where that was said."""
+        found = self._sets().get("base")
+        return None if found is None else str(found)
 
     @property
     def places(self) -> list[str]:
@@ -136,7 +143,7 @@ class Batch:
         trace.unlink(missing_ok=True)
         try:
             if kind == RUN:
-                workflow.run(data_set, self.folder / "workspace")
+                workflow.run(data_set, self.folder / "workspace", base=self.base)
             else:
                 results = self.folder / "diagnoses" / key(place)
                 workflow.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")

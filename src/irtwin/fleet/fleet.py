@@ -12,6 +12,7 @@ from irtwin.errors import InputError
 from irtwin.fleet.batch import DONE, FAILED, REFUSED, Batch, Record
 from irtwin.fleet.data_sets import find_data_sets
 from irtwin.fleet.schedule import work_here, work_on_cluster
+from irtwin.storage import base_iri
 
 _NAME = "batch_{:04d}"
 
@@ -32,14 +33,17 @@ def work(
     batch: int,
     workers: int,
     scheduler: str | None = None,
+    base: str | None = None,
     announce: Callable[[str], None] = lambda line: None,
 ) -> Status:
     """Take every data set of a source through `run` or `diagnose`, results below `folder`.
 
-    What was done before and has not changed is not done again. `batch`: at most so many data sets share a workspace.
-    Raises InputError where the source holds none, or the folder is of another kind.
+    What was done before and has not changed is not done again. `batch`: at most so many data sets share a workspace;
+    `base`: what the IRIs of its individuals begin with, one for the whole fleet.
+    Raises InputError where the source holds none, or the folder is of another kind or base.
     """
-    _plan(find_data_sets(source), folder, kind, batch, workers)
+    base = None if base is None else base_iri.checked(base, "--base")
+    _plan(find_data_sets(source), folder, kind, batch, workers, base)
     batches = [one for one in batches_of(folder) if one.kind == kind]
     ended = count(1)
 
@@ -53,16 +57,23 @@ def work(
     return status_of(batches)
 
 
-def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: int) -> None:
+def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: int, base: str | None) -> None:
     """Put data sets that no batch has into new ones, enough for each worker to have one."""
     there = batches_of(folder)
     if there and {one.kind for one in there} != {kind}:
         raise InputError(f"{folder}: holds a fleet of `{there[0].kind}`; give `{kind}` a folder of its own")
+    if there and {one.base for one in there} != {base}:
+        said = there[0].base
+        raise InputError(
+            f"{folder}: the IRIs of this fleet begin with {said or base_iri.DEFAULT}; "
+            + (f"give --base {said}" if said else "leave --base away")
+            + ", or another --out"
+        )
     known = {place for one in there for place in one.places}
     new = [place for place in places if place not in known]
     share = max(1, min(size, -(-len(new) // max(workers, 1))))
     for number, start in enumerate(range(0, len(new), share), start=len(there) + 1):
-        Batch.create(folder / _NAME.format(number), kind, new[start : start + share])
+        Batch.create(folder / _NAME.format(number), kind, new[start : start + share], base)
 
 
 def batches_of(folder: Path) -> list[Batch]:
