@@ -1,4 +1,4 @@
-"""What any test may ask for: a private PostgreSQL server, a machine without Java."""
+"""What any test may ask for: a private PostgreSQL server, a browser, a machine without Java."""
 
 from __future__ import annotations
 
@@ -9,9 +9,15 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import create_engine, text
+
+_CHROMIUM = (
+    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+)  # fmt: skip
 
 
 def _server_programs() -> Path | None:
@@ -24,6 +30,19 @@ def _server_programs() -> Path | None:
 def keep_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave this process its sockets: a command that is run within it would take them for good."""
     monkeypatch.setattr("irtwin.knowledge.store.no_network.leave_network", lambda: True)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Headless Chromium, which asks nothing of the network by itself and draws in 3-D without a graphics card."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        pytest.skip("no Chromium on this machine")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as session:
+        started = session.chromium.launch(executable_path=chromium, args=_CHROMIUM)
+        yield started
+        started.close()
 
 
 @pytest.fixture(scope="session")

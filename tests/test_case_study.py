@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +22,6 @@ pytest.importorskip("ompl")
 pytest.importorskip("toppra")
 pytestmark = pytest.mark.slow
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run"]
 Done = tuple[Said, Path]
 
 
@@ -94,15 +90,6 @@ def test_a_log_of_another_motion_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"is the log of another motion, .* rad off"):
         case_study.add_measurement(data_set, Plan(names, motion, None, 0.0, True, (), 1.2))
     assert case_study.MEASURED not in (data_set / "dataset.toml").read_text()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    if not CHROMIUM:
-        pytest.skip("no Chromium on this machine")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as session:
-        yield session.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
 
 
 @pytest.mark.system

@@ -6,8 +6,8 @@ import html
 import json
 import math
 import re
-import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests import gap_cases, rows
@@ -22,7 +22,6 @@ from irtwin.storage.database import Workspace
 
 pytestmark = pytest.mark.slow
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 ORDER = ["summary", "where", "which", "shrink", "next", "untestable", "provenance"]
 
 
@@ -213,23 +212,18 @@ def test_text_from_the_data_is_no_markup(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
-@pytest.mark.skipif(not CHROMIUM, reason="no Chromium on this machine")
-def test_every_figure_is_drawn_without_network(pages: dict[str, Path]) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-quic"])
-        for verdict, file in pages.items():
-            page = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True).new_page()
-            complaints: list[str] = []
-            page.on("console", lambda message, into=complaints: into.append(message.text))
-            page.on("pageerror", lambda error, into=complaints: into.append(str(error)))
-            page.goto(file.as_uri())
-            page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
-            for plot in page.locator(".plot").all():
-                assert plot.locator(".plot-container").count() == 1
-            assert page.evaluate("document.documentElement.scrollWidth") == 1440
-            assert complaints == [], verdict
-        browser.close()
+def test_every_figure_is_drawn_without_network(browser: Any, pages: dict[str, Path]) -> None:
+    for verdict, file in pages.items():
+        page = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True).new_page()
+        complaints: list[str] = []
+        page.on("console", lambda message, into=complaints: into.append(message.text))
+        page.on("pageerror", lambda error, into=complaints: into.append(str(error)))
+        page.goto(file.as_uri())
+        page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
+        for plot in page.locator(".plot").all():
+            assert plot.locator(".plot-container").count() == 1
+        assert page.evaluate("document.documentElement.scrollWidth") == 1440
+        assert complaints == [], verdict
 
 
 def test_the_residual_of_a_joint_that_slides_is_a_force(tmp_path: Path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,14 +13,12 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.packing import Fragment, packed_scripts
 from irtwin.report.energy.page import render
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 playwright = pytest.importorskip("playwright.sync_api")
-pytestmark = [pytest.mark.system, pytest.mark.skipif(not CHROMIUM, reason="no Chromium on this machine")]
+pytestmark = pytest.mark.system
 
 Page = playwright.Page
 SCRIPTS = packed_scripts(['document.getElementById("stub").dataset.ran = "yes";'])
 SCENE = Fragment(Markup('<div id="stub" style="height: 200px"></div>') + SCRIPTS.html, SCRIPTS.scripts)
-FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"]
 
 
 @pytest.fixture(scope="module")
@@ -32,14 +29,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("page") / "robot.html"
     render(graph, six.iri, six.read_series, out, draw_scene=lambda runs, opens: SCENE)
     return out
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[playwright.Browser]:
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests import small_robots
@@ -11,38 +11,34 @@ from tests import small_robots
 from irtwin.asking import ask
 from irtwin.workflow import run
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
-playwright = pytest.importorskip("playwright.sync_api")
-pytestmark = [pytest.mark.system, pytest.mark.skipif(not CHROMIUM, reason="no Chromium on this machine")]
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run"]
+pytestmark = pytest.mark.system
 ENERGY = """PREFIX irt: <https://w3id.org/irtwin#>
 SELECT ?name ?energy { ?run irt:Run_Name ?name ; irt:Modelled_Energy ?energy } ORDER BY ?name"""
 SEEK = "time => document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time}}))"
 JOULES = {"J": 1.0, "kJ": 1e3, "MJ": 1e6}
 
 
-def test_each_run_ends_with_the_energy_of_the_graph(tmp_path: Path) -> None:
+def test_each_run_ends_with_the_energy_of_the_graph(browser: Any, tmp_path: Path) -> None:
     report = run(small_robots.data_set(tmp_path / "data", "Arm", joints=3), tmp_path / "w")
     known = {row["name"]: row["energy"] for row in ask(ENERGY, tmp_path / "w").rows}
     assert len(known) == 3
     assert report.stat().st_size < 6_000_000
-    with playwright.sync_playwright() as session:
-        page = session.chromium.launch(executable_path=CHROMIUM, args=FLAGS).new_page()
-        complaints: list[str] = []
-        page.on("console", lambda message: complaints.append(message.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto(report.as_uri())
-        page.wait_for_selector("#figure-torque .scatterlayer .trace")
-        for name, energy in known.items():
-            page.select_option(".is-run", label=name)
-            assert page.locator("#run-choice option:checked").inner_text() == name
-            page.evaluate(SEEK, 1e9)
-            unit = JOULES[page.inner_text(".is-energy-unit")]
-            assert float(page.inner_text(".is-energy")) * unit == pytest.approx(energy, rel=1e-3)
-            page.evaluate(SEEK, 2.0)
-            assert page.locator("#figure-torque .cursor:visible").count() == 3
-        page.select_option(".is-speed", "20")
-        page.click(".is-play")
-        page.wait_for_selector(".is-play[aria-label=Pause]")
-        page.wait_for_selector(".is-play[aria-label=Play]")
-        assert complaints == []
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(report.as_uri())
+    page.wait_for_selector("#figure-torque .scatterlayer .trace")
+    for name, energy in known.items():
+        page.select_option(".is-run", label=name)
+        assert page.locator("#run-choice option:checked").inner_text() == name
+        page.evaluate(SEEK, 1e9)
+        unit = JOULES[page.inner_text(".is-energy-unit")]
+        assert float(page.inner_text(".is-energy")) * unit == pytest.approx(energy, rel=1e-3)
+        page.evaluate(SEEK, 2.0)
+        assert page.locator("#figure-torque .cursor:visible").count() == 3
+    page.select_option(".is-speed", "20")
+    page.click(".is-play")
+    page.wait_for_selector(".is-play[aria-label=Pause]")
+    page.wait_for_selector(".is-play[aria-label=Play]")
+    assert complaints == []
