@@ -23,7 +23,6 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
 from irtwin.gap.isolation.refusal import Refused
 from irtwin.gap.isolation.torque_scale import TorqueScale
-from irtwin.gap.isolation.verdict import UNEXPLAINED
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
@@ -79,12 +78,16 @@ def cause(
     one: Cause,
     name: str,
     gains: Sequence[float],
-    verdict: str,
     weights: Confidence,
     scale: TorqueScale | None,
+    *,
+    unexplained: bool,
 ) -> document.Cause:
-    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named."""
-    closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
+    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named.
+
+    `unexplained`: the gap stays so, however sure its causes are.
+    """
+    closed, share = finding.closed(one), min(one.gain / max(gains), 1.0)
     sure = confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained)
     return document.Cause(
         id=name,
