@@ -106,7 +106,7 @@ class Diagnosis:
         """The diagnosis as it is handed out: in JSON, in the graph, on a page."""
         robot, gains = self.description, [cause.gain for _, cause in self.causes]
         fallen = [cause.gain for channel in self.channels for cause in channel.fallen]
-        acted_on = [(cause.effect, writing.acted_on(robot, cause)) for _, cause in self.causes]
+        acted_on = [(cause.effect, cause.touched(robot)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         weights = self.thresholds.confidence
