@@ -38,6 +38,8 @@ def left(before, after, causes=(), source=REPEATS, closing=MUCH, **more):
     system = SimpleNamespace(both=False)
     floor = np.ones(len(before))
     finding = SimpleNamespace(
+        name="torque",
+        places=("j1", "j2")[: len(before)],
         causes=causes,
         floor=floor,
         system=system,
@@ -105,13 +107,32 @@ def test_a_gap_that_only_an_impossible_number_closes_is_left_open():
 
 
 def test_what_does_not_repeat_is_left_open_where_nothing_else_is_found():
-    first, second = object(), object()
+    first, second = (SimpleNamespace(channel="torque", joint="j1", size=1.0) for _ in range(2))
     assert left([1.0], [1.0], differing=[first, second]) == DOES_NOT_REPEAT
     assert left([1.0], [1.0], differing=[first, second], explained=[second]) == DOES_NOT_REPEAT
     assert left([1.0], [1.0], differing=[first, second], explained=[first]) is None
     assert left([5.0], [1.2], [CAUSE], differing=[first]) is None
 
 
+def test_what_was_taken_out_counts_in_the_gap_that_there_was():
+    swings = SimpleNamespace(channel="torque", joint="j1", size=100.0)
+    assert left([1.0, 3.0], [1.0, 3.0]) == MUCH_IS_LEFT
+    assert left([1.0, 3.0], [1.0, 3.0], differing=[swings], explained=[swings]) is None
+    assert left([1.0, 7.0], [1.0, 7.0], differing=[swings], explained=[swings]) == MUCH_IS_LEFT
+
+
+def test_what_is_left_is_what_does_not_repeat_where_that_is_nearly_all():
+    drifts = SimpleNamespace(channel="torque", joint="j1", size=20.0)
+    assert left([5.0, 1.0], [5.0, 1.0], differing=[drifts]) == DOES_NOT_REPEAT
+    assert left([5.0, 5.0], [5.0, 5.0], differing=[drifts]) == MUCH_IS_LEFT
+    assert left([5.0, 1.0], [4.0, 1.0], [CAUSE], differing=[drifts]) == MUCH_IS_LEFT
+
+
 def test_causes_that_close_nothing_do_not_close_a_gap():
     nothing = Closing(share=0.5, interval=(0.4, 0.6), floors=0.2, size=0.04)
-    assert left([1.0], [1.0], [CAUSE], closing=nothing, differing=[object()]) == DOES_NOT_REPEAT
+    assert (
+        left(
+            [1.0], [1.0], [CAUSE], closing=nothing, differing=[SimpleNamespace(channel="torque", joint="j1", size=1.0)]
+        )
+        == DOES_NOT_REPEAT
+    )

@@ -39,14 +39,16 @@ def left_open(
     """
     if unmatched:
         return IMPOSSIBLE_NUMBER
-    if floor.source == REPEATS:
-        before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
-        if after > max(limits.verdict.excess, (1 - limits.verdict.closed) * before):
-            return MUCH_IS_LEFT
+    located = [one for one in differing if not any(one is each for each in explained)]
     named = any(branch.closing.matters(limits.matters) for finding in findings for branch in branches(finding))
-    if differing and not named and not any(differing[0] is one for one in explained):
-        return DOES_NOT_REPEAT
-    return None
+    nameless = bool(located) and located[0] is differing[0] and not named
+    if floor.source == REPEATS:
+        excesses = (_largest(finding, explained, located) for finding in findings)
+        before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
+        much = max(limits.verdict.excess, (1 - limits.verdict.closed) * before)
+        if after > much and not (nameless and beside <= much):
+            return MUCH_IS_LEFT
+    return DOES_NOT_REPEAT if nameless else None
 
 
 def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
@@ -65,15 +67,28 @@ def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
     return AMBIGUOUS if any(len(sure) > 1 for sure in likely) else ATTRIBUTED
 
 
-def _largest(finding: Finding) -> tuple[float, float]:
-    """Return the largest excess of a channel's equations without causes, and the largest that these leave.
+def _largest(
+    finding: Finding, explained: Sequence[Disturbance], located: Sequence[Disturbance]
+) -> tuple[float, float, float]:
+    """Return the largest excess of a channel without causes, of what these leave, and of that less `located`.
 
-    Over the floor, and over what the reference runs show, if there are any. The two may lie at different joints.
+    Over the floor, and over what the reference runs show, if there are any. They may lie at different joints. Of what
+    does not repeat, `explained` is out of the equations and is counted in the first; `located` is in them.
     """
     if finding.floor is None:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     level = finding.floor
     if finding.system.both:
         level = np.maximum(level, reference_rms(finding.system, noise_before(finding.system)))
     before, after = ((rms / level) ** 2 - 1 for rms in finding.fitted)
-    return float(before.max()), float(after.max())
+    before = before + _excess(explained, finding, level)
+    return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
+
+
+def _excess(some: Sequence[Disturbance], finding: Finding, level: np.ndarray) -> np.ndarray:
+    """Return (g,) the excess that some of what does not repeat makes in the equations of a channel."""
+    found = np.zeros(len(finding.places))
+    for one in some:
+        if one.channel == finding.name:
+            found[finding.places.index(one.joint)] += one.size
+    return np.asarray(found / level**2)
