@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from tests import gap_cases
 
+from irtwin.gap.document.document import Document
 from irtwin.report.gap import summary
 
 
@@ -28,6 +29,16 @@ def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
         ("Fs", 1.82, 1.6, 2.04, "Nm")
     )
     assert rows[1] == {**dict.fromkeys(rows[1]), "parameter": "d", "value": 1.0, "unit": ""}
+
+
+def test_a_guess_is_called_one_and_what_closes_little_is_not_listed():
+    said = gap_cases.diagnosis("attributed")
+    said["causes"][0]["confidence"] = 0.3
+    rows = summary.causes(Document.from_json(said)).rows
+    assert [row["cause"] for row in rows if row["cause"]] == ["perhaps viscous friction", "stribeck friction"]
+    for finding in said["findings"]:
+        finding["matters"] = False
+    assert not summary.causes(Document.from_json(said))
 
 
 @pytest.mark.parametrize("verdict", ["no_gap", "unexplained"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from irtwin.gap.document.document import Document
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.knowledge.store.table import Row, Table
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -32,15 +33,17 @@ def gap(diagnosis: Document) -> Table:
 
 
 def causes(diagnosis: Document) -> Table:
-    """Return each cause with its confidence and its parameters, these with their 95 % intervals."""
+    """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals."""
     columns = ("cause", "joints", "sure, %", "parameter", "value", "95 % from", "to", "unit")
     return Table(columns, tuple(_rows_of_causes(diagnosis)))
 
 
 def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
-    for cause in diagnosis.causes:
+    told = {cause for finding in diagnosis.findings if finding.matters for cause in finding.causes}
+    for cause in (one for one in diagnosis.causes if one.id in told):
+        name = cause.effect.replace("_", " ")
         first: Row = {
-            "cause": cause.effect.replace("_", " "),
+            "cause": name if cause.confidence >= DEFAULT.verdict.likely else f"perhaps {name}",
             "joints": ", ".join(cause.joints) or "whole robot",
             "sure, %": round(100 * cause.confidence),
         }
