@@ -9,6 +9,7 @@ from irtwin.gap.thresholds import DEFAULT
 from irtwin.knowledge.store.table import Row, Table
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
+_STEPS = 3  # motions to log that are told
 
 
 def gap(diagnosis: Document) -> Table:
@@ -63,10 +64,10 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
 
 
 def next_steps(diagnosis: Document) -> list[str]:
-    """Return what to log next, a line for each motion."""
-    return [
-        f"To log next: {motion}" for motion in (diagnosis.next_experiment.motions if diagnosis.next_experiment else ())
-    ]
+    """Return what to log next: a line for each of the first few motions, and how many more the report has."""
+    motions = diagnosis.next_experiment.motions if diagnosis.next_experiment else ()
+    said = [f"To log next: {motion}" for motion in motions[:_STEPS]]
+    return said + ([f"{len(motions) - _STEPS} more to log are in the report (--report)"] if motions[_STEPS:] else [])
 
 
 def _short(value: float) -> float:
