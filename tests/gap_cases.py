@@ -312,5 +312,10 @@ _CASES: dict[str, dict[str, Any]] = {
             "note": None,
         },
     },
-    "unexplained": {"locations": _LOCATED, "not_testable": _UNTESTABLE, "shrink": _shrink(None, 1.4, [])},
+    "unexplained": {
+        "unexplained_because": "much_is_left",
+        "locations": _LOCATED,
+        "not_testable": _UNTESTABLE,
+        "shrink": _shrink(None, 1.4, []),
+    },
 }

@@ -51,7 +51,7 @@ def experiment(programme: Programme | None, *by_hand: str) -> Experiment:
 
 def found(programme: Programme | None, *by_hand: str, **changes: Any) -> Diagnosis:
     given: dict[str, Any] = {
-        "description": ROBOT, "verdict": "ambiguous", "channels": (), "floor": None, "locations": (), "untestable": (),
+        "description": ROBOT, "left_open": None, "channels": (), "floor": None, "locations": (), "untestable": (),
         "runs": (), "curves": NOTHING, "experiment": experiment(programme, *by_hand),
         "planned": programme.motions[0] if programme else None,
     }  # fmt: skip

@@ -62,9 +62,14 @@ def named(diagnoses: Mapping[str, Any], labels: Mapping[str, Any]) -> Iterator[N
                 evidence["closed_where_it_acts"],
                 min(evidence["gain_on_groups_left_out"] / most, 1.0),
                 len(causes),
-                diagnoses[case]["verdict"] == "unexplained",
+                _left_open(diagnoses[case]),
                 cause["effect"] in true,
             )
+
+
+def _left_open(diagnosis: Mapping[str, Any]) -> bool:
+    """Return whether a gap is unexplained for another reason than that its causes are unsure, which they decide."""
+    return diagnosis["verdict"] == "unexplained" and diagnosis.get("unexplained_because") != "unsure"
 
 
 def families(diagnoses: Mapping[str, Any], labels: Mapping[str, Any]) -> Iterator[tuple[float, bool]]:

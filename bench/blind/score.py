@@ -76,6 +76,7 @@ def judge(diagnosis: dict[str, Any], label: dict[str, Any]) -> dict[str, float]:
         "truth in the class": float(first is not None and truth["effect"] in family(first)),
         "any cause names it": float(any(truth["effect"] in family(cause) for cause in causes)),
         "silent": float(first is None),
+        "known effects abstained from": float(diagnosis.get("verdict") in ABSTAIN),
         f"right effect first: {truth['channel']}": float(right),
         f"right effect first: {label['scope']}": float(right),
         f"right effect first: {label['robot']}": float(right),

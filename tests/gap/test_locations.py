@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tests.synthetic import arm, rigid_torque, swing
 
+from irtwin.effects.transmission import JointCoupling
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.localisation.channel_residuals import ChannelResidual
 from irtwin.gap.localisation.excess_map import heat_map, joint_maps, level_of, robot_maps
 from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import followed
 from irtwin.gap.localisation.regimes import JOINT_REGIMES
+from irtwin.gap.regression.hypotheses import MISSING, Variant
 from irtwin.gap.regression.residuals import Trace
 from irtwin.gap.thresholds import DEFAULT
 
@@ -187,3 +192,15 @@ def test_power_follows_the_torque_squared():
         for trace in traces()
     ]
     assert followed(observed, 0, None)[0] == "torque_squared"
+
+
+def test_a_coupling_acts_on_both_joints_of_its_pair():
+    effect = JointCoupling()
+    variant = Variant(effect, (0,), effect.terms(ROBOT)[:1])
+    found = Cause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, t=9.0, p=0.0)
+    assert found.touched(ROBOT) == JOINTS[1:]
+    empty = dict.fromkeys(("after", "seen", "explained", "acts", "reference", "level"))
+    finding = SimpleNamespace(places=JOINTS)
+    left = ChannelResidual(finding, [], added=[], touched=[JOINTS[1:]], limits=DEFAULT.places, **empty)
+    assert left.acting.tolist() == [False, True, True]
+    assert replace(left, touched=[()]).acting.all() and not replace(left, touched=[]).acting.any()

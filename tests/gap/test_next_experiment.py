@@ -51,8 +51,8 @@ def stribeck(motion):
     return torque
 
 
-def ground_of(motions, tried, cause=None, rivals=()):
-    """The finding that an effect is missing on joint_2, beside rivals, from these motions."""
+def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
+    """The finding that an effect is missing on joint_2, beside rivals, which closes a part of the gap."""
     stack = Stack(ROBOT, BASELINE)
     effects = [shape for effect in tried for shape in catalogue()[effect].candidates(ROBOT)]
 
@@ -73,7 +73,8 @@ def ground_of(motions, tried, cause=None, rivals=()):
     attribution = Attribution(causes, noise, found, np.zeros(len(found)), np.zeros(len(found)))
     nothing = Estimate.__new__(Estimate)
     observed = frozenset(m.run for m in motions)
-    judged, closed = held_out(system, noise, noise, ()), np.zeros((0, *np.shape(system.rows)))
+    judged = held_out(system, noise, noise, ())
+    closed = np.array([part * judged.before for _ in causes])
     finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, judged, None, nothing, closed)
     return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
 
@@ -207,6 +208,11 @@ def test_of_two_names_for_one_thing_none_is_told(motions):
     assert proposal.programme is None
     assert "cannot be told apart" in proposal.note
     assert proposal.experiment.expected_separation is None
+
+
+def test_rivals_of_a_cause_that_closes_nothing_are_not_asked_for(motions):
+    channel = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"], part=0.001)
+    assert next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment) is None
 
 
 def test_a_payload_in_every_run_asks_for_runs_without(motions):

@@ -11,7 +11,6 @@ from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import noise_floor
-from irtwin.gap.isolation.verdict import beside
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.repeats import alike
 from irtwin.gap.repeats.disturbances import disturbances
@@ -168,11 +167,3 @@ def test_a_line_is_no_sensors_noise():
     quiet = repeated()
     loud, still = (noise_floor(one.runs, one.motions, DEFAULT.repeats) for one in (case, quiet))
     assert loud.sensor_torque[1] < 2 * still.sensor_torque[1] < 0.3
-
-
-def test_the_verdict_is_never_no_gap_beside_a_disturbance():
-    found = disturbances(repeated(lambda k, t: in_joint_2(4.0 * k + 0 * t)))
-    assert beside("no_gap", [], []) == "no_gap"
-    assert beside("no_gap", found, []) == "unexplained"
-    assert beside("no_gap", found, found) == "attributed"
-    assert beside("ambiguous", found, []) == "ambiguous"

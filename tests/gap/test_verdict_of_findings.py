@@ -1,7 +1,8 @@
-"""The verdict, by what is left of the gap and where."""
+"""The verdict, by what is left of the gap and where, and by how sure its causes are."""
 
 from __future__ import annotations
 
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,66 +10,129 @@ import pytest
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, REPEATS, Floor
+from irtwin.gap.document import document
 from irtwin.gap.isolation.closing import Closing
-from irtwin.gap.isolation.verdict import AMBIGUOUS, ATTRIBUTED, NO_GAP, UNEXPLAINED, verdict_of
+from irtwin.gap.isolation.verdict import (
+    AMBIGUOUS,
+    ATTRIBUTED,
+    DOES_NOT_REPEAT,
+    IMPOSSIBLE_NUMBER,
+    MUCH_IS_LEFT,
+    NO_GAP,
+    UNEXPLAINED,
+    left_open,
+    verdict_of,
+)
 from irtwin.gap.thresholds import DEFAULT
 
+COUNT = count()
 MUCH = Closing(share=0.9, interval=(0.8, 0.95), floors=3.0, size=9.0)
 
 
-def cause(rivals=()):
-    variant = SimpleNamespace(effect=catalogue()["coulomb_friction"])
-    return SimpleNamespace(rivals=rivals, scope="missing", joints=("j1",), variants=(variant,))
+VARIANT = SimpleNamespace(effect=catalogue()["coulomb_friction"])
+CAUSE = SimpleNamespace(rivals=(), scope="missing", joints=("j1",), variants=(VARIANT,))
 
 
-CAUSE = cause()
-
-
-def verdict(before, after, causes=(), source=REPEATS, closing=MUCH):
-    """before, after: RMS of each joint, in floors; `closing`: what the causes close."""
+def left(before, after, causes=(), source=REPEATS, closing=MUCH, **more):
+    """before, after: RMS of each joint, in floors; `closing`: what the causes close; `more` as left_open."""
     system = SimpleNamespace(both=False)
     floor = np.ones(len(before))
     finding = SimpleNamespace(
+        name="torque",
+        places=("j1", "j2")[: len(before)],
         causes=causes,
         floor=floor,
         system=system,
         fitted=(np.array(before), np.array(after)),
         closing=lambda some: closing,
     )
-    return verdict_of([finding], Floor(floor, None, source), DEFAULT)
+    return left_open([finding], Floor(floor, None, source), DEFAULT, **more)
 
 
-def test_a_gap_that_is_closed_is_attributed():
-    assert verdict([5.0, 1.0], [1.2, 1.0], [CAUSE]) == ATTRIBUTED
-    assert verdict([5.0, 1.0], [1.2, 1.0], [cause(rivals=("viscous_friction",))]) == AMBIGUOUS
-
-
-def test_a_gap_that_nothing_closes_is_unexplained():
-    assert verdict([5.0, 1.0], [5.0, 1.0]) == UNEXPLAINED
-    assert verdict([5.0, 1.0], [4.0, 1.0], [CAUSE]) == UNEXPLAINED
-
-
-def test_a_gap_that_is_closed_at_the_worst_joint_alone_is_unexplained():
-    assert verdict([5.0, 4.0], [1.2, 4.0], [CAUSE]) == UNEXPLAINED
-
-
-@pytest.mark.parametrize("left", [[2.0, 1.0], [1.0, 2.0]])
-def test_a_small_rest_is_what_differs_between_runs(left):
-    assert verdict([2.0, 2.0], left) == NO_GAP
-
-
-def test_without_repeats_nothing_is_called_unexplained():
-    assert verdict([5.0, 1.0], [5.0, 1.0], source=OUT_OF_BAND) == NO_GAP
+def finding(*classes, matters=True):
+    """A finding with a class of confidences for each cause: its own first, then of what cannot be told from it."""
+    name = f"c{next(COUNT)}"
+    members = [
+        document.Member(cause=f"{name}.{k}", effect=f"e{k}.{place}", family="friction", confidence=sure)
+        for k, some in enumerate(classes)
+        for place, sure in enumerate(some)
+    ]
+    return SimpleNamespace(matters=matters, members=members)
 
 
 @pytest.mark.parametrize(
-    "closing",
+    ("findings", "verdict"),
     [
-        Closing(share=6.6e-9, interval=(1e-9, 2e-8), floors=9.0, size=81.0),
-        Closing(share=0.018, interval=(-0.012, 0.049), floors=9.0, size=81.0),
-        Closing(share=0.5, interval=(0.4, 0.6), floors=0.2, size=0.04),
+        ([], NO_GAP),
+        ([finding([0.9], matters=False)], NO_GAP),
+        ([finding([0.9])], ATTRIBUTED),
+        ([finding([0.9]), finding([0.2])], ATTRIBUTED),
+        ([finding([0.6, 0.2])], AMBIGUOUS),
+        ([finding([0.3, 0.25])], AMBIGUOUS),  # one of both is likely
+        ([finding([0.9]), finding([0.2, 0.1])], ATTRIBUTED),  # guesses do not speak
+        ([finding([0.4]), finding([0.3])], UNEXPLAINED),  # each is more likely wrong than right
+        ([finding([0.4], [0.4])], UNEXPLAINED),
+        ([finding([0.2, 0.1])], UNEXPLAINED),
+        ([finding([0.3]), finding([0.9], matters=False)], UNEXPLAINED),
     ],
 )
-def test_causes_that_close_nothing_make_no_gap(closing):
-    assert verdict([1.2, 1.0], [1.1, 1.0], [CAUSE], closing=closing) == NO_GAP
-    assert verdict([5.0, 1.0], [4.9, 1.0], [CAUSE], closing=closing) == UNEXPLAINED
+def test_causes_that_are_likely_make_the_verdict(findings, verdict):
+    assert verdict_of(findings, DEFAULT.verdict) == verdict
+
+
+def test_a_gap_that_is_closed_is_not_left_open():
+    assert left([5.0, 1.0], [1.2, 1.0], [CAUSE]) is None
+
+
+def test_a_gap_that_nothing_closes_is_left_open():
+    assert left([5.0, 1.0], [5.0, 1.0]) == MUCH_IS_LEFT
+    assert left([5.0, 1.0], [4.0, 1.0], [CAUSE]) == MUCH_IS_LEFT
+
+
+def test_a_gap_that_is_closed_at_the_worst_joint_alone_is_left_open():
+    assert left([5.0, 4.0], [1.2, 4.0], [CAUSE]) == MUCH_IS_LEFT
+
+
+@pytest.mark.parametrize("after", [[2.0, 1.0], [1.0, 2.0]])
+def test_a_small_rest_is_what_differs_between_runs(after):
+    assert left([2.0, 2.0], after) is None
+
+
+def test_without_repeats_nothing_is_left_open():
+    assert left([5.0, 1.0], [5.0, 1.0], source=OUT_OF_BAND) is None
+
+
+def test_a_gap_that_only_an_impossible_number_closes_is_left_open():
+    assert left([5.0, 1.0], [1.2, 1.0], [CAUSE], unmatched=True) == IMPOSSIBLE_NUMBER
+
+
+def test_what_does_not_repeat_is_left_open_where_nothing_else_is_found():
+    first, second = (SimpleNamespace(channel="torque", joint="j1", size=1.0) for _ in range(2))
+    assert left([1.0], [1.0], differing=[first, second]) == DOES_NOT_REPEAT
+    assert left([1.0], [1.0], differing=[first, second], explained=[second]) == DOES_NOT_REPEAT
+    assert left([1.0], [1.0], differing=[first, second], explained=[first]) is None
+    assert left([5.0], [1.2], [CAUSE], differing=[first]) is None
+
+
+def test_what_was_taken_out_counts_in_the_gap_that_there_was():
+    swings = SimpleNamespace(channel="torque", joint="j1", size=100.0)
+    assert left([1.0, 3.0], [1.0, 3.0]) == MUCH_IS_LEFT
+    assert left([1.0, 3.0], [1.0, 3.0], differing=[swings], explained=[swings]) is None
+    assert left([1.0, 7.0], [1.0, 7.0], differing=[swings], explained=[swings]) == MUCH_IS_LEFT
+
+
+def test_what_is_left_is_what_does_not_repeat_where_that_is_nearly_all():
+    drifts = SimpleNamespace(channel="torque", joint="j1", size=20.0)
+    assert left([5.0, 1.0], [5.0, 1.0], differing=[drifts]) == DOES_NOT_REPEAT
+    assert left([5.0, 5.0], [5.0, 5.0], differing=[drifts]) == MUCH_IS_LEFT
+    assert left([5.0, 1.0], [4.0, 1.0], [CAUSE], differing=[drifts]) == MUCH_IS_LEFT
+
+
+def test_causes_that_close_nothing_do_not_close_a_gap():
+    nothing = Closing(share=0.5, interval=(0.4, 0.6), floors=0.2, size=0.04)
+    assert (
+        left(
+            [1.0], [1.0], [CAUSE], closing=nothing, differing=[SimpleNamespace(channel="torque", joint="j1", size=1.0)]
+        )
+        == DOES_NOT_REPEAT
+    )

@@ -48,6 +48,10 @@ REMEDIES = {
 VERDICTS = {
     ("no_gap", None, True): {"keep the twin as it is"},
     ("unexplained", None, True): {"look for an effect outside the catalogue"},
+    ("unexplained ; irt:unexplained_for_Reason reason:does_not_repeat", None, True): {
+        "look for an effect outside the catalogue"
+    },
+    ("unexplained ; irt:unexplained_for_Reason reason:unsure", 0.9, True): {"log more before acting"},
     ("ambiguous", 0.9, True): {"measure what tells the rivals apart"},
     ("attributed", 0.9, True): {"adopt the twin with the causes added"},
     ("attributed", 0.9, False): set(),
@@ -61,7 +65,7 @@ def individuals() -> str:
     lines = [
         "@prefix irt: <https://w3id.org/irtwin#> . @prefix effect: <https://w3id.org/irtwin/effect/> .",
         "@prefix scope: <https://w3id.org/irtwin/scope/> . @prefix verdict: <https://w3id.org/irtwin/verdict/> .",
-        "@prefix : <https://w3id.org/irtwin/id/> .",
+        "@prefix : <https://w3id.org/irtwin/id/> . @prefix reason: <https://w3id.org/irtwin/reason/> .",
         f"<{SOURCE}> {{",
         ':arm irt:has_RunProcess :r1 . :r1 irt:Run_Role "reference" .',
         ':drawn irt:has_RunProcess :r2 . :r2 irt:Run_Role "simulated" .',
@@ -78,6 +82,11 @@ def individuals() -> str:
             f":{scope}_{matters} a irt:Gap_Cause ; irt:cause_of :d_arm ; irt:caused_by_Effect effect:payload ; "
             f"irt:has_Scope scope:{scope} ; irt:part_of_Finding :f_{scope}_{matters} . "
             f":f_{scope}_{matters} irt:Matters {matters} ."
+        )
+    for name, sure in (("guess", "0.49e0"), ("likely", "0.5e0")):
+        lines.append(
+            f":{name} a irt:Gap_Cause ; irt:cause_of :d_arm ; irt:caused_by_Effect effect:payload ; "
+            f"irt:has_Scope scope:changed ; irt:part_of_Finding :f_{name} . :f_{name} irt:Confidence {sure} ."
         )
     for number, (verdict, closed, saved) in enumerate(VERDICTS):
         lines.append(f":v{number} a irt:Gap_Diagnosis ; irt:diagnosis_of :arm ; irt:has_Verdict verdict:{verdict} .")
@@ -126,3 +135,8 @@ def test_a_verdict_says_what_to_do(number, actions):
 def test_a_cause_that_closes_little_calls_for_nothing(actions):
     assert actions["missing_true"] == {MODEL, "measure the payload"}
     assert not {"missing_false", "changed_false"} & set(actions)
+
+
+def test_a_guess_calls_for_nothing(actions):
+    assert actions["likely"] == {AGAIN, "measure the payload"}
+    assert "guess" not in actions

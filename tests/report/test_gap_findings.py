@@ -25,8 +25,8 @@ def finding(family: str = "friction", **changes: Any) -> Finding:
     return Finding(family=family, **(known | changes))
 
 
-def said(verdict: str, *findings: Finding, where: str = "", closes: str | None = "") -> str:
-    return sentence(verdict, findings, where, closes).replace("\N{NO-BREAK SPACE}", " ")
+def said(verdict: str, *findings: Finding, where: str = "", closes: str | None = "", **more: str) -> str:
+    return sentence(verdict, findings, where, closes, **more).replace("\N{NO-BREAK SPACE}", " ")
 
 
 LITTLE = {"matters": False, "share": 0.0004}
@@ -34,7 +34,7 @@ LITTLE = {"matters": False, "share": 0.0004}
 
 def test_the_family_is_said_before_its_effects() -> None:
     assert said("ambiguous", finding(), closes=" It closes.") == (
-        "Friction of joint_5 differs from the twin’s (97 %): load-dependent friction (55 %) or position-dependent "
+        "Friction of joint_5 differs from the twin’s (97 % sure): load-dependent friction (55 %) or position-dependent "
         "friction (30 %). It closes."
     )
 
@@ -50,7 +50,7 @@ def test_the_family_is_said_before_its_effects() -> None:
 )
 def test_a_finding_is_set_against_the_runs_that_lack_it(against: str, claim: str) -> None:
     one = finding("load", joints=(), against=against, confidence=0.94, members=((("payload", 0.94),),))
-    assert said("attributed", one) == f"Load {claim}: payload (94 %)."
+    assert said("attributed", one) == f"Load {claim}: payload (94 % sure)."
 
 
 def test_where_nothing_is_known_of_the_whole_the_first_finding_says_what_it_closes() -> None:
@@ -66,18 +66,36 @@ def test_where_nothing_is_known_of_the_whole_the_first_finding_says_what_it_clos
 
 def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> None:
     both = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.6), ("backlash", 0.2))))
-    guess = finding("sensing", joints=("joint_1", "joint_3"), confidence=0.48)
+    guess = finding("sensing", joints=("joint_1", "joint_3"), confidence=0.48, members=((("gain", 0.48),),))
     assert said("attributed", both, guess) == (
-        "Friction of joint_5 differs from the twin’s (97 %): stribeck friction (90 %) and hysteresis (60 %) or "
-        "backlash (20 %); perhaps sensing of joint_1 and joint_3 (48 %)."
+        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction (90 %) and hysteresis (60 %) or "
+        "backlash (20 %); perhaps sensing of joint_1 and joint_3 (48 % sure)."
     )
 
 
 def test_guesses_alone_are_said_to_be_guesses() -> None:
-    guesses = [finding("load", confidence=0.4), finding("sensing", confidence=0.2)]
-    assert said("ambiguous", *guesses) == (
-        "Nothing that was found is sure: perhaps load of joint_5 (40 %); perhaps sensing of joint_5 (20 %)."
+    one = {"members": ((("payload", 0.4),),)}
+    guesses = [finding("load", confidence=0.4, **one), finding("sensing", confidence=0.2, **one)]
+    told = said("unexplained", *guesses, where=" in the torque", closes=" It closes.", because="unsure")
+    assert told == (
+        "There is a gap in the torque, and no cause that was found is sure: perhaps load of joint_5 (40 % sure); "
+        "perhaps sensing of joint_5 (20 % sure). It closes."
     )
+
+
+def test_alternatives_of_other_families_are_named_where_one_of_them_is_likely() -> None:
+    guess = finding("load", confidence=0.4, members=((("cable drag", 0.4), ("torque ripple", 0.3)),))
+    assert said("ambiguous", guess) == (
+        "Several effects explain the gap, and none of them is sure: perhaps load of joint_5 (40 % sure): cable drag "
+        "(40 %) or torque ripple (30 %)."
+    )
+
+
+def test_what_is_sure_is_named_before_larger_guesses_and_stays_in_its_place() -> None:
+    guesses = [finding(joints=(f"joint_{k}",), confidence=0.2, members=((("x", 0.2),),)) for k in range(1, 5)]
+    told = said("attributed", *guesses, finding("load", confidence=0.9, members=((("payload", 0.9),),)))
+    assert told.startswith("Perhaps friction of joint_1 (20 % sure); perhaps friction of joint_2 (20 % sure); load of ")
+    assert "joint_3" not in told and "payload (90 % sure)" in told
 
 
 def test_at_most_three_are_named_and_the_rest_is_counted() -> None:
@@ -104,6 +122,31 @@ def test_an_unexplained_gap_says_what_part_is_closed() -> None:
     )
     assert told.endswith("Not named here: 1 finding closes nothing of the gap in torque.")
     assert said("unexplained") == "There is a gap, and no effect in the catalogue closes it."
+
+
+@pytest.mark.parametrize(
+    ("because", "told"),
+    [
+        ("much_is_left", "There is a gap in the power, and no effect in the catalogue closes it."),
+        (
+            "impossible_number",
+            "There is a gap in the power, and what would close it needs a number that cannot be true.",
+        ),
+        ("does_not_repeat", "Runs of one motion differ by a drift, and no effect in the catalogue explains that."),
+    ],
+)
+def test_an_unexplained_gap_says_why(because: str, told: str) -> None:
+    more = {"where": " in the power", "because": because, "differ": "a drift"}
+    assert said("unexplained", **more) == told
+    guess = finding(confidence=0.3, members=((("x", 0.3),),))
+    assert said("unexplained", guess, **more) == f"{told} Part of it is perhaps friction of joint_5 (30 % sure)."
+
+
+def test_what_does_not_repeat_is_told_beside_a_cause() -> None:
+    told = said("attributed", finding(), differ="a drift in the torque of joint_2")
+    assert told.endswith(
+        " Besides, runs of one motion differ by a drift in the torque of joint_2, which no effect explains."
+    )
 
 
 def test_nothing_is_counted_as_nothing() -> None:

@@ -22,16 +22,16 @@ from irtwin.report.gap.headline import line, refused
         (
             "attributed",
             "reference",
-            "attributed: Friction of joint_a3 changed since the reference runs (96 %): viscous friction (70 %) and "
-            "stribeck friction (96 %). Adding this to the twin closes 93 % of the gap on held-out runs (95 % interval "
-            "88 % to 97 %).",
+            "attributed: Friction of joint_a3 changed since the reference runs (96 % sure): viscous friction (70 %) "
+            "and stribeck friction (96 %). Adding this to the twin closes 93 % of the gap on held-out runs (95 % "
+            "interval 88 % to 97 %).",
         ),
         (
             "attributed",
             "simulated",
-            "attributed: Friction of joint_a3 differs from the simulator’s (96 %): viscous friction (70 %) and "
-            "stribeck friction (96 %). Adding this to the twin closes 93 % of the gap on held-out runs (95 % interval "
-            "88 % to 97 %).",
+            "attributed: Friction of joint_a3 differs from the simulator’s (96 % sure): viscous friction (70 %) "
+            "and stribeck friction (96 %). Adding this to the twin closes 93 % of the gap on held-out runs (95 % "
+            "interval 88 % to 97 %).",
         ),
     ],
 )
@@ -43,8 +43,8 @@ def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
     diagnosis = gap_cases.diagnosis("attributed")
     diagnosis["causes"][0] |= {"scope": "missing", "joints": [], "effect": "base_tilt"}
     said = line(Document.from_json(gap_cases.with_findings(diagnosis)), "simulated")
-    assert "Environment differs from the twin’s: base tilt (70 %); " in said
-    assert "friction of joint_a3 differs from the simulator’s: stribeck friction (96 %)." in said
+    assert "Environment differs from the twin’s: base tilt (70 % sure); " in said
+    assert "friction of joint_a3 differs from the simulator’s: stribeck friction (96 % sure)." in said
 
 
 def test_what_was_refused_has_a_line_each():

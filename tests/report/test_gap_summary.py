@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from tests import gap_cases
 
+from irtwin.gap.document.document import Document
 from irtwin.report.gap import summary
 
 
@@ -30,6 +31,16 @@ def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
     assert rows[1] == {**dict.fromkeys(rows[1]), "parameter": "d", "value": 1.0, "unit": ""}
 
 
+def test_a_guess_is_called_one_and_what_closes_little_is_not_listed():
+    said = gap_cases.diagnosis("attributed")
+    said["causes"][0]["confidence"] = 0.3
+    rows = summary.causes(Document.from_json(said)).rows
+    assert [row["cause"] for row in rows if row["cause"]] == ["perhaps viscous friction", "stribeck friction"]
+    for finding in said["findings"]:
+        finding["matters"] = False
+    assert not summary.causes(Document.from_json(said))
+
+
 @pytest.mark.parametrize("verdict", ["no_gap", "unexplained"])
 def test_where_nothing_is_to_blame_there_is_no_table_of_causes(verdict):
     assert not summary.causes(gap_cases.document(verdict))
@@ -38,3 +49,10 @@ def test_where_nothing_is_to_blame_there_is_no_table_of_causes(verdict):
 def test_what_to_log_next_has_a_line_each():
     assert all(line.startswith("To log next: ") for line in summary.next_steps(gap_cases.document("ambiguous")))
     assert summary.next_steps(gap_cases.document("no_gap")) == []
+
+
+def test_of_many_motions_to_log_the_rest_is_counted():
+    said = gap_cases.diagnosis("ambiguous")
+    said["next_experiment"]["motions"] = [f"motion {k}" for k in range(5)]
+    lines = summary.next_steps(Document.from_json(said))
+    assert lines[2:] == ["To log next: motion 2", "2 more to log are in the report (--report)"]

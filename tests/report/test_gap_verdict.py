@@ -11,7 +11,9 @@ from irtwin.report.questions import Answer, Question
 def answers(scope, simulated=False, referenced=True):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
-        "diagnosis": [{"verdict": "ambiguous", "against_simulator": simulated, "referenced": referenced}],
+        "diagnosis": [
+            {"verdict": "ambiguous", "reason": None} | {"against_simulator": simulated, "referenced": referenced}
+        ],
         "findings": [
             {"finding": "f1", "family": "load", "family_label": None, "confidence": 0.9, "scope": scope}
             | {"channel": "torque", "share": 0.5, "lower": 0.4, "upper": 0.6, "of": "the gap", "matters": True}
@@ -22,7 +24,7 @@ def answers(scope, simulated=False, referenced=True):
         ],
         "closed": [{"closed": 0.5, "lower": None, "upper": None}],
     }
-    names = ("diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed")
+    names = ("diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed", "disturbances")
     return {name: Answer(Question(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
 
 
@@ -39,6 +41,6 @@ def answers(scope, simulated=False, referenced=True):
 def test_a_finding_is_set_against_the_runs_that_lack_it(scope, simulated, referenced, claim):
     said = sentence(answers(scope, simulated, referenced)).replace("\N{NO-BREAK SPACE}", " ")
     assert said == (
-        f"Load {claim} (90 %): payload (70 %) or external contact (20 %). Adding this to the twin closes 50 % of the "
-        "gap on held-out runs."
+        f"Load {claim} (90 % sure): payload (70 %) or external contact (20 %). Adding this to the twin closes 50 % of "
+        "the gap on held-out runs."
     )

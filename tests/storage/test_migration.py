@@ -20,7 +20,12 @@ from irtwin.errors import InputError
 from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
-from irtwin.storage.revisions.versions import r0001_tables_of_0_1, r0002_base_of_individuals, r0003_made_and_slower
+from irtwin.storage.revisions.versions import (
+    r0001_tables_of_0_1,
+    r0002_base_of_individuals,
+    r0003_made_and_slower,
+    r0004_halves_of_the_time,
+)
 from irtwin.storage.schema import Base
 
 BEFORE = migration.newest()
@@ -65,13 +70,20 @@ def digest() -> str:
 AFTER_0_1 = {  # columns that revisions have added
     "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
+    "gap_diagnosis": ("unexplained_because",),
+    "gap_cause": ("p_remembered", "part_that_repeats", "first_half_shows_it", "last_half_shows_it"),
 }
 
 
 def older(place: Workspace, *, of_0_1: bool = False) -> None:
-    """Make the tables those before LATER; `of_0_1`: those of irtwin 0.1, in a database that says no revision."""
+    """Ingest a data set, and make the tables `aged`."""
     robot, joints, runs, series = data_set()
     place.ingest(robot, joints, runs, series)
+    aged(place, of_0_1=of_0_1)
+
+
+def aged(place: Workspace, *, of_0_1: bool) -> None:
+    """Make the tables those before LATER; `of_0_1`: those of irtwin 0.1, in a database that says no revision."""
     recreate = "always" if place.engine.dialect.name == "sqlite" else "never"
     with engines.writing(place.engine, restructuring=True) as session:
         connection = session.connection()
@@ -108,6 +120,7 @@ def test_the_newest_revision_is_of_these_tables() -> None:
 
 def test_each_revision_follows_another() -> None:
     assert r0003_made_and_slower.down_revision == r0002_base_of_individuals.revision
+    assert r0004_halves_of_the_time.down_revision == r0003_made_and_slower.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -151,8 +164,9 @@ def test_a_workspace_of_0_1_gets_the_tables_of_now(
 def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:
     used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
     with Workspace(tmp_path) as place:
-        older(place, of_0_1=True)
+        place.ingest(*data_set())
         place.replace_activity(activity("a.1", "run_state", used), [used, "https://plant.example/x"], [])
+        aged(place, of_0_1=True)
     with Workspace(tmp_path) as place, place.engine.connect() as connection:
         assert connection.execute(text("SELECT subject FROM activity")).scalars().all() == ["run/Arm_A.fit_1"]
         found = connection.execute(text("SELECT entity FROM activity_use")).scalars()

@@ -39,7 +39,7 @@ from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.torque_scale import TorqueScale, torque_scale
-from irtwin.gap.isolation.verdict import NO_GAP, beside, verdict_of
+from irtwin.gap.isolation.verdict import NO_GAP, UNEXPLAINED, UNSURE, left_open, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
@@ -64,10 +64,13 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis: its `document`, what that stands on, and the `curves` that a page draws."""
+    """The diagnosis: its `document`, what that stands on, and the `curves` that a page draws.
+
+    `left_open`: why the gap stays unexplained, however sure its causes are; None where it does not.
+    """
 
     description: Robot
-    verdict: str
+    left_open: str | None
     channels: tuple[Finding, ...]
     floor: Floor
     locations: tuple[Location, ...]
@@ -88,6 +91,11 @@ class Diagnosis:
     scale: TorqueScale | None = None  # of torque, where it was measured
 
     @property
+    def verdict(self) -> str:
+        """The verdict, as in the document."""
+        return self.document.verdict
+
+    @property
     def causes(self) -> tuple[tuple[Finding, Cause], ...]:
         """Every cause with its channel, that which closes most first."""
         pairs = [(finding, cause) for finding in self.channels for cause in finding.causes]
@@ -98,25 +106,30 @@ class Diagnosis:
         """The diagnosis as it is handed out: in JSON, in the graph, on a page."""
         robot, gains = self.description, [cause.gain for _, cause in self.causes]
         fallen = [cause.gain for channel in self.channels for cause in channel.fallen]
-        acted_on = [(cause.effect, writing.acted_on(robot, cause)) for _, cause in self.causes]
+        acted_on = [(cause.effect, cause.touched(robot)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         weights = self.thresholds.confidence
         written = tuple(
-            writing.cause(robot, *one, [*gains, *fallen], self.verdict, weights, self.scale) for one in named
+            writing.cause(robot, *one, [*gains, *fallen], weights, self.scale, unexplained=self.left_open is not None)
+            for one in named
         )
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
-        found = writing.findings(robot, self.channels, named, written, self.thresholds)
         causes = apart.causes(written, weights)
+        found = writing.findings(robot, self.channels, named, written, self.thresholds)
+        found = apart.findings(found, causes, self.thresholds.matters)
+        judged = verdict_of(found, self.thresholds.verdict)
+        verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
         shrink = writing.shrink(
             robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
         )
         return Document(
-            verdict=self.verdict,
+            verdict=verdict,
+            unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
             robot=robot.name,
             gap=apart.gap(writing.gap(robot.joint_names, self.channels, self.energies)),
-            locations=tuple(map(writing.location, self.locations)),
-            findings=apart.findings(found, causes, self.thresholds.matters),
+            locations=() if verdict == NO_GAP else tuple(map(writing.location, self.locations)),
+            findings=found,
             causes=causes,
             not_testable=tuple(map(writing.untestable, self.untestable)),
             shrink=apart.shrink(shrink, self.seed),
@@ -193,8 +206,6 @@ def diagnose(
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
-    verdict = verdict_of(findings, floor, thresholds, unmatched=refusals.unmatched)
-    verdict = beside(verdict, differ, [one.disturbance for one in taken])
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
     blamed = {cause.effect for cause in causes}
@@ -217,10 +228,17 @@ def diagnose(
     )
     return Diagnosis(
         description=case.robot,
-        verdict=verdict,
+        left_open=left_open(
+            findings,
+            floor,
+            thresholds,
+            unmatched=refusals.unmatched,
+            differing=differ,
+            explained=[one.disturbance for one in taken],
+        ),
         channels=tuple(with_removed(finding, taken) for finding in findings),
         floor=floor,
-        locations=tuple(located if verdict != NO_GAP else ()),
+        locations=tuple(located),
         untestable=tuple(lacking),
         runs=tuple(sorted(case.observed)),
         seed=seed,

@@ -128,7 +128,11 @@ class NotRepeating:
     def findings(
         self, others: Sequence[document.Finding], causes: Sequence[document.Cause], limits: Matters
     ) -> tuple[document.Finding, ...]:
-        """Return all findings: of what was taken out each is one, with its cause alone; the order is that of causes."""
+        """Return all findings: of what was taken out each is one, with its cause alone; the order is that of causes.
+
+        The largest of all that differs matters where nothing else does: it is a gap, however little it is.
+        """
+        alone = not any(one.matters for one in others)
         sure = {cause.id: cause.confidence for cause in causes}
         own = []
         for one, name in zip(self.taken, self._names, strict=True):
@@ -145,7 +149,7 @@ class NotRepeating:
                     share=closed.share,
                     share_interval95=closed.interval,
                     share_of=closed.share_of,
-                    matters=closed.matters(limits),
+                    matters=closed.matters(limits) or (alone and one.disturbance is self.found[0]),
                     members=(
                         document.Member(
                             cause=name, effect=one.effect.id, family=one.effect.family, confidence=sure[name]

@@ -305,6 +305,9 @@ class Verdict:
     closed: float = _threshold(
         0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-unexplained-verdict.md"
     )
+    likely: float = _threshold(
+        0.5, "a cause or a family speaks from it; below it is a guess", "confidence", "more likely than not"
+    )
 
 
 @dataclass(frozen=True)

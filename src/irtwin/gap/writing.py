@@ -23,7 +23,6 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
 from irtwin.gap.isolation.refusal import Refused
 from irtwin.gap.isolation.torque_scale import TorqueScale
-from irtwin.gap.isolation.verdict import UNEXPLAINED
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
@@ -79,17 +78,21 @@ def cause(
     one: Cause,
     name: str,
     gains: Sequence[float],
-    verdict: str,
     weights: Confidence,
     scale: TorqueScale | None,
+    *,
+    unexplained: bool,
 ) -> document.Cause:
-    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named."""
-    closed, share, unexplained = finding.closed(one), min(one.gain / max(gains), 1.0), verdict == UNEXPLAINED
+    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named.
+
+    `unexplained`: the gap stays so, however sure its causes are.
+    """
+    closed, share = finding.closed(one), min(one.gain / max(gains), 1.0)
     sure = confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained)
     return document.Cause(
         id=name,
         effect=one.effect,
-        joints=acted_on(robot, one),
+        joints=one.touched(robot),
         scope=one.scope,
         confidence=where_runs_are_few(sure, one.p_remembered, one.repeats, one.in_halves, weights),
         parameters=parameters(robot, finding, one, scale),
@@ -135,7 +138,7 @@ def findings(
 
 
 def _joints(robot: Robot, branch: Branch) -> tuple[str, ...]:
-    touched = {joint for cause in branch.causes for joint in acted_on(robot, cause)}
+    touched = {joint for cause in branch.causes for joint in cause.touched(robot)}
     return tuple(joint for joint in robot.joint_names if joint in touched)
 
 
@@ -188,13 +191,6 @@ def _balance(finding: Finding, one: Cause) -> dict[str, Any]:
         "gain_in_power_if_mechanical": said.gain,
         "t_in_power_between_groups": said.t,
     }
-
-
-def acted_on(robot: Robot, one: Cause) -> tuple[str, ...]:
-    """Return the joints that a cause acts on; none for an effect of the whole robot."""
-    named = [(variant.effect, term.joint) for variant in one.variants for term in variant.terms if term.link is None]
-    touched = [effect.touched(robot, joint) for effect, joint in named if joint is not None]
-    return tuple(dict.fromkeys(joint for joints in touched for joint in joints))
 
 
 def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | None) -> tuple[document.Parameter, ...]:
@@ -282,7 +278,7 @@ def _by_cause(robot: Robot, finding: Finding, one: Cause, name: str) -> document
     return document.CauseChange(
         cause=name,
         effect=one.effect,
-        joints=acted_on(robot, one),
+        joints=one.touched(robot),
         scope=one.scope,
         channel=finding.name,
         share=finding.share(one),

@@ -149,6 +149,7 @@ def _row(
         diagnosis_id=diagnosis_id,
         robot_id=robot_id,
         verdict=said.verdict,
+        unexplained_because=said.unexplained_because,
         created=datetime.now(UTC),
         energy_error_percent=said.gap.energy_error_percent,
         noise_floor_from=said.shrink.noise_floor_from,

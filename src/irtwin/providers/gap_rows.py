@@ -192,6 +192,7 @@ def _disturbance(said: NotRepeating, rank: int) -> Iterator[OfDiagnosis]:
 def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
     why, key = said.evidence, {"cause_id": said.id}
     start, stop = why.window or (None, None)
+    halves = why.halves_that_show_it
     yield gap_schema.GapCause(
         **key,
         rank=rank,
@@ -208,6 +209,10 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
         power_says=why.power_says,
         gain_in_power=why.gain_in_power_if_mechanical,
         t_in_power=why.t_in_power_between_groups,
+        p_remembered=why.p_where_residuals_remember,
+        part_that_repeats=why.part_that_repeats,
+        first_half_shows_it=None if halves is None else "first" in halves,
+        last_half_shows_it=None if halves is None else "last" in halves,
         acts_from_s=start,
         acts_until_s=stop,
     )

@@ -22,6 +22,7 @@ class GapDiagnosis(Base):
     diagnosis_id: Mapped[str] = mapped_column(primary_key=True)  # robot_id. and a hash of the diagnosis
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
     verdict: Mapped[str]  # "no_gap", "attributed", "ambiguous" or "unexplained"
+    unexplained_because: Mapped[str | None]  # of that verdict, as in the document: "much_is_left", "unsure", ...
     created: Mapped[datetime]
     energy_error_percent: Mapped[float | None]  # before anything is added
     noise_floor_from: Mapped[str | None]  # "repeats" or "out_of_band"
@@ -239,6 +240,10 @@ class GapCause(OfCause):
     power_says: Mapped[str | None]  # of a cause of torque: "mechanical", "sensor" or "undecided"
     gain_in_power: Mapped[float | None]  # if it is mechanical
     t_in_power: Mapped[float | None]
+    p_remembered: Mapped[float | None]  # of few runs: as p, where residuals remember
+    part_that_repeats: Mapped[float | None]  # 0 to 1, of what it closes in a half of the time with the other's size
+    first_half_shows_it: Mapped[bool | None]  # by itself
+    last_half_shows_it: Mapped[bool | None]
     acts_from_s: Mapped[float | None]  # of the run's clock, where it acts for a while only
     acts_until_s: Mapped[float | None]
 

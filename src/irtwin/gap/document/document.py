@@ -18,6 +18,7 @@ Share = Annotated[float, Between(0, 1)]
 Interval = tuple[float, float]  # 95 %
 Channel = Annotated[str, OneOf("torque", "power")]
 Verdict = Annotated[str, OneOf("no_gap", "attributed", "ambiguous", "unexplained")]
+Because = Annotated[str, OneOf("much_is_left", "impossible_number", "does_not_repeat", "unsure")]
 Scope = Annotated[str, OneOf("missing", "changed")]
 ScaleSource = Annotated[str, OneOf("stated", "simulated", "sensor", "assumed")]
 FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
@@ -292,6 +293,8 @@ class Document:
     """A diagnosis as it is handed out. Raises InputError where the ids of its causes do not fit together.
 
     `findings` and `causes` are ordered by what they close, the largest first.
+    `unexplained_because`: why the verdict is `unexplained`. The causes leave much of the gap; only a number that cannot
+    be true would close it; runs of one motion differ by what no effect explains; or no cause that matters is likely.
     """
 
     verdict: Verdict
@@ -303,6 +306,7 @@ class Document:
     not_testable: tuple[Untestable, ...]
     shrink: Shrink
     next_experiment: Experiment | None
+    unexplained_because: Because | None = None
     not_repeating: tuple[NotRepeating, ...] | None = None  # none where nothing is repeated, or nothing differs
     refused: tuple[Refused, ...] | None = None
     torque_scale: TorqueScale | None = None

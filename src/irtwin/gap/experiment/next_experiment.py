@@ -14,6 +14,7 @@ from irtwin.gap.document.experiment import Considered, Experiment, Question
 from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
 from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated
+from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
 from irtwin.gap.thresholds import NextExperiment, Thresholds
@@ -212,13 +213,13 @@ def next_experiment(
     seen: Sequence[Motion],
     limits: NextExperiment,
 ) -> Proposal | None:
-    """Design what tells the causes' rivals apart; where there are none, what shows the effects `lacking`.
+    """Design what tells the rivals of causes that matter apart; where there are none, what shows the effects `lacking`.
 
     `channels`: planned equations of each; `seen`: the motions that were judged. Of the programmes that reach a
     separation of `limits.enough` in every question the one that takes the least time is chosen, else the one that
     answers the most. None where there is nothing to ask.
     """
-    questions = [q for channel in channels for cause in channel.finding.causes if (q := _rivals(channel, cause))]
+    questions = [q for channel in channels for cause in _mattering(channel) if (q := _rivals(channel, cause))]
     if questions:
         purpose = "; ".join(f"tell {q.effects[0]} from {', '.join(q.effects[1:])}" for q in questions)
         names = tuple(dict.fromkeys(name for q in questions for name in q.effects))
@@ -279,6 +280,12 @@ def _note(weighed: Sequence[Sequence[Weight]]) -> str | None:
         elif not any(weight.reached for weight in chances):
             said.append(f"no programme that was weighed is enough for {' and '.join(best.effects)}")
     return "; ".join(said) or None
+
+
+def _mattering(channel: PlannedEquations) -> list[Cause]:
+    """Return the causes that close enough to be told of, in their order."""
+    told = [one for one in branches(channel.finding) if one.closing.matters(channel.thresholds.matters)]
+    return [cause for cause in channel.finding.causes if any(cause is each for one in told for each in one.causes)]
 
 
 def _rivals(channel: PlannedEquations, cause: Cause) -> _Question | None:

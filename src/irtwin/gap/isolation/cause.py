@@ -10,6 +10,7 @@ from irtwin.gap.regression.cross_validation import Trial
 from irtwin.gap.regression.hypotheses import CHANGED, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Selection
+from irtwin.robot.description import Robot
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,12 @@ class Cause:
     def carries_power(self) -> bool:
         """Whether it is real torque."""
         return self.variants[0].effect.channel == "torque"
+
+    def touched(self, robot: Robot) -> tuple[str, ...]:
+        """Return the joints that it acts on; none for an effect of the whole robot."""
+        named = [(one.effect, term.joint) for one in self.variants for term in one.terms if term.link is None]
+        touched = [effect.touched(robot, joint) for effect, joint in named if joint is not None]
+        return tuple(dict.fromkeys(joint for joints in touched for joint in joints))
 
     @property
     def columns(self) -> tuple[int, ...]:

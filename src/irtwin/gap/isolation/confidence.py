@@ -15,7 +15,7 @@ def confidence(
 
     t: of its gain, between groups of runs; gain: of weighted squares, a row; closed: the part of the gap that all
     causes close where it acts, 0 to 1; share: its gain over that of the largest cause, above 0 to 1; count: of all
-    causes; `unexplained`: the verdict on all causes together.
+    causes; `unexplained`: what all leave together is a gap without a cause.
     """
     logit = weights.constant + weights.per_t * min(max(t, 0.0), weights.most_t) + weights.per_closed * closed
     logit += (

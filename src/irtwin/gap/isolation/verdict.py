@@ -1,4 +1,7 @@
-"""The verdict: whether there is a gap, and whether anything explains it."""
+"""The verdict: whether there is a gap, and whether anything explains it.
+
+First what is left of the gap, before anybody asks how sure a cause is; then, of causes with their confidence, the rest.
+"""
 
 from __future__ import annotations
 
@@ -7,58 +10,85 @@ from collections.abc import Sequence
 import numpy as np
 
 from irtwin.gap.data.noise_floor import REPEATS, Floor
+from irtwin.gap.document import document
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.normal_equations import noise_before, reference_rms
 from irtwin.gap.repeats.disturbances import Disturbance
-from irtwin.gap.thresholds import Thresholds
+from irtwin.gap.thresholds import Thresholds, Verdict
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
+MUCH_IS_LEFT, IMPOSSIBLE_NUMBER, DOES_NOT_REPEAT, UNSURE = (
+    "much_is_left", "impossible_number", "does_not_repeat", "unsure",
+)  # fmt: skip
 
 
-def verdict_of(findings: Sequence[Finding], floor: Floor, limits: Thresholds, *, unmatched: bool = False) -> str:
-    """Return the verdict on all channels: `unexplained` where much of an excess is left at any place, named or not.
+def left_open(
+    findings: Sequence[Finding],
+    floor: Floor,
+    limits: Thresholds,
+    *,
+    unmatched: bool = False,
+    differing: Sequence[Disturbance] = (),
+    explained: Sequence[Disturbance] = (),
+) -> str | None:
+    """Return why the gap stays unexplained, however sure its causes are; None where it does not.
 
-    Causes that close nothing that matters make no gap. `unmatched`: a cause that cannot be true explains the data far
-    better than those that were named instead.
+    `unmatched`: a cause that cannot be true explains the data far better than those that were named instead.
+    `differing`: what differs between repeats, the largest share first; `explained`: those of it that effects explain.
     """
     if unmatched:
-        return UNEXPLAINED
-    causes = [
-        cause
-        for finding in findings
-        for branch in branches(finding)
-        if branch.closing.matters(limits.matters)
-        for cause in branch.causes
-    ]
+        return IMPOSSIBLE_NUMBER
+    located = [one for one in differing if not any(one is each for each in explained)]
+    named = any(branch.closing.matters(limits.matters) for finding in findings for branch in branches(finding))
+    nameless = bool(located) and located[0] is differing[0] and not named
     if floor.source == REPEATS:
-        before, after = max((_largest(finding) for finding in findings), default=(0.0, 0.0))
-        if after > max(limits.verdict.excess, (1 - limits.verdict.closed) * before):
-            return UNEXPLAINED
-    if not causes:
-        return NO_GAP
-    return AMBIGUOUS if any(cause.rivals for cause in causes) else ATTRIBUTED
+        excesses = (_largest(finding, explained, located) for finding in findings)
+        before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
+        much = max(limits.verdict.excess, (1 - limits.verdict.closed) * before)
+        if after > much and not (nameless and beside <= much):
+            return MUCH_IS_LEFT
+    return DOES_NOT_REPEAT if nameless else None
 
 
-def beside(verdict: str, found: Sequence[Disturbance], explained: Sequence[Disturbance]) -> str:
-    """Return the verdict beside what differs between repeats, the largest share first: where there is any, a gap is.
+def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
+    """Return the verdict on a gap that is not left open: `unexplained` where no cause that matters is likely.
 
-    It is `attributed` where effects explain the largest of it, `unexplained` where that is located only.
+    A cause is likely where it is, or one of the effects that the data cannot tell from it.
     """
-    if verdict != NO_GAP or not found:
-        return verdict
-    return ATTRIBUTED if any(found[0] is one for one in explained) else UNEXPLAINED
+    classes: dict[str, list[float]] = {}
+    for member in (one for finding in findings if finding.matters for one in finding.members):
+        classes.setdefault(member.cause, []).append(member.confidence)
+    if not classes:
+        return NO_GAP
+    likely = [sure for sure in classes.values() if sum(sure) >= limits.likely]
+    if not likely:
+        return UNEXPLAINED
+    return AMBIGUOUS if any(len(sure) > 1 for sure in likely) else ATTRIBUTED
 
 
-def _largest(finding: Finding) -> tuple[float, float]:
-    """Return the largest excess of a channel's equations without causes, and the largest that these leave.
+def _largest(
+    finding: Finding, explained: Sequence[Disturbance], located: Sequence[Disturbance]
+) -> tuple[float, float, float]:
+    """Return the largest excess of a channel without causes, of what these leave, and of that less `located`.
 
-    Over the floor, and over what the reference runs show, if there are any. The two may lie at different joints.
+    Over the floor, and over what the reference runs show, if there are any. They may lie at different joints. Of what
+    does not repeat, `explained` is out of the equations and is counted in the first; `located` is in them.
     """
     if finding.floor is None:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     level = finding.floor
     if finding.system.both:
         level = np.maximum(level, reference_rms(finding.system, noise_before(finding.system)))
     before, after = ((rms / level) ** 2 - 1 for rms in finding.fitted)
-    return float(before.max()), float(after.max())
+    before = before + _excess(explained, finding, level)
+    return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
+
+
+def _excess(some: Sequence[Disturbance], finding: Finding, level: np.ndarray) -> np.ndarray:
+    """Return (g,) the excess that some of what does not repeat makes in the equations of a channel."""
+    found = np.zeros(len(finding.places))
+    for one in some:
+        if one.channel == finding.name:
+            found[finding.places.index(one.joint)] += one.size
+    return np.asarray(found / level**2)

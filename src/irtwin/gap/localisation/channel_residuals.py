@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
@@ -27,7 +28,8 @@ class ChannelResidual:
     """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
     `before`, `after`: traces without and with the causes, `after` None where there is none, and `seen`, `explained` the
-    maps of them; `added`: what each cause adds to each trace, (N, g), and `acts` the map of all of it. `reference`: the
+    maps of them; `touched`: the joints that each cause acts on, none for the whole robot; `added`: what it adds to each
+    trace, (N, g), and `acts` the map of all of it. `reference`: the
     map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean square beyond which a gap
     lies.
     """
@@ -35,6 +37,7 @@ class ChannelResidual:
     finding: Finding
     before: list[Trace]
     after: list[Trace] | None
+    touched: list[tuple[str, ...]]
     added: list[list[np.ndarray]]
     seen: Map
     explained: Map | None
@@ -42,6 +45,12 @@ class ChannelResidual:
     reference: Map | None
     level: np.ndarray
     limits: Places
+
+    @property
+    def acting(self) -> np.ndarray:
+        """(g,) whether a cause acts there."""
+        places = self.finding.places
+        return np.array([any(_among(place, joints) for joints in self.touched) for place in places])
 
 
 def channel_residual(case: Case, explained: Explained, torque: Torque) -> ChannelResidual:
@@ -69,6 +78,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
         finding,
         before,
         after,
+        [cause.touched(case.robot) for cause in finding.causes],
         added,
         seen,
         closed,
@@ -77,6 +87,11 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
         level_of(finding.floor, seen, known, limits.fewest_samples),
         limits,
     )
+
+
+def _among(place: str | None, joints: tuple[str, ...]) -> bool:
+    """Return whether what acts on some joints, none for the whole robot, acts at a place, None for all of it."""
+    return place in (None, *joints) or not joints
 
 
 def against_reference(finding: Finding) -> bool:
@@ -99,14 +114,14 @@ def cause_curves(left: Sequence[ChannelResidual]) -> list[Followed]:
     """Return each cause's curve, on the residual that all the others leave."""
     lines = []
     for one in left:
-        for cause, added in zip(one.finding.causes, one.added, strict=True):
+        for cause, joints, added in zip(one.finding.causes, one.touched, one.added, strict=True):
             assert one.after is not None
             alone = [_of(trace, part) for trace, part in zip(one.after, added, strict=True)]
             partial = [
                 replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
             ]
             for k, joint in enumerate(one.finding.places):
-                best = followed(alone, k, joint) if joint is None or not cause.joints or joint in cause.joints else None
+                best = followed(alone, k, joint) if _among(joint, joints) else None
                 if best:
                     lines.append(curve(one.finding.name, partial, k, joint, best[0], cause.effect, added))
     return lines
@@ -116,7 +131,7 @@ def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[Location],
     """Return the residual against what it follows, at the foremost places on which no cause acts."""
     lines: list[Followed] = []
     for one in left:
-        named = {joint for cause in one.finding.causes for joint in cause.joints or one.finding.places}
+        named = set(compress(one.finding.places, one.acting))
         own = [place.joint for place in located if place.channel == one.finding.name and place.joint not in named]
         for joint in list(dict.fromkeys(own))[:most]:
             k = one.finding.places.index(joint)
@@ -141,9 +156,6 @@ def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.nda
 def _places(left: ChannelResidual, seed: int) -> list[Location]:
     names = left.finding.places
     best = [followed(left.before, k, joint) for k, joint in enumerate(names)]
-    acting = np.array(
-        [any(not cause.joints or name in (None, *cause.joints) for cause in left.finding.causes) for name in names]
-    )
     located = locate(
         left.finding.name,
         names,
@@ -152,7 +164,7 @@ def _places(left: ChannelResidual, seed: int) -> list[Location]:
         left.level,
         reference=left.reference,
         explained=left.explained,
-        acting=acting,
+        acting=left.acting,
         acts=left.acts,
         limits=left.limits,
         seed=seed,

@@ -11,7 +11,7 @@ from irtwin.gap.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
 from irtwin.report.energy.figures import Figure, plain
-from irtwin.report.gap.verdict import effect_name
+from irtwin.report.gap.verdict import effect_name, matters
 from irtwin.report.questions import Answers, Row
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], LIMIT
@@ -84,11 +84,18 @@ def heat_map(given: Sequence[Row]) -> Figure | None:
 
 
 def foremost_curves(curves: Sequence[Followed], answers: Answers) -> list[Followed]:
-    """Return the curves of each effect at the joints where most of the gap lies; an arm has too many to show all."""
+    """Return the curves of each effect at the joints where most of the gap lies; an arm has too many to show all.
+
+    Effects that close little have none.
+    """
+    causes = [(wording.local_name(row["effect"]), matters(row["cause"], answers)) for row in answers["causes"].rows]
+    little = {effect for effect, _ in causes} - {effect for effect, much in causes if much}
     order = list(dict.fromkeys(row["joint"] for row in answers["locations"].rows))
     first = {joint: place for place, joint in enumerate(order)}
     of_effect: dict[str | None, list[int]] = {}
     for place, curve in enumerate(curves):
+        if curve.effect in little:
+            continue
         of_effect.setdefault(curve.effect, []).append(place)
     kept = [
         place

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
-_LIKELY = 0.5  # confidence: below it a finding is a guess
+_LIKELY = DEFAULT.verdict.likely  # below it a finding is a guess
 
 Alternative = tuple[str, float]  # what an effect is called, and its confidence
 
@@ -39,22 +40,31 @@ class Finding:
 
     @property
     def claim(self) -> str:
-        """What is said of the family."""
+        """What is said of the family; of a guess, no more than that it is one."""
+        if not self.likely:
+            return f"perhaps {self.place}"
         return f"{self.place} {_CLAIMS[self.against]}"
+
+    @property
+    def likely(self) -> bool:
+        """Whether it is more likely than not, and no guess."""
+        return self.confidence >= _LIKELY
 
     @property
     def effects(self) -> str:
         """The causes with their confidences, each with its alternatives."""
-        return " and ".join(" or ".join(_sure(*one) for one in some) for some in self.members)
+        return " and ".join(" or ".join(_with(*one) for one in some) for some in self.members)
 
     @property
     def sentence(self) -> str:
-        """The whole finding; a guess without its effects."""
-        if self.confidence < _LIKELY:
-            return f"perhaps {self.place} ({wording.share(self.confidence)})"
-        known = [sure for some in self.members for _, sure in some] == [self.confidence]
-        sure = "" if known else f" ({wording.share(self.confidence)})"
-        return f"{self.claim}{sure}: {self.effects}"
+        """The whole finding; a guess without its effects, unless one of them is likely."""
+        sure = f"({wording.share(self.confidence)} sure)"
+        if not self.likely:
+            one_of = any(sum(chance for _, chance in some) >= _LIKELY for some in self.members)
+            return f"{self.claim} {sure}" + (f": {self.effects}" if one_of else "")
+        if [chance for some in self.members for _, chance in some] == [self.confidence]:
+            return f"{self.claim}: {self.members[0][0][0]} {sure}"
+        return f"{self.claim} {sure}: {self.effects}"
 
 
 _CLAIMS = {
@@ -65,27 +75,63 @@ _CLAIMS = {
 }
 
 
-def sentence(verdict: str, findings: Sequence[Finding], where: str, closes: str | None) -> str:
+NOT_REPEATING = {
+    "line": "an oscillation",
+    "band": "a band of oscillations",
+    "switching": "a load that switches",
+    "drift": "a drift",
+    "offset": "an offset",
+}
+"""What runs of one motion differ by, in words."""
+
+
+def sentence(
+    verdict: str,
+    findings: Sequence[Finding],
+    where: str,
+    closes: str | None,
+    because: str | None = None,
+    differ: str = "",
+) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
-    closes: how much of it is closed; None: unknown of the whole, and said of the first finding.
+    closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
+    verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains.
     """
     if verdict == "no_gap":
         if not findings:
             return "There is no gap: the twin explains the data down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."
-    told = [one for one in findings if one.matters][:_NAMED]
+    told = _told(findings)
     rest = [one for one in findings if one not in told]
-    said = "; ".join(one.sentence for one in told)
-    if told and all(one.confidence < _LIKELY for one in told):
-        said = f"nothing that was found is sure: {said}"
+    said, guessed = "; ".join(one.sentence for one in told), not any(one.likely for one in told)
     beside = f" Not named here: {counted(rest)}." if rest else ""
+    if verdict == "unexplained" and because != "unsure":
+        part = "" if not told else f" Part of it is {said}." if guessed else f" Part of it is closed: {said}."
+        return f"{_left(because, where, differ)}{part}{beside}"
     if verdict == "unexplained":
-        part = f" Part of it is closed: {said}." if said else ""
-        return f"There is a gap{where}, and no effect in the catalogue closes it.{part}{beside}"
+        said = f"there is a gap{where}, and no cause that was found is sure: {said}"
+    elif guessed:
+        said = f"several effects explain the gap{where}, and none of them is sure: {said}"
     if closes is None:
         closes = "".join(_closes(one, len(told)) for one in told[:1])
-    return f"{said[:1].upper()}{said[1:]}.{closes}{beside}"
+    differing = f" Besides, runs of one motion differ by {differ}, which no effect explains." if differ else ""
+    return f"{said[:1].upper()}{said[1:]}.{closes}{differing}{beside}"
+
+
+def _told(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the findings that are named, in their order: of those that matter the likely ones, then guesses."""
+    those = sorted((one for one in findings if one.matters), key=lambda one: not one.likely)[:_NAMED]
+    return [one for one in findings if one in those]
+
+
+def _left(because: str | None, where: str, differ: str) -> str:
+    """Say why a gap is unexplained, however sure its causes are."""
+    if because == "does_not_repeat":
+        return f"Runs of one motion differ by {differ}, and no effect in the catalogue explains that."
+    if because == "impossible_number":
+        return f"There is a gap{where}, and what would close it needs a number that cannot be true."
+    return f"There is a gap{where}, and no effect in the catalogue closes it."
 
 
 def _closes(one: Finding, count: int) -> str:
@@ -113,5 +159,5 @@ def counted(findings: Sequence[Finding]) -> str:
     return wording.listed([folded(len(shares), channel, sum(shares)) for channel, shares in of_channel.items()])
 
 
-def _sure(name: str, confidence: float) -> str:
+def _with(name: str, confidence: float) -> str:
     return f"{name} ({wording.share(confidence)})"

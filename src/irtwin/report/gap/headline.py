@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from irtwin.gap.document.document import Document, Finding
 from irtwin.report.gap import findings
-from irtwin.report.gap.verdict import closes, where
+from irtwin.report.gap.verdict import closes, differing, where
 from irtwin.report.wording import listed
 
 
@@ -16,8 +16,12 @@ def line(diagnosis: Document, against: str | None) -> str:
     said = findings.sentence(
         diagnosis.verdict,
         told,
-        "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime)),
+        "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime), place.share),
         None if closed is None else closes(closed.value, closed.interval95),
+        diagnosis.unexplained_because,
+        differing(
+            [(one.kind, one.channel, one.joint) for one in diagnosis.not_repeating or () if not one.explained_by]
+        ),
     )
     return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
 

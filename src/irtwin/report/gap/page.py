@@ -12,6 +12,7 @@ from typing import Any
 from irtwin.errors import InputError
 from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -23,7 +24,7 @@ from irtwin.report.energy.page import content_policy, figure_scripts, page_data
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
-from irtwin.report.gap.findings import counted
+from irtwin.report.gap.findings import NOT_REPEATING, counted
 from irtwin.report.gap.verdict import effect_name
 from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
 from irtwin.report.templates import style, written
@@ -92,6 +93,8 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
         foremost=gap_figures.foremost_joint(answers),
         follows=follows,
         hidden_curves=len(curves.follows) - len(follows),
+        kinds=NOT_REPEATING,
+        places=_places(answers["locations"].rows),
         effect_names=gap_figures.effect_names(answers),
         experiment=experiment(answers),
         drawn=drawn,
@@ -102,15 +105,23 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
     )  # fmt: skip
 
 
+def _places(rows: Sequence[Row]) -> list[Row]:
+    """Return the places that have a part of the gap worth a line; all, where none has."""
+    least = DEFAULT.places.least_share
+    return [row for row in rows if row["excess"] > 0 and row["share"] >= least] or list(rows)
+
+
 def _cause(row: Row, answers: Answers) -> dict[str, Any]:
     cause = row["cause"]
     return {
         **row,
         "name": effect_name(row),
         "told": gap_verdict.matters(cause, answers),
+        "likely": row["confidence"] >= DEFAULT.verdict.likely,
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
         "parameters": _of(cause, answers, "cause_parameters"),
+        "halves": gap_verdict.halves(row["first_half"], row["last_half"], row["repeats"]),
         "evidence": [
             ("channel", row["channel"]),
             *((one["name"], _said(one["value"], one["unit"])) for one in _of(cause, answers, "evidence")),

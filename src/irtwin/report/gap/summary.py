@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from irtwin.gap.document.document import Document
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.knowledge.store.table import Row, Table
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
+_STEPS = 3  # motions to log that are told
 
 
 def gap(diagnosis: Document) -> Table:
@@ -32,15 +34,17 @@ def gap(diagnosis: Document) -> Table:
 
 
 def causes(diagnosis: Document) -> Table:
-    """Return each cause with its confidence and its parameters, these with their 95 % intervals."""
+    """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals."""
     columns = ("cause", "joints", "sure, %", "parameter", "value", "95 % from", "to", "unit")
     return Table(columns, tuple(_rows_of_causes(diagnosis)))
 
 
 def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
-    for cause in diagnosis.causes:
+    told = {cause for finding in diagnosis.findings if finding.matters for cause in finding.causes}
+    for cause in (one for one in diagnosis.causes if one.id in told):
+        name = cause.effect.replace("_", " ")
         first: Row = {
-            "cause": cause.effect.replace("_", " "),
+            "cause": name if cause.confidence >= DEFAULT.verdict.likely else f"perhaps {name}",
             "joints": ", ".join(cause.joints) or "whole robot",
             "sure, %": round(100 * cause.confidence),
         }
@@ -60,10 +64,10 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
 
 
 def next_steps(diagnosis: Document) -> list[str]:
-    """Return what to log next, a line for each motion."""
-    return [
-        f"To log next: {motion}" for motion in (diagnosis.next_experiment.motions if diagnosis.next_experiment else ())
-    ]
+    """Return what to log next: a line for each of the first few motions, and how many more the report has."""
+    motions = diagnosis.next_experiment.motions if diagnosis.next_experiment else ()
+    said = [f"To log next: {motion}" for motion in motions[:_STEPS]]
+    return said + ([f"{len(motions) - _STEPS} more to log are in the report (--report)"] if motions[_STEPS:] else [])
 
 
 def _short(value: float) -> float:

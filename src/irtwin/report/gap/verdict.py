@@ -9,18 +9,24 @@ from irtwin.report.gap import findings
 from irtwin.report.gap.findings import Finding
 from irtwin.report.questions import Answers, Row
 
+_MOSTLY = 0.5  # share of a gap
+
 
 def sentence(answers: Answers) -> str:
     """Return the verdict in plain words, the largest finding first."""
-    verdict = wording.local_name(answers["diagnosis"].rows[0]["verdict"])
+    judged = answers["diagnosis"].rows[0]
     place, closed = answers["locations"].first, answers["closed"].first
     ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
     return findings.sentence(
-        verdict,
+        wording.local_name(judged["verdict"]),
         told(answers),
-        "" if place is None else where(place["channel"], place["joint"], place["regime"]),
+        "" if place is None else where(place["channel"], place["joint"], place["regime"], place["share"]),
         None if closed is None else closes(closed["closed"], ends),
-    )
+        judged["reason"] and wording.local_name(judged["reason"]),
+        differing([
+            (one["kind"], one["channel"], one["joint"]) for one in answers["disturbances"].rows if not one["cause"]
+        ]),
+    )  # fmt: skip
 
 
 def told(answers: Answers) -> list[Finding]:
@@ -61,10 +67,41 @@ def _against(diagnosis: Row) -> str:
     return "both" if diagnosis["referenced"] else "simulated"
 
 
-def where(channel: str, joint: str | None, regime: str | None) -> str:
-    """Say where a gap mostly lies."""
+def where(channel: str, joint: str | None, regime: str | None = None, share: float = 0.0) -> str:
+    """Say where a gap lies: of the channel's, this regime of the joint has this share."""
     of = f" of {joint}" if joint else ""
-    return f" in the {channel}{of}" + (f", mostly in the regime “{regime}”" if regime else "")
+    return f" in the {channel}{of}" + (f", mostly in the regime “{regime}”" if regime and share >= _MOSTLY else "")
+
+
+def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
+    """Say by what runs of one motion differ: kind, channel and joint of each, the largest first; may be empty."""
+    if not unexplained:
+        return ""
+    kind, channel, joint = unexplained[0]
+    more = len(unexplained) - 1
+    said = f"{findings.NOT_REPEATING[kind]}{where(channel, joint)}"
+    return said if not more else f"{said}, and by {more} thing{'s' if more > 1 else ''} more"
+
+
+def halves(first: bool | None, last: bool | None, repeats: float | None) -> str | None:
+    """Say how a cause fares in halves of the time, which are asked where runs are few; None where they were not.
+
+    first, last: whether a half shows it by itself; repeats: of what it closes in one, what it closes with the size that
+    it has in the other.
+    """
+    if first is None or last is None:
+        return None
+    shown = {
+        (True, True): "Found in both halves of the time, in each by itself",
+        (True, False): "Found by itself in the first half of the time only",
+        (False, True): "Found by itself in the second half of the time only",
+        (False, False): "Found in all of the time together, in neither half of it by itself",
+    }[first, last]
+    if repeats is None:
+        return f"{shown}."
+    if repeats <= 0:
+        return f"{shown}; the halves contradict each other on its size."
+    return f"{shown}; with the size found in one half it closes {wording.share(repeats)} of what it can in the other."
 
 
 def closes(share: float, interval: Sequence[float] | None) -> str:
