@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import base64
-import shutil
-import socket
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
-from urllib.error import URLError
-from urllib.request import urlopen
 
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
+from tests.sparql_servers import oxigraph
 
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import ask, named_questions
@@ -29,26 +22,8 @@ A, B = "https://example.org/g/a", "https://example.org/g/b"
 
 @pytest.fixture(scope="module")
 def server_url() -> Iterator[str]:
-    program = shutil.which("oxigraph", path=str(Path(sys.executable).parent)) or shutil.which("oxigraph")
-    if program is None:
-        pytest.skip("no oxigraph server on this machine: pip install oxigraph")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{free.getsockname()[1]}"
-    process = subprocess.Popen(
-        [program, "serve", "--bind", address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    try:
-        for _ in range(100):
-            try:
-                urlopen(f"http://{address}/").close()
-                break
-            except URLError:
-                time.sleep(0.05)
-        yield f"http://{address}/query"
-    finally:
-        process.kill()
-        process.wait()
+    with oxigraph() as server:
+        yield server.url
 
 
 @pytest.fixture
@@ -129,6 +104,7 @@ def test_address_of_updates(query: str, update: str, monkeypatch: pytest.MonkeyP
         ("http://", "names a host"),
         ("http://h:port/", "cannot be read"),
         ("http://user:secret@127.0.0.1:1/query", r"http://127\.0\.0\.1:1/query: no SPARQL server answers"),
+        ("http://127.0.0.1:1/query?key=secret", r"http://127\.0\.0\.1:1/query: no SPARQL server answers"),
     ],
 )
 def test_what_is_no_server(url: str, message: str) -> None:

@@ -18,6 +18,7 @@ from irtwin.errors import InputError
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 _DAMAGE = ("malformed", "not a database", "could not decode to UTF-8", "Could not decode to UTF-8")
+_SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
 _FULL = ("is full", "disk I/O error")
 BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
 _WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
@@ -52,8 +53,9 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
 
 
 def shown(url: URL) -> str:
-    """Return a URL as messages may show it."""
-    return url.render_as_string(hide_password=True)
+    """Return a URL as messages may show it: without a password, which may stand among its parameters too."""
+    secret = {name: "***" for name in url.query if any(word in name.lower() for word in _SECRETS)}
+    return url.update_query_dict(secret).render_as_string(hide_password=True)
 
 
 @contextmanager

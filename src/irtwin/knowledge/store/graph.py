@@ -114,6 +114,11 @@ class KnowledgeGraph:
         self._store = Store()
 
     @property
+    def shown(self) -> str:
+        """Where it is, as messages may say it: never with a password."""
+        return self._store.shown if isinstance(self._store, SparqlServer) else str(self.folder or "memory")
+
+    @property
     def resources(self) -> Resources:
         """The ontology, rules, shapes, mappings, questions and reports that hold for it: its workspace's too."""
         if self._resources is None:

@@ -38,6 +38,10 @@ _ACCEPT = "application/sparql-results+json, application/n-triples;q=0.9"
 _AT_ONCE = 500  # triples looked up by one query
 
 
+class ServerFault(InputError):
+    """A server that cannot be reached, or does not do what it is asked for."""
+
+
 class SparqlServer:
     """The part of pyoxigraph's Store that the knowledge graph uses, on a server.
 
@@ -50,7 +54,9 @@ class SparqlServer:
         """Ask the server whether it is there. Raises InputError, which never shows a password, where it is not."""
         address = _address(url)
         self.headers = {"User-Agent": "irtwin", **_credentials(address)}
-        self.query_url = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
+        host = address.netloc.rpartition("@")[2]
+        self.query_url = address._replace(netloc=host).geturl()
+        self.shown = address._replace(netloc=host, query="", fragment="").geturl()
         self.update_url = _update_url(self.query_url)
         self.query("ASK {}")
 
@@ -67,7 +73,9 @@ class SparqlServer:
         """Answer a query. SyntaxError where the server refuses its text; functions are those that the server has."""
         graphs = [("default-graph-uri", name.value) for name in default_graph or () if isinstance(name, NamedNode)]
         graphs += [("named-graph-uri", name.value) for name in named_graphs or ()]
-        url = f"{self.query_url}?{urlencode(graphs)}" if graphs else self.query_url
+        url = self.query_url
+        if graphs:
+            url += ("&" if urlsplit(url).query else "?") + urlencode(graphs)
         response = self._post(url, "query", _with_prologue(text, base_iri, prefixes), _ACCEPT)
         if response.headers.get_content_type() == "application/sparql-results+json":
             return parse_query_results(response, QueryResultsFormat.JSON)
@@ -117,10 +125,11 @@ class SparqlServer:
             said = " ".join(error.read(1000).decode(errors="replace").split())
             if error.code == 400:
                 raise SyntaxError(said) from None
-            raise InputError(f"{url}: the server refuses the {kind}: {error.code} {error.reason}. {said}") from None
+            refused = f"{error.code} {error.reason}. {said}"
+            raise ServerFault(f"{self.shown}: the server refuses the {kind}: {refused}") from None
         except (URLError, HTTPException, OSError) as error:
             reason = error.reason if isinstance(error, URLError) else error
-            raise InputError(f"{url}: no SPARQL server answers: {reason}") from None
+            raise ServerFault(f"{self.shown}: no SPARQL server answers: {reason}") from None
 
 
 def is_url(place: object) -> bool:
