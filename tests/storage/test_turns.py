@@ -98,6 +98,14 @@ def test_the_turn_is_given_back(tmp_path: Path, url: str | None, monkeypatch: py
                 pass
 
 
+def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+    with Workspace(tmp_path / "place") as place:
+        (tmp_path / "place/.graph.turn").mkdir()
+        cannot = pytest.raises(InputError, match="place: cannot be written")
+        with cannot, turns.rewriting_alone(place.engine, place.folder):
+            pass
+
+
 @pytest.mark.system
 def test_what_those_who_run_the_server_can_mend_is_one_line(
     new_postgresql_database: Callable[[], str], tmp_path: Path

@@ -48,7 +48,10 @@ def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:
 
 
 def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
-    file = held.enter_context((folder / _FILE).open("ab"))
+    try:
+        file = held.enter_context((folder / _FILE).open("ab"))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
     def taken() -> bool:
         try:
