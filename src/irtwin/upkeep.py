@@ -118,25 +118,26 @@ def _check_that_it_may_go(place: Workspace, run: Run) -> None:
 
 
 def repair(
-    workspace: Path | str = WORKSPACE, *, database: str | None = None, announce: Announce = lambda line: None
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> None:
     """Make the graph of a workspace anew from its database, and look through its files.
 
     The graph that was there is replaced once the new one is whole. What SPARQL updates had written is carried over
-    where it can be read; else the damaged graph is kept aside. Raises InputError where the database is damaged, or at
-    the end where files are lost that only a data set or a backup can give back.
+    where it can be read; else the damaged graph is kept aside. On a server, by `graph_url`, each named graph is
+    replaced in a transaction of its own, and what SPARQL updates had written stays. Raises InputError where the
+    database is damaged, or at the end where files are lost that only a data set or a backup can give back.
     """
-    with Workspace.existing(Path(workspace), database) as place, _nobody_else(place.graph_folder):
-        with files.working_folder(place.folder, ".repair-") as folder:
-            place.mapped_rows.unlink(missing_ok=True)
-            announce("Rebuilding the graph from the database")
-            with KnowledgeGraph(folder / "graph", place.folder, place.resources, place.base) as graph:
-                graph.load_ontology()
-                map_rows(place, graph)
-                readable = _carry_over(place.graph_folder, graph, announce)
-                populate_others(place, graph, announce)
-                conclude(graph, announce)
-            _swap(place, folder / "graph", keep=not readable)
+    with Workspace.existing(Path(workspace), database) as place:
+        if graph_url is None:
+            _rebuild(place, announce)
+        else:
+            with rewriting(place, graph_url) as graph:
+                place.mapped_rows.unlink(missing_ok=True)
+                _fill(place, graph, announce)
         lost = lost_files(place)
     for line in lost:
         announce(f"  {line}")
@@ -145,6 +146,26 @@ def repair(
             f"{place.folder}: the graph is rebuilt, but files are missing or altered ({len(lost)}); "
             "run the data sets of these robots again, restore a backup, or remove the robots with `irtwin drop`"
         )
+
+
+def _rebuild(place: Workspace, announce: Announce) -> None:
+    """Make the graph in a folder anew, and put it in place of the old one."""
+    with _nobody_else(place.graph_folder), files.working_folder(place.folder, ".repair-") as folder:
+        place.mapped_rows.unlink(missing_ok=True)
+        with KnowledgeGraph(folder / "graph", place.folder, place.resources, place.base) as graph:
+            readable = _fill(place, graph, announce)
+        _swap(place, folder / "graph", keep=not readable)
+
+
+def _fill(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
+    """Put all that the database knows into a graph; return whether what else was in the folder's was carried over."""
+    announce("Rebuilding the graph from the database")
+    graph.load_ontology()
+    map_rows(place, graph)
+    readable = graph.folder is None or _carry_over(place.graph_folder, graph, announce)
+    populate_others(place, graph, announce)
+    conclude(graph, announce)
+    return readable
 
 
 @contextmanager

@@ -44,6 +44,7 @@ from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
 from irtwin.storage.staging import staged
+from irtwin.storage.turns import rewriting_alone
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
 
@@ -231,12 +232,14 @@ def _check_effects(data_set: DataSet) -> None:
 def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
     """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server.
 
-    Who reads the folder meanwhile sees what was there before, if anything was. Raises InputError for a fault in what
-    extends the workspace, before anything is written.
+    Who reads the folder meanwhile sees what was there before, if anything was; who wants to rewrite it too waits.
+    Raises InputError for a fault in what extends the workspace, before anything is written, or after too long a wait.
     """
     check_extensions(place.resources)
     check_mappings(place.resources, place.engine)
-    with KnowledgeGraph.of_workspace(place, url) as graph, ExitStack() as held:
+    with ExitStack() as held:
+        held.enter_context(rewriting_alone(place.engine, place.folder))
+        graph = held.enter_context(KnowledgeGraph.of_workspace(place, url))
         if url is None and graph.graphs():
             held.enter_context(kept(place.graph_folder))
         yield graph

@@ -1,7 +1,6 @@
 """The command line as a newcomer meets it: help, answers, and what bad input gets."""
 
 import json
-import re
 import sqlite3
 import subprocess
 import sys
@@ -10,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from tests import data_sets
+from tests import data_sets, sparql_servers
 from tests.small_robots import waiting_data_set
 
+from irtwin.cli.command_line import cli
 from irtwin.workflow import unpack_demo
 
 pytestmark = pytest.mark.slow
@@ -223,13 +223,20 @@ def test_the_map_command_ends_what_has_no_end(tmp_path):
 
 
 @pytest.mark.system
-def test_any_database_serves(small_data_set, tmp_path, new_postgresql_database):
+def test_any_database_and_any_sparql_server_serve(small_data_set, tmp_path, new_postgresql_database):
     url = new_postgresql_database()
-    done = irtwin("run", small_data_set, "--workspace", tmp_path, "--database", url)
-    assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "irtwin.db").exists()
-    asked = irtwin("query", "worst_run", "--workspace", tmp_path, "--format", "json")
-    assert json.loads(asked.stdout)[0]["robot"] == "Arm"
+    with sparql_servers.oxigraph() as server:
+        there = ["--workspace", tmp_path, "--database", url, "--graph", server.url]
+        done = data_sets.irtwin("run", small_data_set, *there)
+        assert done.status == 0, done.err
+        assert not {"irtwin.db", "graph"} & {file.name for file in tmp_path.iterdir()}
+        worst = ["query", "worst_run", "--workspace", tmp_path, "--format", "json", "--graph", server.url]
+        asked = data_sets.irtwin(*worst).out
+        assert json.loads(asked)[0]["robot"] == "Arm"
+        server.update("DROP ALL")
+        assert data_sets.irtwin(*worst).out == "[]\n"
+        assert data_sets.irtwin("repair", *there).status == 0
+        assert data_sets.irtwin(*worst).out == asked
 
 
 @pytest.mark.slow
@@ -256,8 +263,24 @@ def test_reason_says_what_goes_together(tmp_path):
     assert (done.returncode, "SOURCE and --out go together" in done.stderr) == (2, True), done.stderr
 
 
-@pytest.mark.parametrize("command", ["query", "explain"])
-def test_commands_that_only_read_the_graph_take_no_database(command):
-    done = irtwin(command, "--database", "sqlite:///x.db")
-    assert done.returncode == 2
-    assert re.search("No such option.*--database", done.stderr), done.stderr
+# What a command has besides --workspace; the others have both.
+HAS = {
+    "query": {"--graph"},  # it reads the graph, and no rows
+    "explain": {"--graph"},
+    "alarms": {"--graph"},
+    "docs": set(),  # it reads files
+    "case-study": set(),  # it makes its own workspace
+}
+
+
+def test_each_command_on_a_workspace_says_where_rows_and_graph_are():
+    for name, command in cli.commands.items():
+        options = {option for parameter in command.params for option in parameter.opts}
+        if "--workspace" in options:
+            assert options & {"--database", "--graph"} == HAS.get(name, {"--database", "--graph"}), name
+
+
+def test_a_graph_that_is_no_url_is_refused(tmp_path):
+    done = irtwin("query", "ASK {}", "--graph", "somewhere", folder=tmp_path)
+    assert (done.returncode, "give the URL of a SPARQL server" in done.stderr) == (2, True), done.stderr
+    assert not list(tmp_path.iterdir())

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import base64
-import shutil
-import socket
-import subprocess
-import sys
 import threading
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
-from urllib.error import URLError
-from urllib.request import urlopen
 
 import pytest
-from pyoxigraph import Literal, NamedNode, Quad
+from pyoxigraph import Literal, NamedNode, Quad, Store
+from tests.sparql_servers import oxigraph
 
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import ask, named_questions
@@ -29,26 +24,8 @@ A, B = "https://example.org/g/a", "https://example.org/g/b"
 
 @pytest.fixture(scope="module")
 def server_url() -> Iterator[str]:
-    program = shutil.which("oxigraph", path=str(Path(sys.executable).parent)) or shutil.which("oxigraph")
-    if program is None:
-        pytest.skip("no oxigraph server on this machine: pip install oxigraph")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{free.getsockname()[1]}"
-    process = subprocess.Popen(
-        [program, "serve", "--bind", address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    try:
-        for _ in range(100):
-            try:
-                urlopen(f"http://{address}/").close()
-                break
-            except URLError:
-                time.sleep(0.05)
-        yield f"http://{address}/query"
-    finally:
-        process.kill()
-        process.wait()
+    with oxigraph() as server:
+        yield server.url
 
 
 @pytest.fixture
@@ -117,7 +94,7 @@ def test_construct_ask_bindings_and_faults(served: KnowledgeGraph) -> None:
     ],
 )
 def test_address_of_updates(query: str, update: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SparqlServer, "query", lambda *_: None)
+    monkeypatch.setattr(SparqlServer, "query", lambda *_: Store().query("ASK {}"))
     assert SparqlServer(query).update_url == update
 
 
@@ -129,6 +106,7 @@ def test_address_of_updates(query: str, update: str, monkeypatch: pytest.MonkeyP
         ("http://", "names a host"),
         ("http://h:port/", "cannot be read"),
         ("http://user:secret@127.0.0.1:1/query", r"http://127\.0\.0\.1:1/query: no SPARQL server answers"),
+        ("http://127.0.0.1:1/query?key=secret", r"http://127\.0\.0\.1:1/query: no SPARQL server answers"),
     ],
 )
 def test_what_is_no_server(url: str, message: str) -> None:
@@ -137,23 +115,60 @@ def test_what_is_no_server(url: str, message: str) -> None:
     assert "secret" not in str(caught.value)
 
 
+@contextmanager
+def answering(respond: Callable[[BaseHTTPRequestHandler, str], None]) -> Iterator[str]:
+    """A server of ours; yields its URL without the scheme. `respond` gets each request and its body."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            respond(self, self.rfile.read(int(self.headers["Content-Length"])).decode())
+
+        def log_message(self, *arguments: object) -> None:
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    yield f"127.0.0.1:{server.server_port}/sparql"
+    server.shutdown()
+
+
 @pytest.fixture
 def refusing() -> Iterator[tuple[str, list[str]]]:
     """A server that wants to know who asks; yields its URL and what it was told."""
     told: list[str] = []
 
-    class Refusing(BaseHTTPRequestHandler):
-        def do_POST(self) -> None:
-            told.append(self.headers.get("Authorization", ""))
-            self.send_error(401)
+    def respond(request: BaseHTTPRequestHandler, body: str) -> None:
+        told.append(request.headers.get("Authorization", ""))
+        request.send_error(401)
 
-        def log_message(self, *arguments: object) -> None:
-            pass
+    with answering(respond) as address:
+        yield address, told
 
-    server = HTTPServer(("127.0.0.1", 0), Refusing)
-    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
-    yield f"127.0.0.1:{server.server_port}/sparql", told
-    server.shutdown()
+
+def of_virtuoso(request: BaseHTTPRequestHandler, body: str, boolean: bool) -> None:
+    """Answer a query in a body of parameters alone; refuse updates, for want of a default graph."""
+    assert request.headers["Content-Type"].startswith(
+        ("application/x-www-form-urlencoded", "application/sparql-update")
+    )
+    if not body.startswith("query="):
+        return request.send_error(400, explain="No plain default graph specified in the preamble")
+    table = '{"head": {"vars": ["__ASK_RETVAL"]}, "results": {"bindings": []}}'
+    request.send_response(200)
+    request.send_header("Content-Type", "application/sparql-results+json")
+    request.end_headers()
+    request.wfile.write(('{"head": {}, "boolean": true}' if boolean and "ASK" in body else table).encode())
+    return None
+
+
+def test_one_that_departs_too_far_is_refused() -> None:
+    a_table = pytest.raises(InputError, match="answers ASK by a table, as Virtuoso does")
+    with answering(partial(of_virtuoso, boolean=False)) as address, a_table:
+        KnowledgeGraph(f"http://{address}")
+    with answering(partial(of_virtuoso, boolean=True)) as address:
+        graph = KnowledgeGraph(f"http://{address}")
+        for write in (lambda: graph.replace([quad("x", 1.0, A)], A), lambda: graph.change([], [quad("x", 1.0, A)])):
+            with pytest.raises(InputError, match=r"takes no SPARQL 1\.1 Update .*No plain default graph.*nothing was"):
+                write()
 
 
 def test_credentials(refusing: tuple[str, list[str]], monkeypatch: pytest.MonkeyPatch) -> None:

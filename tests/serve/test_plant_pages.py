@@ -16,6 +16,7 @@ from tests.endpoint import Server
 from irtwin.errors import InputError
 from irtwin.serve.pool import Limits
 from irtwin.serve.server import serve
+from irtwin.serve.source import Source
 
 pytestmark = pytest.mark.slow
 
@@ -157,4 +158,11 @@ def test_a_tariff_that_was_spoiled_meanwhile_is_said_and_nothing_is_priced(plant
 def test_a_tariff_that_cannot_be_used_is_said_before_anything_is_served(tmp_path: Path) -> None:
     (tmp_path / "plant.toml").write_text("prise = 1\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"plant\.toml: unknown key 'prise'"):
-        serve(plants.make_empty_plant(tmp_path), "127.0.0.1", 0, token=None, limits=Limits(), announce=print)
+        serve(
+            Source(plants.make_empty_plant(tmp_path).parent),
+            "127.0.0.1",
+            0,
+            token=None,
+            limits=Limits(),
+            announce=print,
+        )

@@ -11,6 +11,7 @@ import pytest
 
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.source import Source
 from irtwin.serve.turns import Displaced, Turns
 
 Served = list[str]
@@ -108,7 +109,7 @@ def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callab
     request = {"default_graphs": (), "named_graphs": (), "base": "http://e/", "accept": "text/csv", "at_once": False}
 
     async def run() -> None:
-        pool, done = Pool(new_graph(), 1, Limits()), Served()
+        pool, done = Pool(Source(new_graph().parent), 1, Limits()), Served()
 
         async def ask(client: str, number: int) -> None:
             async with pool.worker(client) as worker:
@@ -131,7 +132,7 @@ def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callab
 @pytest.mark.slow
 def test_the_queue_says_that_it_is_full(new_graph: Callable[[], Path]) -> None:
     async def run() -> None:
-        pool = Pool(new_graph(), 1, Limits(waiting=0))
+        pool = Pool(Source(new_graph().parent), 1, Limits(waiting=0))
         await pool.open()
         try:
             async with pool.worker("A"):

@@ -37,11 +37,20 @@ database_option = click.option(
     envvar="IRTWIN_DATABASE",
     help="SQLAlchemy URL of the database. Default: SQLite in the workspace.",
 )
+
+
+def _checked_url(context: click.Context, option: click.Parameter, url: str | None) -> str | None:
+    if url is not None and "://" not in url:
+        raise click.BadParameter("give the URL of a SPARQL server, or nothing for the workspace's own folder.")
+    return url
+
+
 graph_option = click.option(
     "--graph",
     "graph_url",
     metavar="URL",
     envvar="IRTWIN_GRAPH",
+    callback=_checked_url,
     help="Query URL of a SPARQL 1.1 server for the graph. Default: a folder in the workspace.",
 )
 base_option = click.option(

@@ -11,6 +11,8 @@ from irtwin.cli.options import DAY, Number, database_option, graph_option, say, 
 
 @click.command()
 @workspace_option
+@database_option
+@graph_option
 @click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 picks a free port.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option("--timeout", type=Number(0.1, DAY), default=30.0, show_default=True, help="Limit per query, s.")
@@ -18,19 +20,41 @@ from irtwin.cli.options import DAY, Number, database_option, graph_option, say, 
     "--memory", type=click.IntRange(64, 1 << 20), default=1024, show_default=True, help="Limit per query, MB."
 )
 @click.option("--token-file", type=click.Path(path_type=Path), help="File with the token that permits updates.")
-def serve(workspace: Path, port: int, host: str, timeout: float, memory: int, token_file: Path | None) -> None:
+def serve(
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+    port: int,
+    host: str,
+    timeout: float,
+    memory: int,
+    token_file: Path | None,
+) -> None:
     """Serve the plant's pages at / and the graph as a SPARQL endpoint at /sparql.
 
     A query page is at /query, live robots at /live, the ontology and each individual at the paths of their IRIs. Prices
     are shown where `plant.toml` in the workspace says price_per_kwh, currency and co2_kg_per_kwh. The endpoint is
     read-only unless you give a token for updates, in a file or in the environment variable IRTWIN_TOKEN.
+
+    With --graph the pages and the endpoint ask the server that keeps the graph. Functions of series are not there
+    then, and a query that is cancelled may go on at that server, up to its own limit. --database is only read at the
+    start: the graph must know of robots if the database does.
     """
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
     from irtwin.serve.server import serve as serve_graph
+    from irtwin.serve.source import Source
 
     limits = Limits(seconds=timeout, memory=memory << 20)
-    serve_graph(workspace / "graph", host, port, token=read_token(token_file), limits=limits, announce=_announce)
+    serve_graph(
+        Source(workspace, graph_url),
+        host,
+        port,
+        token=read_token(token_file),
+        limits=limits,
+        announce=_announce,
+        database=database,
+    )
 
 
 def _announce(address: str) -> None:

@@ -72,15 +72,17 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 
 @click.command()
 @workspace_option
+@database_option
+@graph_option
 @base_option
-def demo(workspace: Path, base: str | None) -> None:
+def demo(workspace: Path, database: str | None, graph_url: str | None, base: str | None) -> None:
     """Run the example data set: simulated logs of a KUKA KR6 R700."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
     data_set = unpack_demo(workspace)
     announce(f"The example data set is in {data_set}. Use it as a template for your own.")
-    report = run_all(data_set, workspace, base=base, announce=announce)
+    report = run_all(data_set, workspace, database=database, graph_url=graph_url, base=base, announce=announce)
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
     click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
 

@@ -33,15 +33,16 @@ def drop(robot: str, run: str | None, workspace: Path, database: str | None, gra
 @click.command()
 @workspace_option
 @database_option
-def repair(workspace: Path, database: str | None) -> None:
-    """Rebuild a damaged graph from the database.
+@graph_option
+def repair(workspace: Path, database: str | None, graph_url: str | None) -> None:
+    """Rebuild a damaged or lost graph from the database.
 
     Lists the series, twins and diagnoses that are missing or altered; the exit status is then 2. A damaged database
     needs `restore`.
     """
     from irtwin import upkeep
 
-    upkeep.repair(workspace, database=database, announce=say)
+    upkeep.repair(workspace, database=database, graph_url=graph_url, announce=say)
     click.echo(workspace)
 
 

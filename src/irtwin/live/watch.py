@@ -7,7 +7,7 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from irtwin.providers.records import find_plan, find_robot, load_robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE
+from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 Announce = Callable[[str], None]
@@ -65,6 +66,7 @@ def watch(
     with (
         told_when_full(workspace),
         Workspace.existing(workspace, database) as place,
+        _alone(place, graph_url),
         KnowledgeGraph.of_workspace(_checked(place), graph_url) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
         LiveTwin(place, graph, announce, broadcast) as twin,
@@ -89,6 +91,11 @@ def watch(
             _read(take, port, twin, done, announce)
     announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
+
+
+def _alone(place: Workspace, graph_url: str | None) -> AbstractContextManager[None]:
+    """Keep others from a server's graph, as the lock of a folder's store does by itself."""
+    return nullcontext() if graph_url is None else rewriting_alone(place.engine, place.folder)
 
 
 def _checked(place: Workspace) -> Workspace:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,15 @@ from starlette.types import Receive, Scope, Send
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.records import robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.serve.page import FOLDER, POLICY
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
+from irtwin.serve.source import Source
+from irtwin.serve.worker import SERVER_FAILS
 from irtwin.storage.files import read_document
 from irtwin.virtual.robot_data import robot_data
 
@@ -34,11 +35,11 @@ _POSES = """SELECT ?run ?name ?q {
 
 
 class LivePages:
-    """The pages of a workspace whose graph lies in `graph`."""
+    """The pages of a workspace."""
 
-    def __init__(self, graph: Path) -> None:
-        self._graph = graph
-        self.samples = Samples(graph.parent)
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.samples = Samples(source.workspace)
         self._robots: dict[str, bytes] = {}
         self._drawing = asyncio.Lock()
 
@@ -61,7 +62,9 @@ class LivePages:
                 if len(self._robots) >= _MOST_ROBOTS:
                     self._robots.clear()
                 try:
-                    self._robots[robot_id] = await asyncio.to_thread(_drawn, self._graph, robot_id)
+                    self._robots[robot_id] = await asyncio.to_thread(_drawn, self._source, robot_id)
+                except ServerFault:
+                    raise Refusal(502, SERVER_FAILS) from None
                 except InputError as error:
                     raise Refusal(404, str(error)) from None
         return Response(self._robots[robot_id], media_type="application/json", headers={"Cache-Control": "no-cache"})
@@ -86,15 +89,15 @@ def _page(name: str) -> Response:
     return Response((FOLDER / name).read_bytes(), media_type="text/html", headers={"Content-Security-Policy": POLICY})
 
 
-def _drawn(folder: Path, robot_id: str) -> bytes:
+def _drawn(source: Source, robot_id: str) -> bytes:
     """Return what robot.js builds a robot of, made of what the graph says of it, as JSON. Raises InputError."""
-    with Snapshot(folder) as snapshot:
-        graph = snapshot.current(False)
+    with source.reading() as current:
+        graph = current(False)
         iri = graph.iri(robot_iri(robot_id))
         if any(sign in iri for sign in '<>"{}|\\^` '):
             raise InputError(f"no robot {robot_id!r} here")
         robot = robot_of_graph(graph, iri)
-        meshes = meshes_of_graph(graph, iri, partial(read_document, folder.parent))
+        meshes = meshes_of_graph(graph, iri, partial(read_document, source.workspace))
         poses = _poses(graph, iri, robot.joint_names)
     return json.dumps(robot_data(robot, poses, meshes) | {"name": robot.name}, allow_nan=False).encode()
 

@@ -11,11 +11,11 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from irtwin.knowledge.store.linked import remove_left_behind
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.source import Source
 from irtwin.serve.turns import Displaced, Turns
 from irtwin.serve.worker import FRAME
 
@@ -47,9 +47,9 @@ class Worker:
         self.idle = True  # nothing of an answer is on its way
 
     @classmethod
-    async def start(cls, folder: Path, limits: Limits) -> Worker:
+    async def start(cls, source: Source, limits: Limits) -> Worker:
         """Start a process, and wait until it has opened the graph."""
-        arguments = map(str, (folder, limits.memory, limits.seconds, limits.answer))
+        arguments = map(str, (limits.memory, limits.seconds, limits.answer))
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "irtwin.serve.worker", *arguments),
             stdin=asyncio.subprocess.PIPE,
@@ -58,6 +58,7 @@ class Worker:
             start_new_session=True,  # Ctrl-C in the terminal is the server's alone
         )
         worker = cls(process, limits)
+        worker._write(source.telling())
         await worker._frame()
         return worker
 
@@ -73,9 +74,8 @@ class Worker:
 
     async def ask(self, request: dict[str, Any]) -> str:
         """Send a query; return the media type of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun."""
-        assert self._process.stdin is not None
         self.idle = False
-        self._process.stdin.write(json.dumps(request).encode() + b"\n")
+        self._write(request)
         try:
             kind, data = await self._frame()
         except Refusal:
@@ -105,6 +105,10 @@ class Worker:
         await self._process.stdout.read()  # asyncio takes a process for ended only once its pipes are empty
         await self._process.wait()
 
+    def _write(self, document: dict[str, Any]) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(document).encode() + b"\n")
+
     async def _frame(self) -> tuple[bytes, bytes]:
         assert self._process.stdout is not None
         try:
@@ -127,8 +131,8 @@ class Pool:
     Where there are several, no client holds the last one: a small query need not wait for another client's large ones.
     """
 
-    def __init__(self, folder: Path, size: int, limits: Limits):
-        self._folder = folder
+    def __init__(self, source: Source, size: int, limits: Limits):
+        self._source = source
         self._size = size
         self._limits = limits
         self._idle: Turns[Worker] = Turns(limits.waiting, max(1, size - 1))
@@ -144,7 +148,7 @@ class Pool:
         for task in self._starting:
             task.cancel()
         await asyncio.gather(*(worker.end() for worker in self.workers))
-        remove_left_behind(self._folder)
+        remove_left_behind(self._source.folder)
 
     @asynccontextmanager
     async def worker(self, client: str) -> AsyncIterator[Worker]:
@@ -190,6 +194,6 @@ class Pool:
         task.add_done_callback(self._starting.discard)
 
     async def _start(self) -> None:
-        worker = await Worker.start(self._folder, self._limits)
+        worker = await Worker.start(self._source, self._limits)
         self.workers.add(worker)
         self._idle.add(worker)

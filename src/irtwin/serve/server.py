@@ -23,8 +23,7 @@ from starlette.routing import Route
 
 from irtwin.asking import checked
 from irtwin.errors import InputError
-from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.knowledge.vocabulary import ID
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.report.plant.tariff import read_tariff
 from irtwin.serve import individuals, page
 from irtwin.serve.asking import Asking
@@ -36,33 +35,36 @@ from irtwin.serve.plant_pages import PlantPages
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
+from irtwin.serve.source import Source
 from irtwin.serve.updates import Updates
+from irtwin.storage.database import Workspace
 
 _GRACE = 3  # s that answers under way may still take when the server stops
 _LATE = "Cancel %s running task(s), timeout graceful shutdown exceeded"  # uvicorn's
 
 
 def serve(
-    graph: Path,
+    source: Source,
     host: str,
     port: int,
     *,
     token: str | None,
     limits: Limits,
     announce: Callable[[str], None],
+    database: str | None = None,
 ) -> None:
-    """Serve the graph in a folder until SIGINT or SIGTERM.
+    """Serve a workspace's graph until SIGINT or SIGTERM.
 
-    Port 0 takes a free one; `announce` is told the endpoint's address once it answers.
+    Port 0 takes a free one; `announce` is told the endpoint's address once it answers; `database` is the URL of the
+    workspace's database, which the graph is held against first.
     Raises InputError where the graph is missing, the port is taken, or the tariff cannot be used.
     """
-    with Snapshot(graph) as snapshot:  # what cannot be read is said here, once, rather than by each worker
-        base = snapshot.graph.base
-    read_tariff(graph.parent)  # likewise: later, a page would say it
+    base = _base(source, database)  # what cannot be read is said here, once, rather than by each worker
+    read_tariff(source.workspace)  # likewise: later, a page would say it
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
-    app = application(graph, host, token=token, limits=limits, base=base, opened=lambda: announce(address))
+    app = application(source, host, token=token, limits=limits, base=base, opened=lambda: announce(address))
     config = uvicorn.Config(
         app,
         http=Connection,
@@ -79,6 +81,27 @@ def serve(
     server = _Server(config, app.state.live_pages.samples.close)
     logging.getLogger("uvicorn.error").addFilter(_in_one_line)
     server.run(sockets=[listening])
+
+
+def _base(source: Source, database: str | None) -> str:
+    """Return the base of the graph's individuals.
+
+    Raises InputError where the graph cannot be read or, with the URL of a workspace's database, where that knows of
+    robots and the graph does not.
+    """
+    if database is not None:
+        with Workspace.existing(source.workspace, database) as place:
+            knows = place.knows_robots()
+            if source.url is None:
+                place.check_graph()
+    with source.reading() as current:
+        graph = current(False)
+        if database is not None and knows and not graph.graphs(GRAPH_SOURCE):
+            raise InputError(
+                f"{graph.shown}: the graph is empty, though the database knows of robots; "
+                f"`irtwin repair --workspace {source.workspace}` with the same --database and --graph fills it"
+            )
+        return graph.base
 
 
 class _Server(uvicorn.Server):
@@ -121,7 +144,7 @@ def read_token(file: Path | None) -> str | None:
 
 
 def application(
-    graph: Path,
+    source: Source,
     host: str,
     *,
     token: str | None,
@@ -133,13 +156,13 @@ def application(
 
     base: what the IRIs of the graph's individuals begin with.
     """
-    pool = Pool(graph, 1 + max(2, os.cpu_count() or 2), limits)
-    updates = Updates(graph, token, limits)
-    live = LivePages(graph)
-    resources = checked(graph.parent)
+    pool = Pool(source, 1 + max(2, os.cpu_count() or 2), limits)
+    updates = Updates(source, token, limits)
+    live = LivePages(source)
+    resources = checked(source.workspace)
     asking = Asking(pool, updates, limits, base)
-    reports = ReportFiles(graph.parent)
-    plant = PlantPages(graph.parent, asking, reports)
+    reports = ReportFiles(source.workspace)
+    plant = PlantPages(source.workspace, asking, reports)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:

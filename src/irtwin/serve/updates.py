@@ -8,22 +8,22 @@ import json
 import sys
 import time
 from dataclasses import asdict
-from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.snapshot import OLDEST
+from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
-from irtwin.serve.worker import limit_memory
+from irtwin.serve.source import Source
+from irtwin.serve.worker import SERVER_FAILS, limit_memory
 
 
 class Updates:
     """The way in for updates; closed where there is no token."""
 
-    def __init__(self, folder: Path, token: str | None, limits: Limits):
-        self._folder = folder
+    def __init__(self, source: Source, token: str | None, limits: Limits):
+        self._source = source
         self._token = token
         self._limits = limits
         self._turn = asyncio.Lock()
@@ -46,12 +46,12 @@ class Updates:
         if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
             raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
         async with self._turn:
-            await self._run({**asdict(operation), "base": base})
+            await self._run({**asdict(operation), "base": base, "source": self._source.telling()})
             self._last = time.monotonic()
 
     async def _run(self, request: dict[str, object]) -> None:
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "irtwin.serve.updates", str(self._folder), str(self._limits.memory)),
+            *(sys.executable, "-m", "irtwin.serve.updates", str(self._limits.memory)),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             start_new_session=True,
@@ -72,25 +72,36 @@ class Updates:
             raise Refusal(answer["status"], answer["message"], answer["headers"])
 
 
-def main(folder: Path, memory: int) -> None:
+def main(memory: int) -> None:
     """Do the update on standard input; write what is wrong with it. Both are JSON."""
-    leave_network()
+    request = json.load(sys.stdin.buffer)
+    source = Source.told(request["source"])
+    if source.url is None:
+        leave_network()
     answer: dict[str, object] = {}
     try:
-        graph = KnowledgeGraph(folder)
+        graph = source.writing()
+    except ServerFault as error:
+        answer = _server_fails(error)
     except InputError:
         message = "another process is writing the graph: try again later"
         answer = {"status": 503, "message": message, "headers": {"Retry-After": "5"}}
     else:
         with graph:
             limit_memory(memory)
-            request = json.load(sys.stdin.buffer)
             try:
                 graph.update(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
+            except ServerFault as error:
+                answer = _server_fails(error)
             except InputError as error:
                 answer = {"status": 400, "message": str(error), "headers": {}}
     json.dump(answer, sys.stdout)
 
 
+def _server_fails(error: ServerFault) -> dict[str, object]:
+    print(f"irtwin: {error}", file=sys.stderr)
+    return {"status": 502, "message": SERVER_FAILS, "headers": {}}
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]))
+    main(int(sys.argv[1]))

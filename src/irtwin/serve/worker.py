@@ -1,8 +1,9 @@
 """A process that answers one query at a time, so that a query can be ended for real: by ending the process.
 
-Oxigraph cannot be told to stop. The server writes one line of JSON to standard input for each query and reads frames
-from standard output: a letter, the length of what follows, and that. `B` says that the query begins, `H` is a head
-(JSON), `D` a piece of the answer, `E` the end. A head with a `status` is a refusal, and all that comes.
+Oxigraph cannot be told to stop. The server writes one line of JSON to standard input that says where the graph is, and
+one for each query, and reads frames from standard output: a letter, the length of what follows, and that. `B` says that
+the query begins, `H` is a head (JSON), `D` a piece of the answer, `E` the end. A head with a `status` is a refusal, and
+all that comes. Where a SPARQL server keeps the graph, a query that is ended here may go on there, up to its own limit.
 """
 
 from __future__ import annotations
@@ -16,17 +17,19 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, cast
 
-from pyoxigraph import QueryResultsFormat, QueryTriples, RdfFormat, serialize
+from pyoxigraph import QueryBoolean, QueryResultsFormat, QuerySolutions, RdfFormat, serialize
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
-from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.source import Source
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
+SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
 _PIECE = 1 << 20  # bytes; a failure before the first piece is full can still be told as such
 
 
@@ -64,11 +67,13 @@ class _Sink:
         self._held.clear()
 
 
-def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
-    """Answer queries on the graph in `folder` until standard input ends; bytes of memory and seconds for each."""
-    leave_network()
+def main(memory: int, seconds: float, most_bytes: int) -> None:
+    """Answer queries until standard input ends; bytes of memory and seconds for each."""
     out = sys.stdout.buffer
-    with Snapshot(folder) as snapshot:
+    source = Source.told(json.loads(sys.stdin.buffer.readline()))
+    if source.url is None:
+        leave_network()
+    with source.reading() as current:
         limit_memory(memory)
         _frame(out, b"H", b"{}")
         for line in sys.stdin.buffer:
@@ -76,7 +81,7 @@ def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
             request = json.loads(line)
             sink = _Sink(out, most_bytes)
             try:
-                graph = snapshot.current(request["at_once"])
+                graph = current(request["at_once"])
                 _frame(out, b"B", b"")
                 _answer(graph, request, sink)
             except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
@@ -87,17 +92,17 @@ def main(folder: Path, memory: int, seconds: float, most_bytes: int) -> None:
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
     found = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
-    offered = negotiation.TRIPLES if isinstance(found, QueryTriples) else negotiation.SOLUTIONS
+    offered = negotiation.SOLUTIONS if isinstance(found, QuerySolutions | QueryBoolean) else negotiation.TRIPLES
     media_type = negotiation.best(request["accept"], offered)
     if media_type is None:
         raise Refusal(406, f"this answer comes as {', '.join(offered)}; none of them is in Accept")
     sink.media_type = media_type
     name = offered[media_type]
     file = cast(IO[bytes], sink)
-    if isinstance(found, QueryTriples):
-        serialize(found, file, format=_RDF[name], prefixes=graph.prefixes)
-    else:
+    if isinstance(found, QuerySolutions | QueryBoolean):
         found.serialize(file, format=_RESULTS[name])
+    else:
+        serialize(found, file, format=_RDF[name], prefixes=graph.prefixes)
     sink.end()
 
 
@@ -113,6 +118,9 @@ _RESULTS = {
 def _refuse(out: IO[bytes], error: Exception) -> None:
     status = error.status if isinstance(error, Refusal) else 400 if isinstance(error, InputError) else 500
     message = "the query needs more memory than it may have" if isinstance(error, MemoryError) else str(error)
+    if isinstance(error, ServerFault):  # where the server is concerns who runs this one
+        print(f"irtwin: {error}", file=sys.stderr)
+        status, message = 502, SERVER_FAILS
     _frame(out, b"H", json.dumps({"status": status, "message": message}).encode())
 
 
@@ -139,4 +147,7 @@ def _frame(out: IO[bytes], kind: bytes, data: bytes) -> None:
 
 if __name__ == "__main__":
     with suppress(BrokenPipeError):  # the server is gone
-        main(Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))
+        try:
+            main(int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3]))
+        except InputError as error:  # the graph has gone since the server began
+            sys.exit(f"irtwin: {error}")

@@ -109,14 +109,17 @@ class Workspace:
 
     def check_graph(self) -> None:
         """Raise InputError where the graph's folder is not there, though the database knows of robots."""
-        with self.reading() as session:
-            robots = session.scalar(select(func.count()).select_from(Robot))
-        if robots and not (self.graph_folder / "CURRENT").is_file():
+        if self.knows_robots() and not (self.graph_folder / "CURRENT").is_file():
             raise InputError(
                 f"{self.graph_folder}: the graph is missing, or some of its files; the database is intact: "
                 f"`irtwin repair --workspace {self.folder}` rebuilds the graph from it (if a server keeps the "
                 "graph, give --graph)"
             )
+
+    def knows_robots(self) -> bool:
+        """Whether the database knows of any robot."""
+        with self.reading() as session:
+            return bool(session.scalar(select(func.count()).select_from(Robot)))
 
     @property
     def mapped_rows(self) -> Path:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
-from sqlalchemy.engine import URL
+from sqlalchemy.engine import URL, ExceptionContext
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
@@ -18,8 +18,15 @@ from irtwin.errors import InputError
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 _DAMAGE = ("malformed", "not a database", "could not decode to UTF-8", "Could not decode to UTF-8")
+_SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
 _FULL = ("is full", "disk I/O error")
+_OF_SERVER = {  # by the beginning of PostgreSQL's state
+    "42501": "this user may not do that; ask who runs the server for the right",
+    "25006": "the server takes no changes now; try again later",
+    "53": "the server is out of memory, disk or connections; ask who runs it",
+}
 BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
+_NO_LOCK = "55P03"  # PostgreSQL's state of a lock that was not had in time
 _WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
 
 
@@ -42,6 +49,8 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         event.listen(engine, "handle_error", lambda context: _tell(address, context.original_exception))
+    if engine.dialect.name == "postgresql":
+        event.listen(engine, "handle_error", lambda context: _tell_of_server(address, context))
     try:
         with engine.connect() as connection:
             if engine.dialect.name == "sqlite":
@@ -52,8 +61,9 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
 
 
 def shown(url: URL) -> str:
-    """Return a URL as messages may show it."""
-    return url.render_as_string(hide_password=True)
+    """Return a URL as messages may show it: without a password, which may stand among its parameters too."""
+    secret = {name: "***" for name in url.query if any(word in name.lower() for word in _SECRETS)}
+    return url.update_query_dict(secret).render_as_string(hide_password=True)
 
 
 @contextmanager
@@ -63,25 +73,38 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
     `restructuring`: SQLite changes a table by making another in its place; what refers to it is looked at afterwards.
     Raises InputError where another writer holds the database for longer than BUSY_TIMEOUT.
     """
-    with engine.connect().execution_options(writes=True) as connection, _free_keys(connection, restructuring):
+    with (
+        engine.connect().execution_options(writes=True) as connection,
+        _free_keys(connection, restructuring),
+        _turn(connection),
+    ):
+        with Session(connection) as session:
+            yield session
+            session.flush()
+        if restructuring and engine.dialect.name == "sqlite":
+            broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+            if broken is not None:
+                raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
+
+
+@contextmanager
+def _turn(connection: Connection) -> Iterator[None]:
+    """Begin a transaction once nobody else writes, and commit it. InputError where that takes too long."""
+    with ExitStack() as held:
         try:
-            transaction = connection.begin()
+            held.enter_context(connection.begin())
+            if connection.dialect.name == "postgresql":
+                connection.execute(text(f"SET LOCAL lock_timeout = {int(BUSY_TIMEOUT * 1000)}"))
+                connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _WRITER_LOCK})
+                connection.execute(text("SET LOCAL lock_timeout TO DEFAULT"))
         except OperationalError as error:
             if not _locked(error):
                 raise
             raise InputError(
-                f"{shown(engine.url)}: another process has been writing for {BUSY_TIMEOUT:g} s; try again later"
+                f"{shown(connection.engine.url)}: another process has been writing for {BUSY_TIMEOUT:g} s; "
+                "try again later"
             ) from None
-        with transaction:
-            if engine.dialect.name == "postgresql":
-                connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _WRITER_LOCK})
-            with Session(connection) as session:
-                yield session
-                session.flush()
-            if restructuring and engine.dialect.name == "sqlite":
-                broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
-                if broken is not None:
-                    raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
+        yield
 
 
 @contextmanager
@@ -141,6 +164,17 @@ def _tell(url: URL, error: BaseException) -> None:
         ) from error
 
 
+def _tell_of_server(url: URL, context: ExceptionContext) -> None:
+    """Raise InputError for what those who run a PostgreSQL server can mend."""
+    error = context.original_exception
+    state = str(getattr(error, "sqlstate", None) or "")
+    what = next((f"{said}; nothing was changed" for code, said in _OF_SERVER.items() if state.startswith(code)), None)
+    if context.is_disconnect and context.connection is not None:
+        what = "the connection to the database was lost; do it again"
+    if what is not None:
+        raise InputError(f"{shown(url)}: {what} ({' '.join(str(error).split())[:160]})") from error
+
+
 def _damaged(url: URL, reason: str) -> str:
     return (
         f"{url.database}: the database is damaged ({reason[:160]}); `irtwin restore ARCHIVE --workspace NEW` makes "
@@ -174,7 +208,8 @@ def _begin_sqlite(connection: Connection) -> None:
 
 
 def _locked(error: OperationalError) -> bool:
-    return isinstance(error.orig, sqlite3.OperationalError) and "locked" in str(error.orig)
+    in_sqlite = isinstance(error.orig, sqlite3.OperationalError) and "locked" in str(error.orig)
+    return in_sqlite or getattr(error.orig, "sqlstate", None) == _NO_LOCK
 
 
 def _reason(error: DBAPIError) -> str:

@@ -87,7 +87,7 @@ def restore(archive: Path, folder: Path, database: str | None = None, graph_url:
             sums = dict(unpack(archive, held, _NAMES))
             with KnowledgeGraph(graph_url or place.graph_folder, held) as graph:
                 if graph.graphs():
-                    raise InputError(f"{graph_url}: the server holds a graph already; give an empty one")
+                    raise InputError(f"{graph.shown}: the server holds a graph already; give an empty one")
                 with engine.writing(place.engine) as session:
                     for table in Base.metadata.sorted_tables:
                         _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")

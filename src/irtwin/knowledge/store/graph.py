@@ -114,6 +114,11 @@ class KnowledgeGraph:
         self._store = Store()
 
     @property
+    def shown(self) -> str:
+        """Where it is, as messages may say it: never with a password."""
+        return self._store.shown if isinstance(self._store, SparqlServer) else str(self.folder or "memory")
+
+    @property
     def resources(self) -> Resources:
         """The ontology, rules, shapes, mappings, questions and reports that hold for it: its workspace's too."""
         if self._resources is None:
@@ -167,7 +172,7 @@ class KnowledgeGraph:
         changed = sorted(name for name in names if not same(_read(new, name), _read(self._store, name)))
         if changed:
             self._forget_what_was_inferred(changed)
-            self._store.update(";\n".join(_replacement(name, _read(new, name)) for name in changed))
+            self._write(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
 
@@ -189,10 +194,17 @@ class KnowledgeGraph:
         if not taken and isinstance(self._store, Store):
             self._store.extend(_with_union(given))
         elif taken or given:
-            self._store.update(
+            self._write(
                 f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
                 f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
             )
+
+    def _write(self, text: str) -> None:
+        """Do an update of ours."""
+        if isinstance(self._store, SparqlServer):
+            self._store.change(text)
+        else:
+            self._store.update(text)
 
     def flush(self) -> None:
         """Put what `change` wrote into the store's files: who opens the graph to read replays the store's log."""

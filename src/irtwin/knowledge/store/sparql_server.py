@@ -1,8 +1,9 @@
 """A graph that a SPARQL 1.1 server keeps, asked and changed over HTTP.
 
-Two parts of the standard are used, which every server has: query by POST (`application/sparql-query`) and update by
-POST (`application/sparql-update`). The Graph Store Protocol is not: it replaces one graph at a time, and a change of
-several graphs and their union is to happen whole or not at all.
+Two parts of the standard are used, which every server has: query by POST with its parameters in the body (Virtuoso
+never answers a body of `application/sparql-query`) and update by POST (`application/sparql-update`). The Graph Store
+Protocol is not: it replaces one graph at a time, and a change of several graphs and their union is to happen whole or
+not at all.
 """
 
 from __future__ import annotations
@@ -35,7 +36,12 @@ if TYPE_CHECKING:
 TOKEN = "IRTWIN_GRAPH_TOKEN"  # environment variable: sent as a bearer token
 TIMEOUT = 300.0  # s without a byte from the server
 _ACCEPT = "application/sparql-results+json, application/n-triples;q=0.9"
+_FORM, _UPDATE = "application/x-www-form-urlencoded", "application/sparql-update"
 _AT_ONCE = 500  # triples looked up by one query
+
+
+class ServerFault(InputError):
+    """A server that cannot be reached, or does not do what it is asked for."""
 
 
 class SparqlServer:
@@ -50,9 +56,15 @@ class SparqlServer:
         """Ask the server whether it is there. Raises InputError, which never shows a password, where it is not."""
         address = _address(url)
         self.headers = {"User-Agent": "irtwin", **_credentials(address)}
-        self.query_url = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
+        host = address.netloc.rpartition("@")[2]
+        self.query_url = address._replace(netloc=host).geturl()
+        self.shown = address._replace(netloc=host, query="", fragment="").geturl()
         self.update_url = _update_url(self.query_url)
-        self.query("ASK {}")
+        if not isinstance(self.query("ASK {}"), QueryBoolean):
+            raise ServerFault(
+                f"{self.shown}: answers ASK by a table, as Virtuoso does: it departs from SPARQL 1.1 too far to keep a "
+                "graph; docs/findings/knowledge-graph.md says how, and which servers do not"
+            )
 
     def query(
         self,
@@ -65,10 +77,10 @@ class SparqlServer:
         custom_functions: Mapping[NamedNode, Any] | None = None,
     ) -> QuerySolutions | QueryBoolean | QueryTriples:
         """Answer a query. SyntaxError where the server refuses its text; functions are those that the server has."""
-        graphs = [("default-graph-uri", name.value) for name in default_graph or () if isinstance(name, NamedNode)]
-        graphs += [("named-graph-uri", name.value) for name in named_graphs or ()]
-        url = f"{self.query_url}?{urlencode(graphs)}" if graphs else self.query_url
-        response = self._post(url, "query", _with_prologue(text, base_iri, prefixes), _ACCEPT)
+        asked = [("query", _with_prologue(text, base_iri, prefixes))]
+        asked += [("default-graph-uri", name.value) for name in default_graph or () if isinstance(name, NamedNode)]
+        asked += [("named-graph-uri", name.value) for name in named_graphs or ()]
+        response = self._post(self.query_url, "query", urlencode(asked), _FORM, _ACCEPT)
         if response.headers.get_content_type() == "application/sparql-results+json":
             return parse_query_results(response, QueryResultsFormat.JSON)
         triples = (quad.triple for quad in parse(response, RdfFormat.N_TRIPLES))
@@ -76,7 +88,17 @@ class SparqlServer:
 
     def update(self, text: str, *, base_iri: str | None = None, prefixes: Mapping[str, str] | None = None) -> None:
         """Change the server's graphs, in the one transaction that it makes of a request."""
-        self._post(self.update_url, "update", _with_prologue(text, base_iri, prefixes), "*/*").read()
+        self._post(self.update_url, "update", _with_prologue(text, base_iri, prefixes), _UPDATE, "*/*").read()
+
+    def change(self, text: str) -> None:
+        """Do an update that irtwin wrote. Raises ServerFault where the server does not know SPARQL 1.1 well enough."""
+        try:
+            self.update(text)
+        except SyntaxError as error:
+            raise ServerFault(
+                f"{self.shown}: the server takes no SPARQL 1.1 Update on its default graph and named ones ({error}); "
+                "nothing was changed; docs/findings/knowledge-graph.md says which servers do"
+            ) from None
 
     def named_graphs(self) -> Iterator[NamedNode]:
         """Yield the names of graphs that hold something."""
@@ -103,24 +125,25 @@ class SparqlServer:
     def flush(self) -> None:
         """Do nothing: what a server answered is committed."""
 
-    def _post(self, url: str, kind: str, text: str, accept: str) -> HTTPResponse:
+    def _post(self, url: str, kind: str, text: str, media_type: str, accept: str) -> HTTPResponse:
         # a quarter of the imports of a command that asks a folder
         from http.client import HTTPException
         from urllib.error import HTTPError, URLError
         from urllib.request import Request, urlopen
 
-        headers = {**self.headers, "Content-Type": f"application/sparql-{kind}; charset=utf-8", "Accept": accept}
+        headers = {**self.headers, "Content-Type": f"{media_type}; charset=utf-8", "Accept": accept}
         try:
             request = Request(url, text.encode(), headers, method="POST")
             return cast("HTTPResponse", urlopen(request, timeout=TIMEOUT))
         except HTTPError as error:
-            said = " ".join(error.read(1000).decode(errors="replace").split())
+            said = " ".join(error.read(1000).decode(errors="replace").split())[:300]
             if error.code == 400:
                 raise SyntaxError(said) from None
-            raise InputError(f"{url}: the server refuses the {kind}: {error.code} {error.reason}. {said}") from None
+            refused = f"{error.code} {error.reason}. {said}"
+            raise ServerFault(f"{self.shown}: the server refuses the {kind}: {refused}") from None
         except (URLError, HTTPException, OSError) as error:
             reason = error.reason if isinstance(error, URLError) else error
-            raise InputError(f"{url}: no SPARQL server answers: {reason}") from None
+            raise ServerFault(f"{self.shown}: no SPARQL server answers: {reason}") from None
 
 
 def is_url(place: object) -> bool:

@@ -1,0 +1,63 @@
+"""Who rewrites the graph of a workspace: one process at a time, told by its database.
+
+The graph may lie on a server that knows no locks, and rows lie where all who write to a workspace meet. A process that
+is killed holds nothing any more: PostgreSQL lets go with its connection, the system with its file.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from sqlalchemy import Engine, text
+
+from irtwin.errors import InputError
+from irtwin.storage import engine as engines
+
+_KEY = 0x6972746772  # "irtgr": the advisory lock on PostgreSQL, beside that of writers of rows
+_FILE = ".graph.turn"
+_AGAIN = 0.05  # s between two tries
+
+
+@contextmanager
+def rewriting_alone(engine: Engine, folder: Path) -> Iterator[None]:
+    """Be the only process that rewrites the graph of the workspace in `folder` with this database.
+
+    Raises InputError where another one does so for longer than `engine.BUSY_TIMEOUT`.
+    """
+    with ExitStack() as held:
+        taken = _on_server(engine, held) if engine.dialect.name == "postgresql" else _in_folder(folder, held)
+        give_up = time.monotonic() + engines.BUSY_TIMEOUT
+        while not taken():
+            if time.monotonic() > give_up:
+                raise InputError(
+                    f"{folder}: another process has been rewriting the graph for {engines.BUSY_TIMEOUT:g} s; "
+                    "try again later, or stop `irtwin live`"
+                )
+            time.sleep(_AGAIN)
+        yield
+
+
+def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:
+    connection = held.enter_context(engine.connect().execution_options(isolation_level="AUTOCOMMIT"))
+    held.callback(connection.invalidate)  # closes it, so that nothing is held that was not given back
+    return lambda: bool(connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": _KEY}))
+
+
+def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
+    try:
+        file = held.enter_context((folder / _FILE).open("ab"))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+    def taken() -> bool:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True
+
+    return taken
