@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -146,3 +147,18 @@ def test_factors_by_products_hold_the_same_products_though_columns_repeat_or_are
     size = np.sqrt(np.diag(expected))
     scaled = (found - expected)[np.ix_(size > 0, size > 0)] / np.outer(size[size > 0], size[size > 0])
     assert np.abs(scaled).max() < 1e-13
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux copies processes")
+@pytest.mark.parametrize("by_products", [False, True])
+def test_a_copy_of_the_process_makes_the_same_blocks(monkeypatch, by_products):
+    motions = [measure(ROBOT, swing(ROBOT, k, seconds=12)) for k in range(3)]
+    alone = accumulate(motions, equations, STACK.pattern, by_products=by_products)
+    monkeypatch.setattr(room, "_SHARED", 0)
+    monkeypatch.setattr(room, "can_copy", lambda: True)
+    halves = accumulate(motions, equations, STACK.pattern, by_products=by_products)
+    for one, same in zip(alone, halves, strict=True):
+        assert (one.run, one.start, one.stop) == (same.run, same.start, same.stop)
+        np.testing.assert_array_equal(one.rows, same.rows)
+        for factor, other in zip(one.factors, same.factors, strict=True):
+            np.testing.assert_array_equal(factor, other)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from irtwin.errors import InputError
+from irtwin.identification.two_processes import can_copy, shared
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
 
@@ -48,6 +49,7 @@ _CHUNK = 8192  # samples whose columns are held at once,
 _ROWS = 2048  # of which no more than this are left by decimation: they stay in the processor's cache
 _PANEL = 64  # columns that LAPACK takes together
 _ROUNDING = 1e-15  # of a column's square: less of what others leave of it is rounding
+_SHARED = 5e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
 _BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
@@ -92,16 +94,23 @@ def accumulate_any(
     total = sum(_seconds(motion) for motion in motions)
     kind = _Products if by_products else _Triangle
     found = [_Growing(motion, *stretch, pattern, kind) for motion in motions for stretch in _stretches(motion, total)]
+    samples = sum(len(motion.time) for motion in motions)
+    alone = samples * int(pattern.sum()) < _SHARED or not can_copy()
+    blocks = _grown(found, equations) if alone else shared(lambda some: _grown(some, equations), found)
+    return [block for block in blocks if block.rows.any()]
+
+
+def _grown(growing: Sequence[_Growing], equations: Equations) -> list[Block]:
     with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
-        for one in found:
+        for one in growing:
             for sample in one.samples(equations):
                 if adding:
                     adding.result()
                 adding = other.submit(one.add, sample)
         if adding:
             adding.result()
-    return [one.block() for one in found if one.rows.any()]
+    return [one.block() for one in growing]
 
 
 def _nothing_left(motions: Sequence[Motion]) -> InputError:
