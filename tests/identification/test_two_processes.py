@@ -9,7 +9,8 @@ import threading
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.identification.two_processes import can_copy, in_copy, shared
+from irtwin.identification import two_processes
+from irtwin.identification.two_processes import begun, can_copy, in_copy, shared
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux copies processes")
 
@@ -63,3 +64,21 @@ def test_no_copy_is_made_beside_another_thread_or_on_one_processor(monkeypatch):
     monkeypatch.setattr(threading, "active_count", lambda: 1)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1})
     assert not can_copy()
+
+
+@pytest.mark.parametrize("worth", [True, False])
+def test_work_that_is_begun_is_done_in_a_copy_where_it_is_worth_one(monkeypatch, worth):
+    monkeypatch.setattr(two_processes, "can_copy", lambda: True)
+    result = begun(lambda: (in_copy(), [1, 2]), worth=worth)
+    assert result() == (worth, [1, 2])
+
+
+def test_an_error_in_what_was_begun_is_raised_when_it_is_asked_for(monkeypatch):
+    monkeypatch.setattr(two_processes, "can_copy", lambda: True)
+
+    def work():
+        raise InputError("the log is wrong")
+
+    result = begun(work, worth=True)
+    with pytest.raises(InputError, match="the log is wrong"):
+        result()

@@ -9,11 +9,10 @@ import threading
 import traceback
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
-Work = Callable[[Sequence[Item]], Sequence[Made]]
 
 _copied = False
 
@@ -34,43 +33,74 @@ def can_copy() -> bool:
     return threading.active_count() == 1 and len(os.sched_getaffinity(0)) > 1
 
 
-def shared(work: Work[Item, Made], items: Sequence[Item]) -> list[Made]:
-    """Return what `work` makes of the items, one of each and in their order: of the later half in a copy.
+def shared(work: Callable[[Sequence[Item]], Sequence[Made]], items: Sequence[Item]) -> list[Made]:
+    """Return what `work` makes of the items, in their order: of the later half in a copy.
 
     What is made has to be one that can be pickled. Raises what the work raises, and ChildProcessError where the copy
     ended before its time.
     """
-    context = multiprocessing.get_context("fork")
     middle = -(-len(items) // 2)
-    receiving, sending = context.Pipe(duplex=False)
-    other = context.Process(target=_send, args=(sending, work, items[middle:]), daemon=True)
-    other.start()
-    sending.close()
-    try:
-        made = list(work(items[:middle]))
-        for _ in items[middle:]:
-            one = receiving.recv()
-            if isinstance(one, BaseException):
-                raise one
-            made.append(one)
-    except EOFError as gone:
-        other.join()
-        raise ChildProcessError(f"the process with half of the work ended with {other.exitcode}") from gone
-    finally:
-        receiving.close()
-        other.terminate()
-        other.join()
-    return made
+    with _Copy(lambda: work(items[middle:])) as other:
+        return [*work(items[:middle]), *other.made()]
 
 
-def _send(to: Connection, work: Work[Item, Made], items: Sequence[Item]) -> None:
+def begun(work: Callable[[], Made], *, worth: bool) -> Callable[[], Made]:
+    """Return what gives the result of `work`: from a copy that begins now, if it is `worth` one and may be made.
+
+    Otherwise it is worked out when it is asked for. Raises, when asked, as `shared` does.
+    """
+    if not (worth and can_copy()):
+        return work
+    other = _Copy(lambda: [work()])
+
+    def result() -> Made:
+        with other:
+            return other.made()[0]
+
+    return result
+
+
+class _Copy(Generic[Made]):
+    """A copy of this process at work."""
+
+    def __init__(self, work: Callable[[], Sequence[Made]]):
+        context = multiprocessing.get_context("fork")
+        self._from, to = context.Pipe(duplex=False)
+        self._process = context.Process(target=_send, args=(to, work), daemon=True)
+        self._process.start()
+        to.close()
+
+    def __enter__(self) -> _Copy[Made]:
+        return self
+
+    def made(self) -> list[Made]:
+        """Wait for what the work makes."""
+        try:
+            count = self._from.recv()
+            if isinstance(count, BaseException):
+                raise count
+            return [self._from.recv() for _ in range(count)]
+        except EOFError as gone:
+            self._process.join()
+            raise ChildProcessError(
+                f"the process with a part of the work ended with {self._process.exitcode}"
+            ) from gone
+
+    def __exit__(self, *_: object) -> None:
+        self._from.close()
+        self._process.terminate()
+        self._process.join()
+
+
+def _send(to: Connection, work: Callable[[], Sequence[Made]]) -> None:
     global _copied
     _copied = True
     try:
-        made = work(items)
+        made = work()
     except Exception as error:  # raised there, where the work was asked for
         error.add_note(traceback.format_exc())
         to.send(error)
         return
+    to.send(len(made))
     for one in made:  # one by one: together they would take their memory twice
         to.send(one)
