@@ -131,7 +131,7 @@ def _values(stack: Stack, signal: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a diagnosis took: wall clock and processor, s; most memory at once, MB."""
+    """What a diagnosis took: wall clock and processor of all its processes, s; most memory of one of them, MB."""
 
     seconds: float
     processor: float

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -123,3 +124,41 @@ def test_columns_may_come_in_several_arrays_or_when_asked_for():
     for one, other in zip(whole, accumulate(motions, apart, STACK.pattern), strict=True):
         for factor, same in zip(one.factors, other.factors, strict=True):
             np.testing.assert_allclose(same.T @ same, factor.T @ factor, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("rows", [5, 40, 3000])
+def test_factors_by_products_hold_the_same_products_though_columns_repeat_or_are_empty(monkeypatch, rows):
+    monkeypatch.setattr(room, "_BLOCKS", 1)
+    rng = np.random.default_rng(rows)
+    columns = rng.standard_normal((rows, 1, 12)) * np.logspace(-5, 5, 12)
+    columns[..., 3], columns[..., 7] = columns[..., 2] + 2 * columns[..., 4], 0.0
+    motion = replace(swing(ROBOT, 0, seconds=rows / 100), cutoff=None)
+    measured = rng.standard_normal((rows, 1))
+
+    def given(piece):
+        cut = slice(piece.start, piece.start + len(piece.time))
+        return Rows(columns[cut], np.zeros_like(measured[cut]), measured[cut])
+
+    pattern = np.ones((1, 12), dtype=bool)
+    (plain,), (fast,) = (accumulate([motion], given, pattern, by_products=fast) for fast in (False, True))
+    expected, found = (block.factors[0].T @ block.factors[0] for block in (plain, fast))
+    assert fast.factors[0].shape[0] <= 13
+    assert fast.rows.tolist() == plain.rows.tolist()
+    size = np.sqrt(np.diag(expected))
+    scaled = (found - expected)[np.ix_(size > 0, size > 0)] / np.outer(size[size > 0], size[size > 0])
+    assert np.abs(scaled).max() < 1e-13
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux copies processes")
+@pytest.mark.parametrize("by_products", [False, True])
+def test_a_copy_of_the_process_makes_the_same_blocks(monkeypatch, by_products):
+    motions = [measure(ROBOT, swing(ROBOT, k, seconds=12)) for k in range(3)]
+    alone = accumulate(motions, equations, STACK.pattern, by_products=by_products)
+    monkeypatch.setattr(room, "_SHARED", 0)
+    monkeypatch.setattr(room, "can_copy", lambda: True)
+    halves = accumulate(motions, equations, STACK.pattern, by_products=by_products)
+    for one, same in zip(alone, halves, strict=True):
+        assert (one.run, one.start, one.stop) == (same.run, same.start, same.stop)
+        np.testing.assert_array_equal(one.rows, same.rows)
+        for factor, other in zip(one.factors, same.factors, strict=True):
+            np.testing.assert_array_equal(factor, other)

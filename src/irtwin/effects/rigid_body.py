@@ -9,6 +9,7 @@ from weakref import ReferenceType, ref
 import numpy as np
 import pinocchio as pin
 
+from irtwin.effects.body_regressor import body_regressor
 from irtwin.effects.effect import Effect, Predicted, Term
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
@@ -178,12 +179,7 @@ def _regressor(robot: Robot, motion: Motion) -> np.ndarray:
     found = _last.of(robot, motion)
     if found is not None:
         return found
-    model = robot.model
-    data = model.createData()
-    regressor = np.empty((len(motion.time), model.nv, 10 * model.nv))
-    regress = pin.computeJointTorqueRegressor
-    for row, state in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-        regressor[row] = regress(model, data, *state)
+    regressor = body_regressor(robot.model, motion.q, motion.dq, motion.ddq)
     regressor.flags.writeable = False
     _last.keep(robot, motion, regressor)
     return regressor

@@ -54,6 +54,7 @@ from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.threads import one_blas_thread
+from irtwin.identification.two_processes import begun
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
@@ -208,6 +209,7 @@ def diagnose(
     findings = [one.finding for one in explained]
     tell("Identifying the twin with its causes")
     causes = [cause for finding in findings for cause in finding.causes]
+    twin_with_causes = begun(lambda: closed_twin(case, causes), worth=case.long)
     blamed = {cause.effect for cause in causes}
     screened = (LocalEffect,) if case.shows("torque") else ()
     silent = [
@@ -245,7 +247,7 @@ def diagnose(
         experiment=None if proposal is None else proposal.experiment,
         planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
         curves=drawn(left, located, None if proposal is None else proposal.curve),
-        twin=closed_twin(case, causes),
+        twin=twin_with_causes(),
         energies=energies,
         not_repeating=tuple(differ),
         removed=tuple(taken),

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from irtwin.errors import InputError
+from irtwin.identification.two_processes import can_copy, shared
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
 
@@ -47,6 +48,8 @@ Equations = Callable[[Motion], Rows]
 _CHUNK = 8192  # samples whose columns are held at once,
 _ROWS = 2048  # of which no more than this are left by decimation: they stay in the processor's cache
 _PANEL = 64  # columns that LAPACK takes together
+_ROUNDING = 1e-15  # of a column's square: less of what others leave of it is rounding
+_SHARED = 5e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
 _BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
@@ -56,8 +59,8 @@ _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly i
 class Block:
     """A stretch of a run, reduced.
 
-    `factors[e]` is the triangular factor of equation e's rows of [columns | measurement], (r, k_e + 1) with
-    r <= k_e + 1; `rows` (g,) is how many each equation had.
+    `factors[e]` is a factor, (r, k_e + 1) with r <= k_e + 1, of equation e's rows of [columns | measurement]: with the
+    same products of columns; `rows` (g,) is how many each equation had.
     """
 
     run: str
@@ -67,33 +70,47 @@ class Block:
     factors: tuple[np.ndarray, ...]
 
 
-def accumulate(motions: Sequence[Motion], equations: Equations, pattern: np.ndarray) -> list[Block]:
+def accumulate(
+    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False
+) -> list[Block]:
     """Reduce the motions to blocks.
 
     `pattern`: (g, K) which columns each equation has. What is computed from the motion passes the filter that its
     measurement went through (its `cutoff`), and both are then decimated to what lies below it. Half a kernel at
-    either end of a run is left out, where a filter knows only one side. Raises InputError where nothing is left.
+    either end of a run is left out, where a filter knows only one side. `by_products`: factors are worked out of the
+    products of columns, in a quarter of the time where these are many; they are no triangles, and what is below 1e-8 of
+    a column is lost in rounding. Raises InputError where nothing is left.
     """
-    found = accumulate_any(motions, equations, pattern)
+    found = accumulate_any(motions, equations, pattern, by_products=by_products)
     if not found:
         raise _nothing_left(motions)
     return found
 
 
-def accumulate_any(motions: Sequence[Motion], equations: Equations, pattern: np.ndarray) -> list[Block]:
+def accumulate_any(
+    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False
+) -> list[Block]:
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
-    found = [_Growing(motion, *stretch, pattern) for motion in motions for stretch in _stretches(motion, total)]
+    kind = _Products if by_products else _Triangle
+    found = [_Growing(motion, *stretch, pattern, kind) for motion in motions for stretch in _stretches(motion, total)]
+    samples = sum(len(motion.time) for motion in motions)
+    alone = samples * int(pattern.sum()) < _SHARED or not can_copy()
+    blocks = _grown(found, equations) if alone else shared(lambda some: _grown(some, equations), found)
+    return [block for block in blocks if block.rows.any()]
+
+
+def _grown(growing: Sequence[_Growing], equations: Equations) -> list[Block]:
     with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
-        for one in found:
+        for one in growing:
             for sample in one.samples(equations):
                 if adding:
                     adding.result()
                 adding = other.submit(one.add, sample)
         if adding:
             adding.result()
-    return [one.block() for one in found if one.rows.any()]
+    return [one.block() for one in growing]
 
 
 def _nothing_left(motions: Sequence[Motion]) -> InputError:
@@ -123,6 +140,49 @@ def triangle(rows: np.ndarray) -> np.ndarray:
     return np.triu(factored[: rows.shape[1]])
 
 
+class _Triangle:
+    """Rows of k columns, reduced to a triangle as they come."""
+
+    def __init__(self, columns: int):
+        self._factor = np.zeros((0, columns))
+
+    def add(self, rows: np.ndarray) -> None:
+        self._factor = triangle(np.concatenate([self._factor, rows]))
+
+    def factor(self) -> np.ndarray:
+        return self._factor
+
+
+class _Products:
+    """Rows of k columns, kept while they are few, and then as the products of their columns."""
+
+    def __init__(self, columns: int):
+        self._few: np.ndarray | None = np.zeros((0, columns))
+        self._products = np.zeros((0, 0))
+
+    def add(self, rows: np.ndarray) -> None:
+        if self._few is None:
+            self._products += rows.T @ rows
+            return
+        self._few = np.concatenate([self._few, rows])
+        if len(self._few) > self._few.shape[1]:
+            self._products, self._few = self._few.T @ self._few, None
+
+    def factor(self) -> np.ndarray:
+        return root(self._products) if self._few is None else self._few
+
+
+def root(products: np.ndarray) -> np.ndarray:
+    """Return a factor (r, k), r <= k, of products of columns (k, k): its own are these."""
+    size = np.sqrt(np.diag(products))
+    size[size == 0] = 1.0
+    scaled = products / size / size[:, None]
+    factored, order, rank, _ = lapack.dpstrf(scaled, tol=_ROUNDING)
+    found = np.empty((rank, len(size)))
+    found[:, order - 1] = np.triu(factored)[:rank] * size[order - 1]
+    return found
+
+
 def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
     """Cut a motion into the sample ranges of its blocks, of equal length."""
     seconds = _seconds(motion)
@@ -135,11 +195,11 @@ def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
 class _Growing:
     """A block, from sample `start` to `stop` (exclusive) of a motion, whose factors grow part by part."""
 
-    def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray):
+    def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray, kind: type[_Triangle | _Products]):
         self._motion, self._start, self._stop, self._pattern = motion, start, stop, pattern
         self._taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
         self._step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
-        self._factors = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
+        self._reduced = [kind(int(row.sum()) + 1) for row in pattern]
         self.rows = np.zeros(len(pattern), dtype=int)
 
     def samples(self, equations: Equations) -> Iterator[Rows]:
@@ -153,11 +213,12 @@ class _Growing:
 
     def add(self, sample: Rows) -> None:
         """Take in a part, filtered and decimated."""
-        parts = self._reduced(sample)
+        parts = self._thinned(sample)
         self.rows += [len(part) for part in parts]
-        self._factors = [triangle(np.concatenate(pair)) for pair in zip(self._factors, parts, strict=True)]
+        for reduced, part in zip(self._reduced, parts, strict=True):
+            reduced.add(part)
 
-    def _reduced(self, sample: Rows) -> list[np.ndarray]:
+    def _thinned(self, sample: Rows) -> list[np.ndarray]:
         """Return each equation's rows of [columns | measurement], filtered and decimated."""
         taps, step = self._taps, self._step
         half = len(taps) // 2
@@ -175,4 +236,4 @@ class _Growing:
         """Return what the block has become."""
         time = self._motion.time
         ends = float(time[self._start]), float(time[self._stop - 1])
-        return Block(self._motion.run, *ends, self.rows, tuple(self._factors))
+        return Block(self._motion.run, *ends, self.rows, tuple(reduced.factor() for reduced in self._reduced))

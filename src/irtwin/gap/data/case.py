@@ -22,6 +22,8 @@ from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
 
+_LONG = 50_000  # samples: a fit of the twin to them takes some 1 s, a copy of the process 0.1 s
+
 
 @dataclass(frozen=True)
 class Case:
@@ -96,6 +98,11 @@ class Case:
     def measured(self) -> list[Motion]:
         """The motions whose torque is known or whose power was measured."""
         return [one for one in self.motions.values() if one.torque is not None or one.power is not None]
+
+    @property
+    def long(self) -> bool:
+        """Whether there are so many samples that work on all of them is worth a copy of the process."""
+        return sum(len(motion.time) for motion in self.motions.values()) >= _LONG
 
     @property
     def run_offsets(self) -> list[Effect]:

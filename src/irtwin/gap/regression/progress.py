@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from irtwin.identification.accumulate import Equations, Rows
+from irtwin.identification.two_processes import in_copy
 from irtwin.signals.motion import Motion
 
 Tell = Callable[[str], None]
@@ -22,7 +23,7 @@ def with_progress(equations: Equations, motions: Sequence[Motion], tell: Tell | 
 
     def asked(motion: Motion) -> Rows:
         nonlocal said
-        if time.monotonic() - said >= _EVERY:
+        if time.monotonic() - said >= _EVERY and not in_copy():
             said = time.monotonic()
             share = 100 * motion.start // len((motion.whole or motion).time)
             tell(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")

@@ -22,6 +22,7 @@ from irtwin.gap.screening.local import local_effects
 from irtwin.gap.screening.payloads import UntoldPayload, untold_payload
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.screening.ripples import fast_ripples
+from irtwin.identification.two_processes import begun
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
@@ -55,13 +56,14 @@ def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
         residual = torque_residual(stack, motion, values)
         observed = motion.run in case.observed
         left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
+    in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
-    return Screened(
-        contact(case.robot, left, noise, limits.contact),
+    others = (
         untold_payload(case.robot, system, noise, limits.some_payload, seed),
         tuple(fast_ripples(case.robot, left, limits.ripples.least_share)),
         tuple(local_effects(case.robot, known, left, limits.local, seed)),
     )
+    return Screened(in_contact(), *others)
 
 
 def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, float] | None] | None:

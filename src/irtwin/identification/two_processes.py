@@ -1,0 +1,106 @@
+"""Long work shared between this process and a copy of it: Python's lock lets threads do little of it side by side."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+_copied = False
+
+
+def in_copy() -> bool:
+    """Return whether this process is such a copy: what it tells, the other tells too."""
+    return _copied
+
+
+def can_copy() -> bool:
+    """Return whether a copy may be made, and would have a processor of its own.
+
+    That needs Linux, where a copy takes neither time nor memory of its own. It has no threads, so what another thread
+    of this process holds would be held in it for ever. Who is a worker of others already is to make no more.
+    """
+    if not sys.platform.startswith("linux") or multiprocessing.current_process().daemon:
+        return False
+    return threading.active_count() == 1 and len(os.sched_getaffinity(0)) > 1
+
+
+def shared(work: Callable[[Sequence[Item]], Sequence[Made]], items: Sequence[Item]) -> list[Made]:
+    """Return what `work` makes of the items, in their order: of the later half in a copy.
+
+    What is made has to be one that can be pickled. Raises what the work raises, and ChildProcessError where the copy
+    ended before its time.
+    """
+    middle = -(-len(items) // 2)
+    with _Copy(lambda: work(items[middle:])) as other:
+        return [*work(items[:middle]), *other.made()]
+
+
+def begun(work: Callable[[], Made], *, worth: bool) -> Callable[[], Made]:
+    """Return what gives the result of `work`: from a copy that begins now, if it is `worth` one and may be made.
+
+    Otherwise it is worked out when it is asked for. Raises, when asked, as `shared` does.
+    """
+    if not (worth and can_copy()):
+        return work
+    other = _Copy(lambda: [work()])
+
+    def result() -> Made:
+        with other:
+            return other.made()[0]
+
+    return result
+
+
+class _Copy(Generic[Made]):
+    """A copy of this process at work."""
+
+    def __init__(self, work: Callable[[], Sequence[Made]]):
+        context = multiprocessing.get_context("fork")
+        self._from, to = context.Pipe(duplex=False)
+        self._process = context.Process(target=_send, args=(to, work), daemon=True)
+        self._process.start()
+        to.close()
+
+    def __enter__(self) -> _Copy[Made]:
+        return self
+
+    def made(self) -> list[Made]:
+        """Wait for what the work makes."""
+        try:
+            count = self._from.recv()
+            if isinstance(count, BaseException):
+                raise count
+            return [self._from.recv() for _ in range(count)]
+        except EOFError as gone:
+            self._process.join()
+            raise ChildProcessError(
+                f"the process with a part of the work ended with {self._process.exitcode}"
+            ) from gone
+
+    def __exit__(self, *_: object) -> None:
+        self._from.close()
+        self._process.terminate()
+        self._process.join()
+
+
+def _send(to: Connection, work: Callable[[], Sequence[Made]]) -> None:
+    global _copied
+    _copied = True
+    try:
+        made = work()
+    except Exception as error:  # raised there, where the work was asked for
+        error.add_note(traceback.format_exc())
+        to.send(error)
+        return
+    to.send(len(made))
+    for one in made:  # one by one: together they would take their memory twice
+        to.send(one)
