@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, parse
 
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE
 
 GRAPH = GRAPH_SOURCE + "test"
@@ -52,8 +47,8 @@ LEDGER = """
 SUM = "column:sum(<urn:energy>, <urn:effect>, <urn:a>)"
 
 
-def graph_of(turtle: str, place: Path | None = None) -> KnowledgeGraph:
-    graph = KnowledgeGraph(place)
+def graph_of(turtle: str) -> KnowledgeGraph:
+    graph = KnowledgeGraph()
     graph.replace(in_graph((quad.triple for quad in parse(turtle, RdfFormat.TURTLE)), GRAPH), GRAPH)
     return graph
 
@@ -133,18 +128,6 @@ def test_columns_follow_every_change() -> None:
     assert ask(graph, SUM) is None
     graph.replace([six, Quad(six.subject, NamedNode("urn:effect"), NamedNode("urn:a"), NamedNode(GRAPH))], GRAPH)
     assert ask(graph, SUM) == 6.0
-
-
-def test_a_view_follows_what_another_process_writes(tmp_path: Path) -> None:
-    graph_of(LEDGER, tmp_path / "graph").close()
-    write = "from pyoxigraph import *; import sys; Store(sys.argv[1]).update(sys.argv[2])"
-    more = "INSERT DATA { <urn:4> <urn:energy> 100.0e0 ; <urn:effect> <urn:a> }"
-    with Snapshot(tmp_path / "graph") as snapshot:
-        before = snapshot.current()
-        assert ask(before, SUM) == 7.0
-        subprocess.run([sys.executable, "-c", write, tmp_path / "graph", more], check=True)
-        assert ask(before, SUM) == 7.0, "a view is of one state"
-        assert ask(snapshot.current(at_once=True), SUM) == 107.0
 
 
 def test_every_function_is_described_in_the_ontology() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -122,15 +122,20 @@ class Columns:
         values = pa.array(numbers, pa.float64())
         read = pa.table({"s": pairs[:, 0], "o": pairs[:, 1], "v": values})
         self._database.register("read", read)
-        self._database.execute(f"CREATE TABLE {name} AS SELECT * FROM read")
+        self._database.execute(f"CREATE TEMP TABLE {name} AS SELECT * FROM read")
         self._database.unregister("read")
         return name
 
     @cached_property
     def _database(self) -> duckdb.DuckDBPyConnection:
-        import duckdb
+        return _in_memory().cursor()  # its temporary tables are its own, and go with it
 
-        return duckdb.connect(config={"autoload_known_extensions": False, "autoinstall_known_extensions": False})
+
+@lru_cache(maxsize=1)
+def _in_memory() -> duckdb.DuckDBPyConnection:
+    import duckdb
+
+    return duckdb.connect(config={"autoload_known_extensions": False, "autoinstall_known_extensions": False})
 
 
 def _number(term: Any) -> float | None:

@@ -29,7 +29,7 @@ from irtwin.knowledge.store.column_functions import column_functions
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
 from irtwin.knowledge.store.rdf_input import read_rdf, refuse
-from irtwin.knowledge.store.reading import Reading
+from irtwin.knowledge.store.reading import KeptAnswers, Reading
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
 MOST_ROWS = 1_000_000
+_MOST_KEPT = 2_000  # values of an answer that is kept
 _NAMED_AT_ONCE = 5_000  # IRIs in a query
 URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
 _ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base }} }} LIMIT 1"
@@ -162,6 +163,11 @@ class KnowledgeGraph:
         finally:
             self._reading = Reading(self._store)
 
+    @property
+    def answers(self) -> KeptAnswers:
+        """Answers that hold until the graph is written to. Take it before the question is asked."""
+        return self._reading.answers
+
     @telling
     def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
         """Make the quads the whole content of the named graphs whose IRIs start with one of `below`.
@@ -261,10 +267,18 @@ class KnowledgeGraph:
         `bindings` gives variables the IRI that they stand for, whole or below the base. The usual prefixes need no
         PREFIX.        InputError where the text is no such query, asks another server, or has too many answers.
         """
+        text = bound(text, {name: self._term(one) for name, one in (bindings or {}).items()})
+        answers = self.answers
+        kept = answers.get(text)
+        if kept is None:
+            kept = self._table(text)
+            if len(kept) * len(kept.columns) <= _MOST_KEPT and not kept.faults:
+                answers.keep(kept, text)
+        return Table(kept.columns, tuple(map(dict, kept.rows)), kept.faults)  # rows that may be written to
+
+    def _table(self, text: str) -> Table:
         faults: dict[str, None] = {}
-        answer = self.answer(
-            bound(text, {name: self._term(one) for name, one in (bindings or {}).items()}), faults=faults
-        )
+        answer = self.answer(text, faults=faults)
         if isinstance(answer, QueryBoolean):
             return Table(("answer",), ({"answer": bool(answer)},))
         if isinstance(answer, QuerySolutions):
