@@ -27,11 +27,19 @@ class Engine(ABC):
 
     @abstractmethod
     def load(self, file: Path) -> None:
-        """Load N-Triples."""
+        """Load N-Triples: each triple of the graph once."""
+
+    def load_named(self, file: Path) -> None:
+        """Load N-Quads, each quad into its named graph."""
+        raise NotImplementedError("not tried")
 
     @abstractmethod
     def ask(self, text: str) -> Any:
         """Answer a SELECT in the store's own terms, all rows of it."""
+
+    def ask_again(self, text: str) -> Any:
+        """Answer what was asked before and has not changed since, where it keeps answers."""
+        raise NotImplementedError("keeps no answers")
 
     @abstractmethod
     def rows(self, answer: Any) -> Rows:
@@ -54,20 +62,29 @@ class Irtwin(Engine):
 
         super().__init__(folder)
         self.graph = KnowledgeGraph(folder / "graph")
+        self.changed: list[str] = []
 
     def load(self, file: Path) -> None:
         from irtwin.knowledge.store.graph import in_graph
 
         self.graph.replace(in_graph((quad.triple for quad in parse(path=file)), GRAPH), GRAPH)
 
+    def load_named(self, file: Path) -> None:
+        self.graph.replace(parse(path=file), "")
+
     def ask(self, text: str) -> Any:
         return list(self.graph.answer(text))
+
+    def ask_again(self, text: str) -> Any:
+        return self.graph.query(text)
 
     def rows(self, answer: Any) -> Rows:
         return [tuple(None if term is None else str(term) for term in row) for row in answer]
 
     def change(self, removed: str, added: str) -> None:
-        self.graph.change(_quads(removed), _quads(added))
+        """In the named graph of the first triple, which is looked up once."""
+        self.changed = self.changed or self.graph.graphs_with(_quads(removed)[0].triple)
+        self.graph.change(_quads(removed, self.changed[0]), _quads(added, self.changed[0]))
 
     def close(self, file: Path) -> set[str]:
         from irtwin.knowledge.owl_rl.closure import Closure
@@ -83,6 +100,7 @@ class IrtwinInMemory(Irtwin):
 
         Engine.__init__(self, folder)
         self.graph = KnowledgeGraph()
+        self.changed = []
 
 
 class Rdflib(Engine):
@@ -151,6 +169,38 @@ class Owlready(Engine):
         raise NotImplementedError("no OWL 2 RL")
 
 
+class Maplib(Engine):
+    """In memory, in columns; where its folder stands in PYTHONPATH (bench/README.md)."""
+
+    def __init__(self, folder: Path) -> None:
+        import maplib
+
+        super().__init__(folder)
+        self.model = maplib.Model()
+
+    def load(self, file: Path) -> None:
+        self.model.read(str(file), format="ntriples")
+
+    def ask(self, text: str) -> Any:
+        try:
+            return self.model.query(text)
+        except BaseException as error:  # what it has not is a panic, which is no Exception
+            raise NotImplementedError(str(error)) from None
+
+    def rows(self, answer: Any) -> Rows:
+        return [tuple(None if value is None else str(value) for value in row) for row in answer.rows()]
+
+    def change(self, removed: str, added: str) -> None:
+        """By patterns, as it has no DELETE DATA; each subject has one value of each predicate."""
+        triples = [quad.triple for quad in _quads(added)]
+        old = " . ".join(f"{triple.subject} {triple.predicate} ?v{at}" for at, triple in enumerate(triples))
+        new = " . ".join(map(str, triples))
+        self.model.update(f"DELETE {{ {old} }} INSERT {{ {new} }} WHERE {{ {old} }}")
+
+    def close(self, file: Path) -> set[str]:
+        raise NotImplementedError("no OWL 2 RL")
+
+
 class Jena(Engine):
     """In memory without transactions, its fastest store."""
 
@@ -171,6 +221,9 @@ class Jena(Engine):
 
     def load(self, file: Path) -> None:
         self.jena.riot.RDFDataMgr.read(self.dataset, str(file))
+
+    def load_named(self, file: Path) -> None:
+        self.load(file)
 
     def ask(self, text: str) -> Any:
         """Rows as TSV, written in Java: to fetch them one by one from Python would cost more than the query."""
@@ -214,6 +267,9 @@ class JenaOnDisk(Jena):
         loader.load(str(file))
         loader.finishBulk()
 
+    def load_named(self, file: Path) -> None:
+        self.load(file)
+
     def ask(self, text: str) -> Any:
         self.dataset.begin(self.jena.query.ReadWrite.READ)
         try:
@@ -235,6 +291,7 @@ ENGINES: dict[str, type[Engine]] = {
     "irtwin, in memory": IrtwinInMemory,
     "rdflib": Rdflib,
     "owlready2": Owlready,
+    "maplib": Maplib,
     "Jena": Jena,
     "Jena TDB2": JenaOnDisk,
 }
@@ -242,8 +299,8 @@ ENGINES: dict[str, type[Engine]] = {
 _JENA = re.compile("(jena|slf4j-api|commons|collection|caffeine|httpc|jackson|jsonld|libthrift)")
 
 
-def _quads(text: str | bytes) -> list[Quad]:
-    graph = NamedNode(GRAPH)
+def _quads(text: str | bytes, name: str = GRAPH) -> list[Quad]:
+    graph = NamedNode(name)
     found = (quad.triple for quad in parse(text, RdfFormat.N_TRIPLES))
     return [Quad(triple.subject, triple.predicate, triple.object, graph) for triple in found]
 

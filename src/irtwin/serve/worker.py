@@ -30,6 +30,7 @@ from irtwin.storage import windows  # noqa: F401  # before the memory is limited
 
 FRAME = struct.Struct(">cI")
 SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
+_MOST_KEPT = 1 << 16  # bytes of an answer that is kept
 _PIECE = 1 << 20  # bytes; a failure before the first piece is full can still be told as such
 
 
@@ -39,6 +40,7 @@ class _Sink:
     def __init__(self, out: IO[bytes], most_bytes: int):
         self.media_type = ""
         self.begun = False
+        self.small: bytes | None = None  # the whole answer, where it may be kept
         self._out = out
         self._left = most_bytes
         self._held = bytearray()
@@ -56,6 +58,8 @@ class _Sink:
         """Leave it to `end`: pieces are sent when they are full."""
 
     def end(self) -> None:
+        if not self.begun and len(self._held) <= _MOST_KEPT:
+            self.small = bytes(self._held)
         self._send()
         _frame(self._out, b"E", b"")
 
@@ -83,11 +87,25 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
             try:
                 graph = current(request["at_once"])
                 _frame(out, b"B", b"")
-                _answer(graph, request, sink)
+                _answer_once(graph, request, sink)
             except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
                 if sink.begun:
                     sys.exit(f"irtwin: an answer was broken off: {error}")
                 _refuse(out, error)
+
+
+def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
+    """Answer as before where the graph has not changed since; keep an answer that is small."""
+    answers, asked = graph.answers, (request["text"], json.dumps({**request, "at_once": None}, sort_keys=True))
+    kept = answers.get(*asked)
+    if kept is None:
+        _answer(graph, request, sink)
+        if sink.small is not None:
+            answers.keep((sink.media_type, sink.small), *asked)
+    else:
+        sink.media_type, body = kept
+        sink.write(body)
+        sink.end()
 
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:

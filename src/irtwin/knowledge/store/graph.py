@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -24,9 +25,11 @@ from pyoxigraph import (
 from irtwin.errors import InputError
 from irtwin.knowledge.store import changes, store_files
 from irtwin.knowledge.store.blank_nodes import has_blank_node, same
+from irtwin.knowledge.store.column_functions import column_functions
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
 from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.reading import KeptAnswers, Reading
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
 MOST_ROWS = 1_000_000
+_MOST_KEPT = 2_000  # values of an answer that is kept
 _NAMED_AT_ONCE = 5_000  # IRIs in a query
 URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
 _ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base }} }} LIMIT 1"
@@ -72,10 +76,12 @@ class KnowledgeGraph:
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
             self._store = Store() if place is None else SparqlServer(str(place))
+            self._reading = Reading(self._store)
             return
         check_files(self.folder)
         with told(self.folder):
             self._store = Store(str(self.folder))
+        self._reading = Reading(self._store)
         for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
             old.unlink(missing_ok=True)
 
@@ -96,6 +102,7 @@ class KnowledgeGraph:
         graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
         graph._workspace, graph._resources, graph._base = workspace or path.parent, None, None
+        graph._reading = Reading(graph._store)
         return graph
 
     def __enter__(self) -> Self:
@@ -112,6 +119,7 @@ class KnowledgeGraph:
                 self._store.flush()
                 store_files.note_sums(self.folder)
         self._store = Store()
+        self._reading = Reading(self._store)
 
     @property
     def shown(self) -> str:
@@ -152,6 +160,19 @@ class KnowledgeGraph:
             in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
         )
 
+    @contextmanager
+    def _writing(self) -> Iterator[Any]:
+        """Give the store to write to, and forget what was read of it: all writing goes this way."""
+        try:
+            yield self._store
+        finally:
+            self._reading = Reading(self._store)
+
+    @property
+    def answers(self) -> KeptAnswers:
+        """Answers that hold until the graph is written to. Take it before the question is asked."""
+        return self._reading.answers
+
     @telling
     def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
         """Make the quads the whole content of the named graphs whose IRIs start with one of `below`.
@@ -164,7 +185,8 @@ class KnowledgeGraph:
         old = self.graphs(*below)
         if isinstance(self._store, Store) and not old:
             self._forget_what_was_inferred(below)
-            self._store.bulk_extend(_with_union(quads))
+            with self._writing() as store:
+                store.bulk_extend(_with_union(quads))
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
@@ -172,7 +194,8 @@ class KnowledgeGraph:
         changed = sorted(name for name in names if not same(_read(new, name), _read(self._store, name)))
         if changed:
             self._forget_what_was_inferred(changed)
-            self._write(";\n".join(_replacement(name, _read(new, name)) for name in changed))
+            with self._writing():
+                self._write(";\n".join(_replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
 
@@ -191,13 +214,14 @@ class KnowledgeGraph:
         triples = {quad.triple for quad in taken}
         remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
         lost = triples - remaining - {quad.triple for quad in given}
-        if not taken and isinstance(self._store, Store):
-            self._store.extend(_with_union(given))
-        elif taken or given:
-            self._write(
-                f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
-                f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
-            )
+        with self._writing() as store:
+            if not taken and isinstance(store, Store):
+                store.extend(_with_union(given))
+            elif taken or given:
+                self._write(
+                    f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
+                    f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
+                )
 
     def _write(self, text: str) -> None:
         """Do an update of ours."""
@@ -255,10 +279,18 @@ class KnowledgeGraph:
         `bindings` gives variables the IRI that they stand for, whole or below the base. The usual prefixes need no
         PREFIX.        InputError where the text is no such query, asks another server, or has too many answers.
         """
+        text = bound(text, {name: self._term(one) for name, one in (bindings or {}).items()})
+        answers = self.answers
+        kept = answers.get(text)
+        if kept is None:
+            kept = self._table(text)
+            if len(kept) * len(kept.columns) <= _MOST_KEPT and not kept.faults:
+                answers.keep(kept, text)
+        return Table(kept.columns, tuple(map(dict, kept.rows)), kept.faults)  # rows that may be written to
+
+    def _table(self, text: str) -> Table:
         faults: dict[str, None] = {}
-        answer = self.answer(
-            bound(text, {name: self._term(one) for name, one in (bindings or {}).items()}), faults=faults
-        )
+        answer = self.answer(text, faults=faults)
         if isinstance(answer, QueryBoolean):
             return Table(("answer",), ({"answer": bool(answer)},))
         if isinstance(answer, QuerySolutions):
@@ -328,7 +360,8 @@ class KnowledgeGraph:
             change = as_change(text, self._holding, base, self.prefixes)
             if change is None:
                 self._forget_what_was_inferred([GRAPH_UPDATE])
-                self._store.update(keeping_union(text, base), base_iri=base, prefixes=self.prefixes)
+                with self._writing() as store:
+                    store.update(keeping_union(text, base), base_iri=base, prefixes=self.prefixes)
             else:
                 self.change(*change)
             self._store.flush()
@@ -397,10 +430,13 @@ class KnowledgeGraph:
             self.change(changes.made_of(self._store), ())
 
     def _functions(self, faults: dict[str, None]) -> Functions:
-        """Return the functions that reach the samples, where their files are known."""
-        if self._workspace is None or isinstance(self._store, SparqlServer):
+        """Return the functions that sum by columns, and those that reach the samples where their files are known."""
+        if isinstance(self._store, SparqlServer):
             return {}
-        return series_functions(self._store, self._workspace, faults)
+        functions = column_functions(self._reading.columns, self.prefixes, faults)
+        if self._workspace is None:
+            return functions
+        return functions | series_functions(self._store, self._workspace, faults)
 
 
 def read_turtle(file: Path) -> Iterator[Triple]:

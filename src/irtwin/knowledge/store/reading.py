@@ -1,0 +1,62 @@
+"""What was read of a graph since it was last written to: columns of its properties, and answers to queries.
+
+A store in memory, and one that is open to write, changes by its graph alone, which then begins a new `Reading`; a view
+of a folder never changes. So what is kept here is true for as long as it is there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable
+from functools import cached_property
+from threading import Lock
+from typing import Any
+
+from pyoxigraph import Store
+
+from irtwin.knowledge.store.columns import Columns
+from irtwin.knowledge.store.sparql_server import SparqlServer
+
+MOST_ANSWERS = 256
+# What answers anew each time, and the functions that read files; a backslash may hide them.
+_NOT_KEPT = re.compile(r"\\|series|\b(?:now|rand|uuid|struuid|bnode)\b", re.IGNORECASE)
+
+
+class Reading:
+    """What was read of a store that nobody wrote to since."""
+
+    def __init__(self, store: Store | SparqlServer) -> None:
+        self._store = store
+        self.answers = KeptAnswers(0 if isinstance(store, SparqlServer) else MOST_ANSWERS)  # others write to a server
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Columns of its properties; not of a server's graph."""
+        assert isinstance(self._store, Store)
+        return Columns(self._store)
+
+
+class KeptAnswers:
+    """Answers by what was asked, the texts first; of too many the one goes that was asked for longest ago."""
+
+    def __init__(self, most: int = MOST_ANSWERS) -> None:
+        self._most = most
+        self._answers: dict[Hashable, Any] = {}
+        self._lock = Lock()
+
+    def get(self, text: str, *beside: Hashable) -> Any:
+        """Return the answer to a query, asked in some way; None where none is kept."""
+        with self._lock:
+            found = self._answers.pop((text, *beside), None)
+            if found is not None:
+                self._answers[(text, *beside)] = found
+            return found
+
+    def keep(self, answer: Any, text: str, *beside: Hashable) -> None:
+        """Keep an answer, if the query's text alone says what it is."""
+        if not self._most or _NOT_KEPT.search(text):
+            return
+        with self._lock:
+            self._answers[(text, *beside)] = answer
+            if len(self._answers) > self._most:
+                del self._answers[next(iter(self._answers))]
