@@ -30,7 +30,9 @@ _TELLS = 0.2  # of a scale: deviation below which a joint tells what is usual
 _OTHERS = 3  # such joints, beside the one that differs
 _TURNS = 4  # of a scale far from one
 _ZERO = 0.03  # rad; links and gears give way by as much
+_GAIN = 2.0  # in the product of all residuals that a corrected zero has to bring
 _SHOWN = 0.015  # rad: half of it; a deviation beyond means that the motions do not show where the zero is
+_NEARER = 2  # looks at a zero that seems to be off
 _TURN = 1e-3  # rad over which a torque's change with a position is taken
 
 
@@ -39,13 +41,8 @@ def estimate_findings(robot: Robot, moving: Moving) -> list[Finding]:
     rows = rows_of(robot, moving, _ROWS)
     if rows is None or len(rows.q) < _FEWEST or len(robot.joint_names) > _MOST_JOINTS:
         return []
-    fitted = WholeBody.of(rows).fit(rows.torque)
-    return (
-        _scales(robot, moving, fitted)
-        or scale_findings(robot, moving)
-        or _delays(robot, moving, fitted)
-        or _zeros(robot, moving, rows, fitted)
-    )
+    fitted = _fit(rows)
+    return _scales(robot, moving, fitted) or _delays(robot, moving, fitted) or _zeros(robot, moving, rows, fitted)
 
 
 def _delays(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
@@ -83,16 +80,20 @@ def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
     joints = np.flatnonzero(moving.joints).tolist()
     scales = {joint: _scale(fitted, joint) for joint in joints}
     names = CHANNELS["torque"].columns(robot.joint_names)
-    telling = [joint for joint, (_, deviation) in scales.items() if deviation < _TELLS]
+    telling = {joint for joint, (_, deviation) in scales.items() if deviation < _TELLS}
     found = [
-        (_left(fitted, joint, np.exp(log)), joint)
+        (_rescaled(fitted, joint, np.exp(log)).left, joint)
         for joint, (log, deviation) in scales.items()
-        if len(set(telling) - {joint}) >= _OTHERS and _beyond(abs(log), deviation, np.log(_SCALED))
+        if len(telling - {joint}) >= _OTHERS and _beyond(abs(log), deviation, np.log(_SCALED))
     ]
     if not found:
-        return []
+        open_to_it = {names[joint] for joint in telling if abs(scales[joint][0]) > np.log(_SCALED) + scales[joint][1]}
+        return [finding for finding in scale_findings(robot, moving) if finding.channel in open_to_it]
     _, joint = min(found)  # of one that differs, others seem to differ as well
     log, deviation = scales[joint]
+    own, cured = fitted.body.held_out(fitted.torque), fitted.body.held_out(_rescaled(fitted, joint, np.exp(log)).torque)
+    if own.t(cured) < _SURE:
+        return []
     evidence = {"ratio": round(float(np.exp(log)), 3), "deviation": round(float(np.exp(log)) * deviation, 3)}
     say = (
         f"{names[joint]} is {np.exp(log):.2g} times (± {deviation:.0%}) as large as the bodies that it carries are by "
@@ -119,30 +120,29 @@ def _rescaled(fitted: Fitted, joint: int, scale: float) -> Fitted:
     return fitted.body.fit(fitted.torque / np.where(np.arange(fitted.torque.shape[1]) == joint, scale, 1.0))
 
 
-def _left(fitted: Fitted, joint: int, scale: float) -> float:
-    return _rescaled(fitted, joint, scale).left
-
-
 def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Finding]:
     """Return the position whose zero is off; what a tilted base or a spring at the joint does is no such thing."""
-    now, _ = fitted.parts(rows.columns())
-
-    def change(turned: Rows) -> np.ndarray:
-        return np.asarray((fitted.parts(turned.columns())[0] - now) / _TURN)
-
-    tilts = tuple(change(replace(rows, tilt=tilt)) for tilt in ((_TURN, 0.0, 0.0), (0.0, _TURN, 0.0)))
+    tilts = _tilts(rows, fitted)
     found = []
     for joint in np.flatnonzero(moving.joints).tolist():
         if robot.joints[joint].kind == "prismatic":
             continue
-        turn = _only(np.full_like(rows.q, _TURN), joint)
-        spring = _only(rows.q - rows.q.mean(axis=0), joint)
-        off, deviation = fitted.estimate(-change(replace(rows, q=rows.q + turn)), (*tilts, spring))
+        off, deviation = _zero(rows, fitted, tilts, joint)
+        if abs(off) < _SURE * deviation:
+            continue
+        for _ in range(_NEARER):
+            turned = _turned(rows, joint, -off)
+            again = _fit(turned)
+            more, deviation = _zero(turned, again, _tilts(turned, again), joint)
+            off += more
         if deviation < _SHOWN and _beyond(abs(off), deviation, _ZERO):
-            found.append((abs(off) / deviation, joint, off, deviation))
+            found.append((_fit(_turned(rows, joint, -off)).left, joint, off, deviation))
     if not found:
         return []
-    _, joint, off, deviation = max(found)  # of one that is off, others seem to be off as well
+    _, joint, off, deviation = min(found)  # of one that is off, others seem to be off as well
+    own, cured = (WholeBody.of(each).held_out(rows.torque) for each in (rows, _turned(rows, joint, -off)))
+    if own.gain(cured) < np.log(_GAIN) or own.t(cured) < _SURE:
+        return []
     name = CHANNELS["q"].column(robot.joints[joint].name)
     evidence = {"offset_rad": round(off, 4), "deviation_rad": round(deviation, 4)}
     say = (
@@ -150,6 +150,31 @@ def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Fin
         "compare its zero with the URDF's"
     )
     return [Finding("zero_offset", name, moving.names, False, False, evidence, say)]
+
+
+def _zero(rows: Rows, fitted: Fitted, tilts: tuple[np.ndarray, ...], joint: int) -> tuple[float, float]:
+    """Return by how much (rad) a position reads too much, and its deviation."""
+    shapes = (rows.q, np.cos(rows.q), np.sin(rows.q))  # of a hose, of a balancer
+    springs = tuple(_only(shape - shape.mean(axis=0), joint) for shape in shapes)
+    return fitted.estimate(-_change(_turned(rows, joint, _TURN), fitted), (*tilts, *springs))
+
+
+def _tilts(rows: Rows, fitted: Fitted) -> tuple[np.ndarray, ...]:
+    """Return how the torques change as the base tilts about x and y."""
+    return tuple(_change(replace(rows, tilt=tilt), fitted) for tilt in ((_TURN, 0.0, 0.0), (0.0, _TURN, 0.0)))
+
+
+def _change(turned: Rows, fitted: Fitted) -> np.ndarray:
+    """Return the rate at which what bodies do changes as something turns by 1 mrad, N m/rad (N, n)."""
+    return np.asarray((fitted.parts(turned.columns())[0] - fitted.of_bodies) / _TURN)
+
+
+def _fit(rows: Rows) -> Fitted:
+    return WholeBody.of(rows).fit(rows.torque)
+
+
+def _turned(rows: Rows, joint: int, by: float) -> Rows:
+    return replace(rows, q=rows.q + _only(np.full_like(rows.q, by), joint))
 
 
 def _only(torque: np.ndarray, joint: int) -> np.ndarray:

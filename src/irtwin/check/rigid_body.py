@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from irtwin.check.moving import Moving
 from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
 
 _REVERSAL = 0.1  # of a joint's usual speed: friction has its full size there
 _INDEPENDENT = 1e-5  # of the largest singular value
@@ -78,11 +79,11 @@ class Rows:
 
 
 def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0) -> Rows | None:
-    """Return at most so many samples of the runs with torque; None where no run has it.
+    """Return at most so many samples of the runs with torque, of the payload that most have; None where none has it.
 
     `later`: by how much (s) the motion is that of a later time than the torque.
     """
-    motions = [motion for motion in moving.motions if motion.torque is not None]
+    motions = _alike([motion for motion in moving.motions if motion.torque is not None])
     if not motions:
         return None
     step = -(-sum(len(motion.time) for motion in motions) // most)
@@ -92,6 +93,14 @@ def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0) -> Rows
     )
     torque = np.vstack([motion.torque[::step] for motion in motions if motion.torque is not None])
     return Rows(robot, q, dq, ddq, torque, np.concatenate([motion.time[::step] for motion in motions]))
+
+
+def _alike(motions: list[Motion]) -> list[Motion]:
+    """Return those of the payload that was carried longest: another is another body."""
+    carried: dict[tuple[float, ...], list[Motion]] = {}
+    for motion in motions:
+        carried.setdefault((motion.payload_mass, *motion.payload_com), []).append(motion)
+    return max(carried.values(), key=lambda alike: sum(len(motion.time) for motion in alike), default=[])
 
 
 def _at(times: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:

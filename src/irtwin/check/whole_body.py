@@ -16,6 +16,7 @@ from irtwin.check.rigid_body import Rows
 BLOCKS = 20  # stretches of time that count as independent
 _LEAST = 0.01  # of a torque's deviation: less is left in simulated logs alone, and means nothing
 _TURNS = 4  # of the weights: by then they change by less than 1 %
+_OWN = 1e-3  # of a column's squares that nothing else makes up: with less, it is rounding that is fitted
 _PRIOR = 1e-8  # of a column's squares: keeps what no motion excites at zero
 
 
@@ -107,6 +108,12 @@ class Fitted:
         """The torques as the numbers predict them, (N, n)."""
         return np.asarray(self.body.columns @ self.coefficients)
 
+    @cached_property
+    def of_bodies(self) -> np.ndarray:
+        """What of that the bodies are, (N, n)."""
+        bodies = int(self.body.used[: 10 * self.torque.shape[1]].sum())
+        return np.asarray(self.body.columns[:, :, :bodies] @ self.coefficients[:bodies])
+
     def parts(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the torques (N, n) that bodies and that friction add where the columns are these, (N, n, 13 n)."""
         numbers = np.zeros(len(self.body.used))
@@ -130,7 +137,7 @@ class Fitted:
         part, explained = _solved(products, np.stack([wanted @ weighted, torque @ weighted]))
         own = wanted - weighted @ part
         free = float(own @ own)
-        if free <= 1e-6 * size or size == 0:
+        if free <= _OWN * size:
             return 0.0, np.inf
         residual = torque - weighted @ explained
         number = float(own @ residual) / free
