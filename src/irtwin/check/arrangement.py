@@ -77,7 +77,7 @@ def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collect
     own = body.held_out(rows.torque)
     left = {fault: _undone(rows, body, fault).left for fault in _faults(rows, moving.joints)}
     fault = min(left, key=lambda each: left[each], default=None)
-    if fault is None or body.fit(rows.torque).left - left[fault] < np.log(_GAIN):
+    if fault is None or body.fit(rows.torque).left < left[fault]:
         return []
     held = _held(rows, body, fault)
     if own.gain(held) < np.log(_GAIN) or own.t(held) < _SURE:

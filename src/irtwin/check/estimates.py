@@ -1,7 +1,7 @@
 """How late a torque is, what its scale is, and where a position's zero is: estimated beside bodies and friction.
 
 Each is a number of one channel that the data give with its deviation. It is said where it is large and sure; where the
-motions do not show it, it is not sure, and nothing is said.
+motions do not show it, it is not sure, and nothing is said. The thresholds' origin: docs/decisions/logs-faults.md.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _MOST_JOINTS = 12
 _SURE = 4.0  # standard deviations of a number from none
 _BEYOND = 2.0  # standard deviations by which a number exceeds what is tolerated
+_AS_WELL = 3.0  # standard deviations by which bodies come late where a torque as a whole surely does
 _LATE, _LATEST = 0.008, 0.1  # s of a delay; drives filter their currents by a few ms
 _STEP = 0.005  # s over which the rate of a torque is taken
 _SCALED = 1.6  # times, or its inverse; torque constants are nominal, friction grows with load
@@ -62,7 +63,7 @@ def _delays(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
         of_bodies = fitted.estimate(body, (rubbed,))
         if _beyond(*of_bodies, _LATE):
             found.append(_delay(names[joint], *of_bodies, moving))
-        elif _beyond(*whole, _LATE) and of_bodies[0] > max(_LATE, _BEYOND * of_bodies[1]):
+        elif _beyond(*whole, _LATE) and of_bodies[0] > max(_LATE, _AS_WELL * of_bodies[1]):
             found.append(_delay(names[joint], *whole, moving))
     return found
 

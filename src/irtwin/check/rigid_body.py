@@ -43,12 +43,13 @@ class Rows:
         return np.array([pin.rnea(self.robot.model, data, *state) for state in self._states()])
 
     def columns(self) -> np.ndarray:
-        """Return what bodies and, at each joint for itself, friction add to the torques, (N, n, 10 n + 3 n)."""
+        """Return what bodies and, at each joint for itself, rotor and friction add to the torques, (N, n, 14 n)."""
         count, n = self.q.shape
-        columns = np.zeros((count, n, 13 * n))
+        columns = np.zeros((count, n, 14 * n))
         columns[:, :, : 10 * n] = self._regressors()
         for joint in range(n):
-            columns[:, joint, 10 * n + 3 * joint : 10 * n + 3 * joint + 3] = friction(self.dq[:, joint])
+            own = np.column_stack([self.ddq[:, joint], friction(self.dq[:, joint])])
+            columns[:, joint, 10 * n + 4 * joint : 10 * n + 4 * joint + 4] = own
         return columns
 
     def unexplained(self, joints: np.ndarray) -> np.ndarray:

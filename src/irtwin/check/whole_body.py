@@ -115,7 +115,7 @@ class Fitted:
         return np.asarray(self.body.columns[:, :, :bodies] @ self.coefficients[:bodies])
 
     def parts(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the torques (N, n) that bodies and that friction add where the columns are these, (N, n, 13 n)."""
+        """Return what bodies, and what rotors and friction, add to torques (N, n), by columns (N, n, 14 n)."""
         numbers = np.zeros(len(self.body.used))
         numbers[self.body.used] = self.coefficients
         bodies = 10 * self.torque.shape[1]
