@@ -81,8 +81,8 @@ def _correlation(derived: np.ndarray, logged: np.ndarray) -> np.ndarray:
 def _exchanged(alike: np.ndarray, joint: int) -> int | None:
     """Return the joint whose speed stands in this one's column, and this one's in its; None where there is none."""
     other = int(np.argmax(alike[joint]))
-    crossed = min(alike[joint, other], alike[other, joint])
-    return other if crossed > max(_ALIKE, abs(alike[joint, joint]), abs(alike[other, other])) else None
+    crossed, own = (alike[joint, other], alike[other, joint]), (alike[joint, joint], alike[other, other])
+    return other if min(crossed) > _ALIKE and sum(crossed) > sum(np.abs(own)) else None
 
 
 def _gain(derived: np.ndarray, logged: np.ndarray) -> float:
