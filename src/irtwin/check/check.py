@@ -11,11 +11,13 @@ from threadpoolctl import threadpool_limits
 
 from irtwin.check.arrangement import arrangement_findings
 from irtwin.check.channels import channel_findings
-from irtwin.check.moving import moving
+from irtwin.check.estimates import estimate_findings
+from irtwin.check.moving import Moving, moving
 from irtwin.check.plausibility import plausibility_findings
 from irtwin.check.speeds import speed_findings
 from irtwin.check.torque import torque_findings
 from irtwin.errors import InputError
+from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Signals, columns_of, from_columns
 from irtwin.signals.finding import Finding
 from irtwin.signals.log import DataSet
@@ -50,8 +52,25 @@ def _findings(data_set: DataSet) -> list[Finding]:
         if not any(finding.stops for finding in found):
             found += channel_findings(data_set.robot, seen) + speed_findings(data_set.robot, seen)
         if not any(finding.stops for finding in found):
-            found += arrangement_findings(data_set.robot, seen) or torque_findings(data_set.robot, seen)
+            found += _by_bodies(data_set.robot, seen)
     return found
+
+
+def _by_bodies(robot: Robot, seen: Moving) -> list[Finding]:
+    """Return what bodies and friction say of the torques and positions."""
+    arranged = arrangement_findings(robot, seen)
+    if any(finding.stops for finding in arranged):
+        return arranged
+    found = torque_findings(robot, seen)
+    reversed_torques = [finding.channel for finding in found if finding.fault == "sign" and finding.mended]
+    if reversed_torques:  # beside several, the one that is right looks reversed
+        arranged = [
+            finding for finding in arrangement_findings(robot, seen, reversed_torques)
+            if finding.mended and finding.channel not in reversed_torques
+        ]  # fmt: skip
+    named = {finding.channel for finding in arranged}
+    found = arranged + [finding for finding in found if finding.channel not in named]
+    return found if any(finding.certain for finding in found) else found + estimate_findings(robot, seen)
 
 
 def checked(data_set: DataSet) -> Checked:

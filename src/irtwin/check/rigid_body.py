@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from irtwin.check.moving import Moving
 from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
 
 _REVERSAL = 0.1  # of a joint's usual speed: friction has its full size there
 _INDEPENDENT = 1e-5  # of the largest singular value
@@ -17,7 +18,10 @@ _EXACT = 0.01  # of a torque's deviation: less is left in simulated logs alone, 
 
 @dataclass(frozen=True)
 class Rows:
-    """N samples of a robot of n joints over all runs: motion and torque, each (N, n); time (N,) in its run, s."""
+    """N samples of a robot of n joints over all runs: motion and torque, each (N, n); time (N,) in its run, s.
+
+    `tilt`: by which vector (3,), rad, its base is turned from where the URDF has it.
+    """
 
     robot: Robot
     q: np.ndarray
@@ -25,6 +29,7 @@ class Rows:
     ddq: np.ndarray
     torque: np.ndarray
     time: np.ndarray
+    tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def changed(self, factors: np.ndarray, order: np.ndarray | None = None) -> Rows:
         """Return them with the positions of each joint times a factor (n,), then in another order (n,)."""
@@ -37,15 +42,22 @@ class Rows:
         data = self.robot.model.createData()
         return np.array([pin.rnea(self.robot.model, data, *state) for state in self._states()])
 
+    def columns(self) -> np.ndarray:
+        """Return what bodies and, at each joint for itself, rotor and friction add to the torques, (N, n, 14 n)."""
+        count, n = self.q.shape
+        columns = np.zeros((count, n, 14 * n))
+        columns[:, :, : 10 * n] = self._regressors()
+        for joint in range(n):
+            own = np.column_stack([self.ddq[:, joint], friction(self.dq[:, joint])])
+            columns[:, joint, 10 * n + 4 * joint : 10 * n + 4 * joint + 4] = own
+        return columns
+
     def unexplained(self, joints: np.ndarray) -> np.ndarray:
         """Return (n, n): the share of torque b's deviation that the motion of joint a leaves.
 
         Bodies and friction are free. One where either is not among the `joints` (n,) bool.
         """
-        data = self.robot.model.createData()
-        regressors = np.array(
-            [pin.computeJointTorqueRegressor(self.robot.model, data, *state) for state in self._states()]
-        )
+        regressors = self._regressors()
         shares = np.ones((len(joints), len(joints)))
         centred = self.torque - self.torque.mean(axis=0)
         sizes = np.sum(centred**2, axis=0)
@@ -55,26 +67,45 @@ class Rows:
             shares[a] = np.where(joints & (sizes > 0), np.sqrt(np.maximum(left, 0.0)), 1.0)
         return np.clip(shares, _EXACT, 1.0)
 
-    def explained(self, joint: int) -> np.ndarray:
-        """Return an orthonormal basis (N, k) of what bodies and friction can explain of a joint's torque."""
-        data = self.robot.model.createData()
-        model, states = self.robot.model, self._states()
-        regressors = [pin.computeJointTorqueRegressor(model, data, *state)[joint] for state in states]
-        return _basis(np.column_stack([regressors, friction(self.dq[:, joint])]))
+    def _regressors(self) -> np.ndarray:
+        model = self.robot.model
+        if any(self.tilt):
+            model = model.copy()
+            model.gravity.linear = model.gravity.linear + np.cross(self.tilt, model.gravity.linear)
+        data = model.createData()
+        return np.array([pin.computeJointTorqueRegressor(model, data, *state) for state in self._states()])
 
     def _states(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         return list(zip(self.q, self.dq, self.ddq, strict=True))
 
 
-def rows_of(robot: Robot, moving: Moving, most: int) -> Rows | None:
-    """Return at most so many samples of the runs with torque; None where no run has it."""
-    motions = [motion for motion in moving.motions if motion.torque is not None]
+def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0) -> Rows | None:
+    """Return at most so many samples of the runs with torque, of the payload that most have; None where none has it.
+
+    `later`: by how much (s) the motion is that of a later time than the torque.
+    """
+    motions = _alike([motion for motion in moving.motions if motion.torque is not None])
     if not motions:
         return None
     step = -(-sum(len(motion.time) for motion in motions) // most)
-    fields = ("q", "dq", "ddq", "torque")
-    q, dq, ddq, torque = (np.vstack([getattr(motion, name)[::step] for motion in motions]) for name in fields)
+    q, dq, ddq = (
+        np.vstack([_at(motion.time[::step] + later, motion.time, getattr(motion, name)) for motion in motions])
+        for name in ("q", "dq", "ddq")
+    )
+    torque = np.vstack([motion.torque[::step] for motion in motions if motion.torque is not None])
     return Rows(robot, q, dq, ddq, torque, np.concatenate([motion.time[::step] for motion in motions]))
+
+
+def _alike(motions: list[Motion]) -> list[Motion]:
+    """Return those of the payload that was carried longest: another is another body."""
+    carried: dict[tuple[float, ...], list[Motion]] = {}
+    for motion in motions:
+        carried.setdefault((motion.payload_mass, *motion.payload_com), []).append(motion)
+    return max(carried.values(), key=lambda alike: sum(len(motion.time) for motion in alike), default=[])
+
+
+def _at(times: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.interp(times, time, column) for column in values.T])
 
 
 def friction(speed: np.ndarray) -> np.ndarray:
@@ -90,10 +121,3 @@ def _explained(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
     sizes, directions = np.linalg.eigh(scaled.T @ scaled)
     used = sizes > _INDEPENDENT**2 * sizes[-1]
     return np.asarray(np.sum((directions[:, used].T @ (scaled.T @ values)) ** 2 / sizes[used, None], axis=0))
-
-
-def _basis(columns: np.ndarray) -> np.ndarray:
-    norms = np.linalg.norm(columns, axis=0)
-    used = norms > _INDEPENDENT * norms.max()
-    left, values, _ = np.linalg.svd(columns[:, used] / norms[used], full_matrices=False)
-    return np.asarray(left[:, values > _INDEPENDENT * values[0]])

@@ -21,7 +21,9 @@ _TIMES = {"ms": 1e3, "µs": 1e6, "ns": 1e9}
 _NEAR = 0.03  # share by which a factor may miss a unit's
 _SCALED = 1.15  # a gain beyond it, or its inverse, is another scale
 _LATE = 0.008  # s: a shorter delay is a filter's
-_SURE = 8.0  # standard deviations
+_SURE = 4.0  # standard deviations of a delay from none
+_BEYOND = 2.0  # standard deviations by which it exceeds a filter's
+_SLOW = 0.25  # of the cutoff, which is ten times the motion's band: above, derivatives are noise, which hides a delay
 
 
 def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
@@ -42,12 +44,12 @@ def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
         name = names[joint]
         if np.ptp(logged[:, joint]) == 0:
             found.append(_finding("dead", name, moving, {}, "never changes, though the joint moves"))
-        elif joint in gains:
-            found += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving)
-        elif (other := int(np.argmax(np.abs(alike[joint])))) != joint and abs(alike[joint, other]) > _ALIKE:
-            if joint < other or abs(alike[other, joint]) <= _ALIKE:
+        elif (other := _exchanged(alike, joint)) is not None:
+            if joint < other:
                 said = "stand in each other's columns: name them by their joints"
                 found.append(_finding("swap", f"{name} <-> {names[other]}", moving, {}, said))
+        elif joint in gains:
+            found += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving)
         else:
             found += _delayed(name, joint, moving)
     return found
@@ -74,6 +76,13 @@ def _correlation(derived: np.ndarray, logged: np.ndarray) -> np.ndarray:
     a, b = derived - derived.mean(axis=0), logged - logged.mean(axis=0)
     sizes = np.outer(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
     return np.asarray(np.divide(a.T @ b, sizes, out=np.zeros_like(sizes), where=sizes > 0))
+
+
+def _exchanged(alike: np.ndarray, joint: int) -> int | None:
+    """Return the joint whose speed stands in this one's column, and this one's in its; None where there is none."""
+    other = int(np.argmax(alike[joint]))
+    crossed, own = (alike[joint, other], alike[other, joint]), (alike[joint, joint], alike[other, other])
+    return other if min(crossed) > _ALIKE and sum(crossed) > sum(np.abs(own)) else None
 
 
 def _gain(derived: np.ndarray, logged: np.ndarray) -> float:
@@ -111,12 +120,16 @@ def _delayed(name: str, joint: int, moving: Moving) -> list[Finding]:
 
     For short delays d, the speed v(t - d) is v - d dv/dt.
     """
-    runs = [(_speeds(run, motion), motion.rate) for run, motion in zip(moving.runs, moving.motions, strict=True)]
-    pairs = [(pair[0][:, joint], pair[1][:, joint], rate) for pair, rate in runs if pair is not None]
-    columns = [np.column_stack([derived, differentiate(derived, rate)]) for derived, _, rate in pairs]
-    found = fit(np.vstack(columns), np.concatenate([logged for _, logged, _ in pairs]))
+    columns, values = [], []
+    for run, motion in zip(moving.runs, moving.motions, strict=True):
+        if (pair := _speeds(run, motion)) is not None and motion.cutoff is not None:
+            derived, logged = (low_pass(each[:, joint], motion.rate, _SLOW * motion.cutoff) for each in pair)
+            columns.append(np.column_stack([derived, differentiate(derived, motion.rate)]))
+            values.append(logged)
+    found = fit(np.vstack(columns), np.concatenate(values))
     gain, change = found.coefficients
-    if not gain or abs(delay := float(-change / gain)) < _LATE or abs(found.t(np.array([0.0, 1.0]))) < _SURE:
+    t = abs(found.t(np.array([0.0, 1.0])))
+    if not gain or t < _SURE or abs(delay := float(-change / gain)) * (1 - _BEYOND / t) < _LATE:
         return []
     said = f"comes {1000 * abs(delay):.3g} ms {'after' if delay > 0 else 'before'} the speed of its position"
-    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1)}, said)]
+    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1), "t": round(t, 1)}, said)]

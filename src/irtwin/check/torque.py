@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from irtwin.check.arrangement import says_position
 from irtwin.check.moving import Moving
 from irtwin.check.rigid_body import Rows, friction, rows_of
 from irtwin.check.robust_fit import Fit, fit
@@ -20,8 +21,6 @@ _ROWS = 1500  # over all runs
 _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _SURE = 4.0  # standard deviations
 _LIKELY = 2.0
-_LATE, _LATEST = 0.008, 0.1  # s of a delay
-_SURE_DELAY = 10.0  # standard deviations: friction near a reversal looks like a delay, too
 _SCALED = 1.6  # times the other joints' gain, or its inverse
 _SURE_SCALE = 10.0  # standard deviations of a gain
 _OTHERS = 3  # gains that tell the usual one
@@ -34,9 +33,14 @@ def torque_findings(robot: Robot, moving: Moving) -> list[Finding]:
     if rows is None or len(rows.q) < _FEWEST:
         return []
     nominal = rows.nominal()
-    joints = np.flatnonzero(moving.joints).tolist()
-    found = [_direction(robot, moving, rows, nominal, joint) or _delay(robot, moving, rows, joint) for joint in joints]
-    return [finding for finding in found if finding is not None] or _scales(robot, moving, rows, nominal)
+    found = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
+    return [finding for finding in found if finding is not None]
+
+
+def scale_findings(robot: Robot, moving: Moving) -> list[Finding]:
+    """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
+    rows = rows_of(robot, moving, _ROWS)
+    return [] if rows is None or len(rows.q) < _FEWEST else _scales(robot, moving, rows, rows.nominal())
 
 
 def _direction(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray, joint: int) -> Finding | None:
@@ -76,10 +80,20 @@ def _drives(found: Fit, dry: float, viscous: float) -> bool:
 
 
 def _wrong_sign(robot: Robot, moving: Moving, joint: int, evidence: dict[str, float], why: str) -> Finding:
-    name = CHANNELS["torque"].column(robot.joints[joint].name)
+    """Return the finding, of the position where that explains the torques of the other joints as well."""
+    names = {field: CHANNELS[field].column(robot.joints[joint].name) for field in ("torque", "q")}
+    position = says_position(robot, moving, joint)
+    evidence = {**evidence, "position_t": round(position, 1)}
+    if position > _SURE:
+        return Finding(
+            "sign", names["q"], moving.names, certain=True, mended=False, evidence=evidence,
+            say=f"{names['q']} has the wrong sign: {why}, and the torques of other joints fit the motion reversed; "
+            "change it, and that of the speed",
+        )  # fmt: skip
+    other = f" (or {names['q']}: the torques cannot tell which)" if position > -_LIKELY else ""
     return Finding(
-        "sign", name, moving.names, certain=True, mended=True, evidence=evidence,
-        say=f"{name} has the wrong sign: {why}; its sign is changed here, change it in the log",
+        "sign", names["torque"], moving.names, certain=True, mended=True, evidence=evidence,
+        say=f"{names['torque']} has the wrong sign{other}: {why}; its sign is changed here, change it in the log",
     )  # fmt: skip
 
 
@@ -91,23 +105,7 @@ def _reversed(body: float, lost: float) -> str:
     return " and ".join(reason for reason, holds in reasons if holds)
 
 
-def _delay(robot: Robot, moving: Moving, rows: Rows, joint: int) -> Finding | None:
-    """Return the finding where a torque comes late: by a short delay d, it lacks d times its own rate."""
-    torque, basis = rows.torque[:, joint], rows.explained(joint)
-    explained = basis @ (basis.T @ torque)
-    steps = np.diff(rows.time, append=rows.time[-1])
-    rate = np.where(steps > 0, np.diff(explained, append=explained[-1]) / np.where(steps > 0, steps, 1.0), 0.0)
-    found = fit(np.column_stack([basis, rate]), torque)
-    late = float(-found.coefficients[-1])
-    if not _LATE < late < _LATEST or found.t(np.eye(len(found.coefficients))[-1]) > -_SURE_DELAY:
-        return None
-    name = CHANNELS["torque"].column(robot.joints[joint].name)
-    say = f"{name} comes about {1000 * late:.2g} ms after the motion that it explains; log both at one time"
-    return Finding("delay", name, moving.names, False, False, {"delay_ms": round(1000 * late, 1)}, say)
-
-
 def _scales(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray) -> list[Finding]:
-    """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
     gains = {}
     for joint in np.flatnonzero(moving.joints).tolist():
         columns = [nominal[:, joint], rows.ddq[:, joint], friction(rows.dq[:, joint])]

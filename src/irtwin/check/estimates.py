@@ -1,0 +1,187 @@
+"""How late a torque is, what its scale is, and where a position's zero is: estimated beside bodies and friction.
+
+Each is a number of one channel that the data give with its deviation. It is said where it is large and sure; where the
+motions do not show it, it is not sure, and nothing is said. The thresholds' origin: docs/decisions/logs-faults.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from irtwin.check.moving import Moving
+from irtwin.check.rigid_body import Rows, rows_of
+from irtwin.check.torque import scale_findings
+from irtwin.check.whole_body import Fitted, WholeBody
+from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS
+from irtwin.signals.finding import Finding
+
+_ROWS = 1500  # over all runs
+_FEWEST = 300  # samples; fewer, and regressors of chance explain everything
+_MOST_JOINTS = 12
+_SURE = 4.0  # standard deviations of a number from none
+_BEYOND = 2.0  # standard deviations by which a number exceeds what is tolerated
+_AS_WELL = 3.0  # standard deviations by which bodies come late where a torque as a whole surely does
+_LATE, _LATEST = 0.008, 0.1  # s of a delay; drives filter their currents by a few ms
+_STEP = 0.005  # s over which the rate of a torque is taken
+_SCALED = 1.6  # times, or its inverse; torque constants are nominal, friction grows with load
+_TELLS = 0.2  # of a scale: deviation below which a joint tells what is usual
+_OTHERS = 3  # such joints, beside the one that differs
+_TURNS = 4  # of a scale far from one
+_ZERO = 0.03  # rad; links and gears give way by as much
+_GAIN = 2.0  # in the product of all residuals that a corrected zero has to bring
+_SHOWN = 0.015  # rad: half of it; a deviation beyond means that the motions do not show where the zero is
+_NEARER = 2  # looks at a zero that seems to be off
+_TURN = 1e-3  # rad over which a torque's change with a position is taken
+
+
+def estimate_findings(robot: Robot, moving: Moving) -> list[Finding]:
+    """Return torques that are late or of another scale than the others', and positions whose zero is off."""
+    rows = rows_of(robot, moving, _ROWS)
+    if rows is None or len(rows.q) < _FEWEST or len(robot.joint_names) > _MOST_JOINTS:
+        return []
+    fitted = _fit(rows)
+    return _scales(robot, moving, fitted) or _delays(robot, moving, fitted) or _zeros(robot, moving, rows, fitted)
+
+
+def _delays(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
+    after, before = (rows_of(robot, moving, _ROWS, later) for later in (_STEP, -_STEP))
+    if after is None or before is None:
+        return []
+    rates = (after.columns() - before.columns()) / (2 * _STEP)
+    bodies, friction = fitted.parts(rates)
+    names = CHANNELS["torque"].columns(robot.joint_names)
+    found = []
+    for joint in np.flatnonzero(moving.joints).tolist():
+        body, rubbed = _only(-bodies, joint), _only(-friction, joint)
+        whole = fitted.estimate(body + rubbed)
+        if not _LATE < whole[0] < _LATEST:
+            continue
+        # friction near a reversal looks like a delay of itself: what bodies do must come late as well
+        of_bodies = fitted.estimate(body, (rubbed,))
+        if _beyond(*of_bodies, _LATE):
+            found.append(_delay(names[joint], *of_bodies, moving))
+        elif _beyond(*whole, _LATE) and of_bodies[0] > max(_LATE, _AS_WELL * of_bodies[1]):
+            found.append(_delay(names[joint], *whole, moving))
+    return found
+
+
+def _delay(name: str, late: float, deviation: float, moving: Moving) -> Finding:
+    evidence = {"delay_ms": round(1000 * late, 1), "deviation_ms": round(1000 * deviation, 1)}
+    say = (
+        f"{name} comes about {1000 * late:.2g} ms (± {1000 * deviation:.2g}) after the motion that it explains, beyond "
+        "what friction does; log both at one time"
+    )
+    return Finding("delay", name, moving.names, False, False, evidence, say)
+
+
+def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
+    joints = np.flatnonzero(moving.joints).tolist()
+    scales = {joint: _scale(fitted, joint) for joint in joints}
+    names = CHANNELS["torque"].columns(robot.joint_names)
+    telling = {joint for joint, (_, deviation) in scales.items() if deviation < _TELLS}
+    found = [
+        (_rescaled(fitted, joint, np.exp(log)).left, joint)
+        for joint, (log, deviation) in scales.items()
+        if len(telling - {joint}) >= _OTHERS and _beyond(abs(log), deviation, np.log(_SCALED))
+    ]
+    if not found:
+        open_to_it = {names[joint] for joint in telling if abs(scales[joint][0]) > np.log(_SCALED) + scales[joint][1]}
+        return [finding for finding in scale_findings(robot, moving) if finding.channel in open_to_it]
+    _, joint = min(found)  # of one that differs, others seem to differ as well
+    log, deviation = scales[joint]
+    own, cured = fitted.body.held_out(fitted.torque), fitted.body.held_out(_rescaled(fitted, joint, np.exp(log)).torque)
+    if own.t(cured) < _SURE:
+        return []
+    evidence = {"ratio": round(float(np.exp(log)), 3), "deviation": round(float(np.exp(log)) * deviation, 3)}
+    say = (
+        f"{names[joint]} is {np.exp(log):.2g} times (± {deviation:.0%}) as large as the bodies that it carries are by "
+        "the torques of other joints; check its unit, torque constant and gear ratio"
+    )
+    return [Finding("scale", names[joint], moving.names, False, False, evidence, say)]
+
+
+def _scale(fitted: Fitted, joint: int) -> tuple[float, float]:
+    """Return the logarithm of a torque's scale beside the others' and its deviation, infinite where vague."""
+    scale = 1.0
+    for _ in range(_TURNS):
+        now = fitted if scale == 1.0 else _rescaled(fitted, joint, scale)
+        more, deviation = now.estimate(_only(now.explained, joint))
+        if not np.isfinite(deviation) or more <= -1 or deviation > 1:
+            return 0.0, np.inf
+        scale *= 1 + more
+        if abs(more) < 0.1:
+            break
+    return float(np.log(scale)), deviation
+
+
+def _rescaled(fitted: Fitted, joint: int, scale: float) -> Fitted:
+    return fitted.body.fit(fitted.torque / np.where(np.arange(fitted.torque.shape[1]) == joint, scale, 1.0))
+
+
+def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Finding]:
+    """Return the position whose zero is off; what a tilted base or a spring at the joint does is no such thing."""
+    tilts = _tilts(rows, fitted)
+    found = []
+    for joint in np.flatnonzero(moving.joints).tolist():
+        if robot.joints[joint].kind == "prismatic":
+            continue
+        off, deviation = _zero(rows, fitted, tilts, joint)
+        if abs(off) < _SURE * deviation:
+            continue
+        for _ in range(_NEARER):
+            turned = _turned(rows, joint, -off)
+            again = _fit(turned)
+            more, deviation = _zero(turned, again, _tilts(turned, again), joint)
+            off += more
+        if deviation < _SHOWN and _beyond(abs(off), deviation, _ZERO):
+            found.append((_fit(_turned(rows, joint, -off)).left, joint, off, deviation))
+    if not found:
+        return []
+    _, joint, off, deviation = min(found)  # of one that is off, others seem to be off as well
+    own, cured = (WholeBody.of(each).held_out(rows.torque) for each in (rows, _turned(rows, joint, -off)))
+    if own.gain(cured) < np.log(_GAIN) or own.t(cured) < _SURE:
+        return []
+    name = CHANNELS["q"].column(robot.joints[joint].name)
+    evidence = {"offset_rad": round(off, 4), "deviation_rad": round(deviation, 4)}
+    say = (
+        f"{name} reads about {off:+.3f} rad (± {deviation:.2g}) beside where gravity and inertia put the joint; "
+        "compare its zero with the URDF's"
+    )
+    return [Finding("zero_offset", name, moving.names, False, False, evidence, say)]
+
+
+def _zero(rows: Rows, fitted: Fitted, tilts: tuple[np.ndarray, ...], joint: int) -> tuple[float, float]:
+    """Return by how much (rad) a position reads too much, and its deviation."""
+    shapes = (rows.q, np.cos(rows.q), np.sin(rows.q))  # of a hose, of a balancer
+    springs = tuple(_only(shape - shape.mean(axis=0), joint) for shape in shapes)
+    return fitted.estimate(-_change(_turned(rows, joint, _TURN), fitted), (*tilts, *springs))
+
+
+def _tilts(rows: Rows, fitted: Fitted) -> tuple[np.ndarray, ...]:
+    """Return how the torques change as the base tilts about x and y."""
+    return tuple(_change(replace(rows, tilt=tilt), fitted) for tilt in ((_TURN, 0.0, 0.0), (0.0, _TURN, 0.0)))
+
+
+def _change(turned: Rows, fitted: Fitted) -> np.ndarray:
+    """Return the rate at which what bodies do changes as something turns by 1 mrad, N m/rad (N, n)."""
+    return np.asarray((fitted.parts(turned.columns())[0] - fitted.of_bodies) / _TURN)
+
+
+def _fit(rows: Rows) -> Fitted:
+    return WholeBody.of(rows).fit(rows.torque)
+
+
+def _turned(rows: Rows, joint: int, by: float) -> Rows:
+    return replace(rows, q=rows.q + _only(np.full_like(rows.q, by), joint))
+
+
+def _only(torque: np.ndarray, joint: int) -> np.ndarray:
+    """Return a torque (N, n) at one joint alone."""
+    return np.where(np.arange(torque.shape[1]) == joint, torque, 0.0)
+
+
+def _beyond(number: float, deviation: float, tolerated: float) -> bool:
+    return number > _SURE * deviation and number > tolerated + _BEYOND * deviation
