@@ -334,14 +334,16 @@ class KnowledgeGraph:
             if not isinstance(quad.graph_name, DefaultGraph)
         ]
 
-    def said_of(self, nodes: Iterable[NamedNode | BlankNode]) -> Iterator[Quad]:
-        """Yield the quads of named graphs that have one of some nodes for subject; not of a server's graph."""
+    def said_of(self, nodes: Iterable[NamedNode | BlankNode]) -> Iterator[tuple[Any, Any, Any, NamedNode]]:
+        """Yield subject, predicate, object and named graph of what has one of some nodes for subject.
+
+        Not of a server's graph.
+        """
         named, others = _by_name(nodes)
         for some in named:
             rows = self._store.query(f"SELECT ?s ?p ?o ?g {{ VALUES ?s {{ {some} }} GRAPH ?g {{ ?s ?p ?o }} }}")
-            for subject, predicate, object, graph in cast(QuerySolutions, rows):
-                yield Quad(subject, predicate, object, graph)
-        yield from (quad for node in others for quad in self.about(node) if quad.subject == node)
+            yield from map(tuple, cast(Any, rows))
+        yield from (cast(Any, tuple(quad)) for node in others for quad in self.about(node) if quad.subject == node)
 
     @telling
     def leading_to(self, nodes: Iterable[NamedNode | BlankNode], apart: Iterable[str]) -> set[NamedNode | BlankNode]:
