@@ -7,11 +7,11 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import chain
 
 from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
 from irtwin.knowledge.engines import NATIVE
+from irtwin.knowledge.locality import read_by_rules
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
 from irtwin.knowledge.rules.files import all_rules
@@ -47,7 +47,8 @@ class Conclusions:
 
 def by_rules(ontology: Ontology, *known: Iterable[Triple]) -> Conclusions:
     """Return what the rules conclude of what is known, each into a named graph of its own."""
-    return Conclusions(running.conclusions(chain(*known), all_rules(ontology.resources)))
+    resources = ontology.resources
+    return Conclusions(running.conclusions(read_by_rules(resources, *known), all_rules(resources)))
 
 
 def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:

@@ -21,6 +21,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +52,7 @@ Name = NamedNode | BlankNode
 Row = tuple[Any, Any, Any, NamedNode]  # subject, predicate, object, and the named graph
 
 MOST_TOGETHER = 20_000  # triples of small parts that are looked at together
+MOST_KEPT = 100_000  # triples of parts that are kept for who asks next
 
 _TYPE = NamedNode(RDF + "type")
 _INVERSE_FUNCTIONAL = NamedNode(OWL + "InverseFunctionalProperty")
@@ -60,6 +62,7 @@ _NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED)
 _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 _ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
 _NAMES = (NamedNode, BlankNode)
+_RECENT: WeakKeyDictionary[KnowledgeGraph, tuple[int, dict[Name, Region]]] = WeakKeyDictionary()
 
 
 class Ontology:
@@ -136,18 +139,36 @@ def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> 
     return region
 
 
-def some(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Iterator[Region | None]:
-    """Yield the parts that the seeds belong to, one by one, like `around`."""
+def some(
+    graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name], *, asserted: bool = False
+) -> Iterator[Region | None]:
+    """Yield the parts that the seeds belong to, one by one, like `around`.
+
+    asserted: what was concluded of them is not needed, so those that were read last may be given again.
+    """
     wanted, done = set(seeds), set[Name]()
+    recent = _recent(graph)
     for seed in sorted(wanted, key=str):
         if seed not in done:
-            region = around(graph, ontology, [seed])
+            region = recent.get(seed) if asserted else None
+            region = region or around(graph, ontology, [seed])
             if region is None:
                 yield None
                 return
             done |= region.nodes & wanted
             if region.nodes:  # none are around a term of the ontology
                 yield region
+                recent = _recent(graph)
+                if sum(len(one.asserted) for one in recent.values()) < MOST_KEPT:
+                    recent[seed] = region
+
+
+def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
+    """Return parts that were read lately, each by a node of it, if nothing was asserted meanwhile."""
+    count, found = _RECENT.get(graph, (-1, {}))
+    if count != graph.asserted_since:
+        _RECENT[graph] = graph.asserted_since, (found := {})
+    return found
 
 
 def each(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
