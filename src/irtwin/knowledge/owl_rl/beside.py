@@ -187,8 +187,12 @@ class Beside:
 
     def _of_all(self, keys: Iterable[tuple[Number, Number]]) -> set[Number]:
         """Return the subjects that have all of some predicates and objects, some of it beside the ontology."""
-        groups = [self._known.get(key, set()) | self._schema.known(key) for key in keys]
-        return set.intersection(*groups)
+        groups: list[AbstractSet[Number]] = []
+        for key in keys:
+            own, of_ontology = self._known.get(key), self._schema.known(key)
+            groups.append(of_ontology if own is None else own | of_ontology if of_ontology else own)
+        groups.sort(key=len)
+        return set(groups[0]).intersection(*groups[1:])
 
     def _refuse_several(self, predicate: Number, end: int) -> None:
         """Raise Equality where several objects of a subject (or the other way round) are to be one."""

@@ -105,7 +105,8 @@ class Schema:
         self.reads_values |= any(self._is_datatype(pattern[2]) for of_one in values for pattern in of_one)
         conjunctions = [self._conjunction(rule, *both) for both in zip(values, bindings, strict=True)]
         if None not in conjunctions:
-            self.conjunctions += filter(None, conjunctions)
+            each = {(frozenset(it.keys), it.concluded): it for it in filter(None, conjunctions)}
+            self.conjunctions += each.values()
             return
         single = [self._one_value(rule, patterns, of_one) for of_one in values]
         if None not in single:
