@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import fleet
-
 from irtwin import workflow
 from irtwin.knowledge import reasoning
 from irtwin.knowledge.parts import Ontology
