@@ -3,9 +3,8 @@
 python bench/fleet.py FOLDER [ROBOTS] [RUNS]      writes FOLDER/irtwin.db and FOLDER/graph
 
 The rows are what `irtwin run` and `irtwin diagnose` leave of six-axis robots, the numbers drawn; the graph comes from
-the shipped mappings. Nothing is thinned out: a run has 31 entries in its ledger, 6 joint states and 2 activities.
-Only the union of the named graphs is written, which is what questions are asked of: with each triple's own graph beside
-it the store takes more than twice the disk and the time.
+the shipped mappings, reasoning and validation. Nothing is thinned out: a run has 31 entries in its ledger, 6 joint
+states and 2 activities.
 """
 
 from __future__ import annotations
@@ -19,13 +18,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from pyoxigraph import DefaultGraph, Quad, Store
-
-from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.rules.files import all_rules
+from irtwin import workflow
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import PREFIXES
-from irtwin.resources import folder, shipped
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import METER, Base
 
@@ -285,21 +279,12 @@ def make_database(place: Path, robots: int, runs: int) -> None:
 
 
 def make_graph(place: Path) -> int:
-    """Map the database and infer by the rules, on disk; return the number of triples.
-
-    The rules are run on the store as it lies, once: `rules.running.infer` would copy it into memory.
-    """
-    with KnowledgeGraph(place / "graph") as graph:
+    """Map the database, reason and validate as `irtwin run` does; return the number of triples."""
+    with Workspace.existing(place) as workspace, KnowledgeGraph(workspace.graph_folder, place) as graph:
         graph.load_ontology()
-    store = Store(str(place / "graph"))
-    with Workspace.existing(place) as workspace:
-        documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
-        store.bulk_extend(Quad(*quad.triple) for quad in map_database(workspace.engine, documents))
-    store.optimize()
-    for rule in sorted(all_rules(shipped()), key=lambda rule: rule.order):
-        found: Any = store.query(rule.construct, prefixes=PREFIXES)
-        store.bulk_extend([Quad(*triple) for triple in found])
-    return sum(1 for _ in store.quads_for_pattern(None, None, None, DefaultGraph()))
+        workflow.map_rows(workspace, graph)
+        workflow.conclude(graph, print)
+        return int(graph.query("SELECT (COUNT(*) AS ?count) { ?s ?p ?o }").rows[0]["count"])
 
 
 def main(place: Path, robots: int = 100, runs: int = 1000) -> None:

@@ -36,6 +36,11 @@ AXIOMS = [
     "ex:L owl:disjointWith ex:C .",
     "ex:s a owl:AsymmetricProperty .",
     "ex:o a ex:C ; ex:p ex:o2 .",
+    "ex:r a owl:InverseFunctionalProperty .",
+    "ex:p a owl:AsymmetricProperty .",
+    "ex:J owl:complementOf ex:G .",
+    "ex:C rdfs:subClassOf [ owl:onProperty ex:q ; owl:maxCardinality 1 ] .",
+    "[] a owl:AllDisjointClasses ; owl:members (ex:D ex:L ex:H) .",
 ]
 FACTS = [f"ex:{one} ex:{name} ex:{other} ." for one in "abc" for name in "pqrs" for other in "abc"]
 FACTS += [f"ex:{one} a ex:{kind} ." for one in "abc" for kind in "CDEFGHJL"]

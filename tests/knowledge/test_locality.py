@@ -64,3 +64,19 @@ def test_what_cannot_be_followed_is_said(body: str) -> None:
 
 def test_terms_that_a_rule_names_are_told() -> None:
     assert {EX + "x", EX + "y"} <= reach("BIND(ex:x AS ?a) ?a ex:p ?b . $this ex:q ex:y").terms
+
+
+@pytest.mark.parametrize(
+    ("body", "predicates"),
+    [
+        ("$this ex:p ?a . FILTER NOT EXISTS { ?a ex:q/ex:r* ?b }", {"p", "q", "r"}),
+        ("$this ex:p|^ex:q ?a . OPTIONAL { ?a ex:r ?b } { SELECT $this { $this ex:s ?c } }", {"p", "q", "r", "s"}),
+    ],
+)
+def test_the_predicates_that_a_rule_reads(body: str, predicates: set[str]) -> None:
+    assert reach(body).predicates == {EX + it for it in predicates}
+
+
+@pytest.mark.parametrize("body", ["$this ?p ?a", "$this !ex:p ?a", "$this ex:p ?a . FILTER EXISTS { ?a ?q ?b }"])
+def test_a_rule_that_may_read_anything(body: str) -> None:
+    assert locality.ANY in reach(body).predicates

@@ -12,7 +12,8 @@ from tests.individuals import individual
 
 from irtwin import workflow
 from irtwin.knowledge import by_parts, parts, reasoning
-from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
+from irtwin.knowledge.owl_rl.beside import Beside
+from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
@@ -198,8 +199,8 @@ def test_what_joins_robots_is_seen(joining: Quad) -> None:
 def test_only_the_part_that_changed_is_reasoned_over(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = anew(FACTS)
     given: set[Triple] = set()
-    add = Closure.add
-    monkeypatch.setattr(Closure, "add", lambda self, triples: (given.update(triples), add(self, triples))[1])
+    add = Beside.add
+    monkeypatch.setattr(Beside, "add", lambda self, triples: (given.update(triples), add(self, triples))[1])
     share = quad(individual("run", "r.2"), term("Idle_Share"), Literal(0.2))
     graph.change({share}, {quad(individual("run", "r.2"), term("Idle_Share"), Literal(0.9))})
     reason(graph)

@@ -2,6 +2,7 @@ import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
 
+from irtwin.knowledge import parts
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl import validation
 from irtwin.knowledge.shacl.validation import validate
@@ -223,6 +224,23 @@ def test_nothing_is_checked_where_nothing_changed(two_robots: list[Quad], checke
     checked.clear()
     assert validate(graph) == first
     assert checked == []
+
+
+def test_a_part_that_was_just_reasoned_over_is_not_read_again(
+    two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = reasoned(two_robots)
+    assert validate(graph) == ()
+    longer = changed(two_robots, RUN, "Run_Time", Literal(99.0))
+    graph.change(set(two_robots) - set(longer), set(longer) - set(two_robots))
+    reason(graph)
+    with monkeypatch.context() as patch:
+        patch.setattr(parts, "around", None)
+        assert validate(graph) == ()
+    wrong = changed(two_robots, RUN, "Run_Time", None)
+    graph.change(set(longer) - set(wrong), set(wrong) - set(longer))
+    reason(graph)
+    assert len(validate(graph)) == 1
 
 
 def test_violations_go_with_their_robot(two_robots: list[Quad], checked: list[set[str]]) -> None:

@@ -39,14 +39,14 @@ class Changes:
     names: set[str] = field(default_factory=set)
     noted: set[Quad] = field(default_factory=set)
 
-    def take(self, old: set[Quad], new: set[Quad]) -> None:
-        """Let some quads be in the place of others; write when there are many."""
-        if has_blank_node(new ^ old):
+    def take(self, removed: set[Quad], added: set[Quad], noted: Iterable[Quad]) -> None:
+        """Let some quads be in the place of others, and know of notes that stood before; write when there are many."""
+        if has_blank_node(removed | added):
             raise Joined
-        self.removed |= old - new
-        self.added |= new - old
-        self.names.update(graph_of(quad) for quad in new ^ old)
-        self.noted.update(quad for quad in old | new if graph_of(quad) == GRAPH_REASONED)
+        self.removed |= removed
+        self.added |= added
+        self.names.update(map(graph_of, removed | added))
+        self.noted.update(noted, (quad for quad in added if graph_of(quad) == GRAPH_REASONED))
         if len(self.removed) + len(self.added) > MOST_WAITING:
             self.write(self.graph.made_of() if self.whole else ())
 
@@ -68,13 +68,14 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region
         if some is None:
             raise Joined
         for region, found in _conclude(ontology, some):
-            new = found.quads()
-            nodes = {node for quad in new if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
+            removed, added = region.concluded, found.quads()
+            removed, added = removed - added, added - removed  # what was concluded before speaks of the region's nodes
+            nodes = {node for quad in added if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
             nodes -= region.nodes
             if not minted.isdisjoint(nodes) or any(graph.about(node) for node in nodes):
                 raise Joined
             minted |= nodes
-            changes.take(region.concluded, new)
+            changes.take(removed, added, (quad for quad in region.concluded if graph_of(quad) == GRAPH_REASONED))
     return changes
 
 
@@ -99,8 +100,7 @@ def _conclude_of_one(ontology: Ontology, region: Region) -> Conclusions:
     try:
         closure = Beside(ontology.schema, region.asserted)
         _check(ontology, closure)
-        of_all = ontology.triples | ontology.schema.kept
-        found = by_rules(ontology, of_all | region.asserted | closure.worth_keeping())
+        found = by_rules(ontology, ontology.triples, ontology.schema.kept, region.asserted, closure.worth_keeping())
         closure.add(found.concluded())
         _check(ontology, closure)
     except Equality as same:
@@ -110,7 +110,7 @@ def _conclude_of_one(ontology: Ontology, region: Region) -> Conclusions:
 
 
 def _check(ontology: Ontology, closure: Beside) -> None:
-    if ontology.borders.crossed(closure):
+    if ontology.borders.crossed_by(closure):
         raise Joined
 
 

@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from pyoxigraph import NamedNode, Quad, Store, Triple
+from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
 from irtwin.knowledge.engines import NATIVE
+from irtwin.knowledge.locality import read_by_rules
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
 from irtwin.knowledge.rules.files import all_rules
@@ -35,16 +36,19 @@ class Conclusions:
 
     def quads(self) -> set[Quad]:
         """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
-        store = Store()
         derivations = {Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items()}  # type: ignore[arg-type]
-        for name, triples in {**self.contents, GRAPH_REASONED: derivations | self.made_by}.items():
-            store.extend(in_graph(triples, name))
-        return set(store)
+        contents = {**self.contents, GRAPH_REASONED: derivations | self.made_by}
+        quads = {quad for name, triples in contents.items() for quad in in_graph(triples, name)}
+        written = [quad for quad in quads if isinstance(quad.object, Literal)]
+        store = Store()
+        store.extend(written)
+        return quads.difference(written).union(store)
 
 
-def by_rules(ontology: Ontology, known: set[Triple]) -> Conclusions:
-    """Return what the rules conclude, each into a named graph of its own."""
-    return Conclusions(running.conclusions(known, all_rules(ontology.resources)))
+def by_rules(ontology: Ontology, *known: Iterable[Triple]) -> Conclusions:
+    """Return what the rules conclude of what is known, each into a named graph of its own."""
+    resources = ontology.resources
+    return Conclusions(running.conclusions(read_by_rules(resources, *known), all_rules(resources)))
 
 
 def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:

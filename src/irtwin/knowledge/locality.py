@@ -8,14 +8,16 @@ here, so that `parts` can see whether some robot's facts make use of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
+from itertools import chain
+from operator import or_
 from typing import Any
 
 import rdflib
 from pyoxigraph import NamedNode, Triple
-from rdflib.paths import AlternativePath, MulPath, SequencePath
+from rdflib.paths import AlternativePath, InvPath, MulPath, SequencePath
 from rdflib.plugins.sparql import prepareQuery
 from rdflib.plugins.sparql.algebra import traverse
 from rdflib.plugins.sparql.parserutils import CompValue
@@ -29,6 +31,8 @@ _TYPE = rdflib.RDF.type
 _THIS = rdflib.Variable("this")
 _TEXTS = {SH + name for name in ("select", "ask", "construct")}
 
+ANY = "?"  # among predicates
+
 Pattern = tuple[Any, Any, Any]  # of rdflib's terms and paths
 
 
@@ -38,12 +42,14 @@ class Reach:
 
     `backward`: predicates that they follow from object to subject. `anywhere`: predicates of facts that they look for
     in all of the graph. `terms`: what they name. `unknown`: why they may look farther than this says; empty else.
+    `predicates`: of all facts that they look at, among them ANY where that is not known.
     """
 
     backward: frozenset[str] = frozenset()
     anywhere: frozenset[str] = frozenset()
     terms: frozenset[str] = frozenset()
     unknown: frozenset[str] = frozenset()
+    predicates: frozenset[str] = frozenset()
 
     def __or__(self, other: Reach) -> Reach:
         """Return how far both look."""
@@ -52,22 +58,29 @@ class Reach:
             self.anywhere | other.anywhere,
             self.terms | other.terms,
             self.unknown | other.unknown,
+            self.predicates | other.predicates,
         )
 
 
 def of_all_rules(resources: Resources) -> Reach:
     """Return how far the rules and the constraints look."""
-    return _of_files(resources.of("rules"), resources.of("shapes"))
+    return _of_rules(resources.of("rules")) | _of_shapes(resources.of("shapes"))
+
+
+def read_by_rules(resources: Resources, *known: Iterable[Triple]) -> Iterator[Triple]:
+    """Yield those of some triples that rules look at."""
+    read = _of_rules(resources.of("rules")).predicates
+    return (triple for triple in chain(*known) if ANY in read or triple.predicate.value in read)
 
 
 @lru_cache(maxsize=16)
-def _of_files(rules: Files, shapes: Files) -> Reach:
-    reach = Reach()
-    for rule in all_rules(Resources(rules)):
-        reach |= of_query(rule.construct)
-    for file in shapes:
-        reach |= of_shapes(read_turtle(file.path))
-    return reach
+def _of_rules(files: Files) -> Reach:
+    return reduce(or_, (of_query(rule.construct) for rule in all_rules(Resources(files))), Reach())
+
+
+@lru_cache(maxsize=16)
+def _of_shapes(files: Files) -> Reach:
+    return reduce(or_, (of_shapes(read_turtle(file.path)) for file in files), Reach())
 
 
 def of_query(text: str) -> Reach:
@@ -107,7 +120,7 @@ def of_shapes(triples: Iterable[Triple]) -> Reach:
     return reach
 
 
-def _reach(patterns: Iterable[Pattern], start: set[Any]) -> Reach:
+def _reach(patterns: Collection[Pattern], start: set[Any]) -> Reach:
     """Follow patterns from `start`, and from terms that they name, as far as subjects lead to objects."""
     reached, left = set(start), list(patterns)
     backward, anywhere, unknown = set[str](), set[str](), set[str]()
@@ -124,7 +137,8 @@ def _reach(patterns: Iterable[Pattern], start: set[Any]) -> Reach:
             unknown.add(f"{pattern[1]} in a rule")
         left.remove(pattern)
         reached |= {pattern[0], pattern[2]}
-    return Reach(frozenset(backward), frozenset(anywhere), frozenset(_iris(patterns)), frozenset(unknown))
+    read = frozenset(name for _, predicate, _ in patterns for name in _predicates(predicate))
+    return Reach(frozenset(backward), frozenset(anywhere), frozenset(_iris(patterns)), frozenset(unknown), read)
 
 
 def _known(term: Any, reached: set[Any]) -> bool:
@@ -133,6 +147,18 @@ def _known(term: Any, reached: set[Any]) -> bool:
 
 def _simple(predicate: Any) -> bool:
     return isinstance(predicate, rdflib.URIRef) and predicate != _TYPE
+
+
+def _predicates(path: Any) -> Iterator[str]:
+    if isinstance(path, SequencePath | AlternativePath):
+        for one in path.args:
+            yield from _predicates(one)
+    elif isinstance(path, MulPath):
+        yield from _predicates(path.path)
+    elif isinstance(path, InvPath):
+        yield from _predicates(path.arg)
+    else:
+        yield str(path) if isinstance(path, rdflib.URIRef) else ANY
 
 
 def _leads_forward(path: Any) -> bool:

@@ -20,6 +20,8 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -27,10 +29,11 @@ from pyoxigraph import BlankNode, NamedNode, Quad, Triple
 
 from irtwin.knowledge import locality
 from irtwin.knowledge.owl_rl import datatypes
+from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.rules import Fact, Number
-from irtwin.knowledge.owl_rl.schema import Schema
+from irtwin.knowledge.owl_rl.schema import Key, Schema
 from irtwin.knowledge.store.changes import is_asserted
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
@@ -46,8 +49,10 @@ from irtwin.knowledge.vocabulary import (
 )
 
 Name = NamedNode | BlankNode
+Row = tuple[Any, Any, Any, NamedNode]  # subject, predicate, object, and the named graph
 
 MOST_TOGETHER = 20_000  # triples of small parts that are looked at together
+MOST_KEPT = 100_000  # triples of parts that are kept for who asks next
 
 _TYPE = NamedNode(RDF + "type")
 _INVERSE_FUNCTIONAL = NamedNode(OWL + "InverseFunctionalProperty")
@@ -55,6 +60,9 @@ _ROBOT = NamedNode(term("Industrial_Robot"))
 _HAS_KEY = NamedNode(OWL + "hasKey")
 _NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED)
 _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
+_ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
+_NAMES = (NamedNode, BlankNode)
+_RECENT: WeakKeyDictionary[KnowledgeGraph, tuple[int, dict[Name, Region]]] = WeakKeyDictionary()
 
 
 class Ontology:
@@ -91,53 +99,76 @@ class Region:
     concluded: set[Quad] = field(default_factory=set)
     read: Counter[str] = field(default_factory=Counter)  # how many quads, by their graphs
 
-    def take(self, quad: Quad, ontology: Ontology) -> list[Name]:
-        """Take in a quad; return the nodes that it speaks of."""
-        name = quad.graph_name.value  # type: ignore[union-attr]
-        self.read[_kind(name)] += 1
-        if name.startswith(_NOT_PARTS):
-            return []
-        if not name.startswith(GRAPH_INFERRED) and name != GRAPH_REASONED:
-            self.asserted.add(quad.triple)
-        else:
-            self.concluded.add(quad)
-            if name == GRAPH_REASONED:
-                return []
-        return ontology.nodes(quad.triple)
+    def take(self, rows: Iterable[Row], ontology: Ontology) -> set[Name]:
+        """Take in quads; return the nodes of parts that are their objects."""
+        terms, found, counts = ontology.terms, set[Name](), dict[NamedNode, int]()
+        places = dict[NamedNode, str]()
+        for subject, predicate, object, graph in rows:
+            place = places.get(graph)
+            if place is None:
+                place, counts[graph] = places.setdefault(graph, _place(graph.value)), 0
+            counts[graph] += 1
+            if place == _ASSERTED:
+                self.asserted.add(Triple(subject, predicate, object))
+            elif place == _APART:
+                continue
+            else:
+                self.concluded.add(Quad(subject, predicate, object, graph))
+                if place == _NOTED:
+                    continue
+            if type(object) in _NAMES and predicate != _TYPE and object not in terms:
+                found.add(object)
+        for graph, count in counts.items():
+            self.read[_kind(graph.value)] += count
+        return found
 
 
 def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Region | None:
     """Return the parts that the seeds belong to, or None where one is a term that more is said of than the ontology."""
     region, todo = Region(), set(seeds)
     terms = todo & ontology.terms
-    if any(is_asserted(it) and _elsewhere(it) for it in graph.said_of(terms)):
+    if any(_place(name.value) == _ASSERTED and name.value != GRAPH_ONTOLOGY for *_, name in graph.said_of(terms)):
         return None
     todo -= terms
     while todo:
         region.nodes |= todo
-        found: set[Name] = set()
-        for quad in graph.said_of(todo):
-            found.update(region.take(quad, ontology))
+        found = region.take(graph.said_of(todo), ontology)
         before = graph.leading_to(todo, _NOT_FOLLOWED)
-        for quad in graph.said_of(before & ontology.terms):
-            if quad.object in todo:
-                found.update(region.take(quad, ontology))
+        found |= region.take((row for row in graph.said_of(before & ontology.terms) if row[2] in todo), ontology)
         todo = (found | before - ontology.terms) - region.nodes
     return region
 
 
-def some(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Iterator[Region | None]:
-    """Yield the parts that the seeds belong to, one by one, like `around`."""
+def some(
+    graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name], *, asserted: bool = False
+) -> Iterator[Region | None]:
+    """Yield the parts that the seeds belong to, one by one, like `around`.
+
+    asserted: what was concluded of them is not needed, so those that were read last may be given again.
+    """
     wanted, done = set(seeds), set[Name]()
+    recent = _recent(graph)
     for seed in sorted(wanted, key=str):
         if seed not in done:
-            region = around(graph, ontology, [seed])
+            region = recent.get(seed) if asserted else None
+            region = region or around(graph, ontology, [seed])
             if region is None:
                 yield None
                 return
             done |= region.nodes & wanted
             if region.nodes:  # none are around a term of the ontology
                 yield region
+                recent = _recent(graph)
+                if sum(len(one.asserted) for one in recent.values()) < MOST_KEPT:
+                    recent[seed] = region
+
+
+def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
+    """Return parts that were read lately, each by a node of it, if nothing was asserted meanwhile."""
+    count, found = _RECENT.get(graph, (-1, {}))
+    if count != graph.asserted_since:
+        _RECENT[graph] = graph.asserted_since, (found := {})
+    return found
 
 
 def each(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
@@ -198,9 +229,9 @@ def one(regions: Iterable[Region]) -> Region:
 def _of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
     region = Region()
     if graph.graphs(GRAPH_INFERRED):
-        for quad in graph.said_of(term for term in ontology.terms if isinstance(term, Name)):
-            if not is_asserted(quad) and not ontology.nodes(quad.triple):
-                region.take(quad, ontology)
+        said = graph.said_of(term for term in ontology.terms if isinstance(term, Name))
+        of_none = (row for row in said if _place(row[3].value) != _ASSERTED and not ontology.nodes(Triple(*row[:3])))
+        region.take(of_none, ontology)
     return region
 
 
@@ -298,6 +329,32 @@ class Borders:
         crossing = (fact for fact in closure.since(count) if self._joins(fact, closure.terms.literals))
         return next(map(closure.in_words, crossing), None)
 
+    def crossed_by(self, closure: Beside) -> bool:
+        """Whether facts that are closed beside the ontology say what crosses a border, as `crossed` has it."""
+        if self._everywhere is not None:
+            return True
+        literals = closure.terms.literals
+        return any(self._join(key, found, literals) for key, found in closure.known.items())
+
+    def _join(self, key: Key, found: set[Any], literals: set[Number]) -> bool:
+        """Whether facts do what `_joins` asks of each."""
+        predicate, end = key if isinstance(key, tuple) else (key, None)
+        subjects = found if end is not None else {one for one, _ in found}
+        objects = {end} if end is not None else {other for _, other in found}
+        if predicate == self._type and objects <= self._datatypes:
+            subjects = subjects - literals  # of values, the same in every part
+        if not subjects:
+            return False
+        if not (subjects.isdisjoint(literals) and subjects.isdisjoint(self._terms | self._datatypes)):
+            return True
+        if not objects.isdisjoint(self._datatypes - self._terms):
+            return True
+        if predicate == self._type:
+            return not objects.isdisjoint(self._kinds)
+        if predicate in self._backward and not (objects.isdisjoint(self._terms) and objects.isdisjoint(literals)):
+            return True
+        return predicate in self._forbidden
+
     def _joins(self, fact: Fact, literals: set[Number]) -> bool:
         subject, predicate, object = fact
         if subject in literals:
@@ -317,5 +374,10 @@ def _schema(ontology: frozenset[Triple]) -> Schema:
     return Schema(ontology)
 
 
-def _elsewhere(quad: Quad) -> bool:
-    return isinstance(quad.graph_name, NamedNode) and quad.graph_name.value != GRAPH_ONTOLOGY
+def _place(name: str) -> str:
+    """Return what a named graph holds, of `_ASSERTED` and the others."""
+    if name.startswith(_NOT_PARTS):
+        return _APART
+    if name == GRAPH_REASONED:
+        return _NOTED
+    return _CONCLUDED if name.startswith(GRAPH_INFERRED) else _ASSERTED

@@ -158,7 +158,7 @@ def _made_by(engine: str) -> Triple:
     return Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine))
 
 
-def _infer(ontology: Ontology, premises: set[Triple]) -> Conclusions:
+def infer(ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from the ontology and some parts."""
     closure = Closure(ontology.triples)
     count = len(closure)
@@ -174,11 +174,11 @@ def _infer(ontology: Ontology, premises: set[Triple]) -> Conclusions:
 def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
     try:
-        return _infer(ontology, premises)
+        return infer(ontology, premises)
     except Contradiction as clash:
         common, of_parts = parts.groups(ontology, premises)
         bad = _contradictory(ontology, common, of_parts, clash)
-        found = _infer(ontology, premises.difference(*(part for part, _ in bad)))
+        found = infer(ontology, premises.difference(*(part for part, _ in bad)))
         said = ((robot, reason) for part, reason in bad for robot in parts.spoken_for(ontology, part))
         found.made_by = {Triple(robot, _CONTRADICTION, Literal(reason)) for robot, reason in said}
         return found
@@ -195,7 +195,7 @@ def _contradictory(
     found, half = [], len(of_parts) // 2
     for some in (of_parts[:half], of_parts[half:]):
         try:
-            _infer(ontology, common.union(*some))
+            infer(ontology, common.union(*some))
         except Contradiction as own:
             found += _contradictory(ontology, common, some, own)
     return found

@@ -70,7 +70,7 @@ class Closure:
 
     def inferred(self) -> Iterator[Triple]:
         """Return every triple that follows and was not given. What RDF cannot write, of literals, is left out."""
-        helpers, forms = self._helpers(), self._terms.forms
+        helpers, forms = self.helpers(), self._terms.forms
         for fact in self._round:
             if fact not in self._given and fact[1] not in helpers:
                 yield from self._terms.triples(fact)
@@ -83,7 +83,7 @@ class Closure:
         Left out is what holds of everything (x sameAs x, C subClassOf C or owl:Thing), what is inferred of anonymous
         class expressions and of datatypes, and one more way to write a literal that stands there already.
         """
-        terms, helpers = self._terms, self._helpers()
+        terms, helpers = self._terms, self.helpers()
         hidden = {number for number, forms in enumerate(terms.forms) if forms and is_hidden(forms[0])}
         reflexive = {terms.number(NamedNode(iri)) for iri in _REFLEXIVE}
         kept: set[Triple] = set()
@@ -128,7 +128,7 @@ class Closure:
 
     def is_helper(self, statement: Statement) -> bool:
         """Whether a statement is one that the rules make for themselves, to walk along lists."""
-        return self._terms.number(statement[1]) in self._helpers()
+        return self._terms.number(statement[1]) in self.helpers()
 
     def _why(self, conclusion: Fact) -> Derivation | None:
         if conclusion in self._given or conclusion not in self._round:
@@ -214,7 +214,7 @@ class Closure:
         Rules need not look at that, unless somebody says something about owl:sameAs itself.
         """
         same = self._program.same
-        helpers = self._helpers()
+        helpers = self.helpers()
         facts = [fact for fact in self._round if fact[1] not in helpers]
         reflexive = [(number, same, number) for number in {same, *(number for fact in facts for number in fact)}]
         if any(same in (fact[0], fact[2]) for fact in facts):
@@ -225,7 +225,7 @@ class Closure:
 
     def _refuse_ill_typed(self) -> None:
         for literal in self._terms.ill_typed:
-            raise _not_of(self._use(self._terms.number(literal)), literal.datatype.value)
+            raise not_of(self._use(self._terms.number(literal)), literal.datatype.value)
 
     def _refuse_contradictions(self) -> None:
         for rule, join in self._program.contradictions:
@@ -234,7 +234,7 @@ class Closure:
 
     def _refuse(self, rule: Rule, found: Iterable[tuple[Number, ...]]) -> None:
         for culprits in found:
-            raise _contradiction(rule.name, ", ".join(map(self._name, culprits)))
+            raise contradiction(rule.name, ", ".join(map(self._name, culprits)))
 
     def _refuse_other_datatypes(self, facts: Facts) -> None:
         """Refuse values that are said to be of a datatype, and are not (dt-not-type)."""
@@ -242,9 +242,9 @@ class Closure:
             if datatypes.is_datatype(self.iri(kind)):
                 for number in members & self._terms.values.keys():
                     if self.iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
-                        raise _not_of(self._use(number), self.iri(kind))
+                        raise not_of(self._use(number), self.iri(kind))
 
-    def _helpers(self) -> set[Number]:
+    def helpers(self) -> set[Number]:
         """Return the predicates that only rules speak: their own, and lists that stand for a chain or a key."""
         lists = (self._facts.objects.get(number, {}) for number in self._program.helpers)
         return self._program.helpers.union(*lists)
@@ -260,9 +260,9 @@ class Closure:
     def _two_values(self, fact: Fact) -> Contradiction:
         derivation = self._why(fact)
         if derivation is None:
-            return _contradiction("dt-diff", " is the same as ".join(map(self._name, fact[::2])))
+            return contradiction("dt-diff", " is the same as ".join(map(self._name, fact[::2])))
         premises = (" ".join(map(show, premise)) for premise in derivation.premises)
-        return _contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises))
+        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises))
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""
@@ -306,9 +306,11 @@ def show(term: Node, base: str = ID) -> str:
     return str(term)
 
 
-def _contradiction(rule: str, what: str) -> Contradiction:
+def contradiction(rule: str, what: str) -> Contradiction:
+    """Return the error of a rule that finds a contradiction, and the terms it finds it of."""
     return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {what}")
 
 
-def _not_of(use: str, datatype: str) -> Contradiction:
-    return _contradiction("dt-not-type", f"the value is not of {shorten(datatype)} in {use}")
+def not_of(use: str, datatype: str) -> Contradiction:
+    """Return the error of a value, in a statement that uses it, that is not of a datatype."""
+    return contradiction("dt-not-type", f"the value is not of {shorten(datatype)} in {use}")

@@ -7,7 +7,7 @@ run forward over what is new (semi-naive evaluation) and asked backward for what
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -98,11 +98,13 @@ class Facts:
         self.subjects.setdefault(predicate, {}).setdefault(object, set()).add(subject)
         return True
 
-    def copy(self) -> Facts:
-        """Return the same triples, to be added to apart."""
+    def copy(self, changing: Container[Number | None]) -> Facts:
+        """Return the same triples, to be added to apart with some predicates alone; with any where None is one."""
         other = Facts()
         for mine, its in ((self.objects, other.objects), (self.subjects, other.subjects)):
-            its |= {predicate: {key: set(some) for key, some in found.items()} for predicate, found in mine.items()}
+            for predicate, found in mine.items():
+                changes = None in changing or predicate in changing
+                its[predicate] = {key: set(some) for key, some in found.items()} if changes else found
         return other
 
 

@@ -2,12 +2,16 @@
 
 Nearly all that OWL 2 RL concludes of individuals follows from one fact and the ontology: a type of a domain, an
 inverse, a class above a class. It is the same for all facts with that predicate, or of that type, so it is worked out
-once and kept as a table. What joins several facts stays a loop, as long as the ontology gives it anything to do.
+once and kept as a table. Of what joins several facts, two forms are kept as tables too: what is of several classes at
+once, and properties with one value. The rest stay loops, as long as the ontology gives them anything to do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from typing import Any
 
 from pyoxigraph import Triple
 
@@ -18,31 +22,64 @@ from irtwin.knowledge.owl_rl.rules import Fact, Join, Number, Pattern, Rule, Ter
 
 SUBJECT, OBJECT = -1, -2  # in a conclusion of the table: the ends of the fact that it follows from
 Key = Number | tuple[Number, Number]  # a predicate, or a predicate and an object
+_NOTHING: frozenset[Any] = frozenset()
+
+
+@dataclass(frozen=True)
+class Conjunction:
+    """What follows of a subject that has all of some predicates and objects: `concluded`, or where it finds a
+    contradiction `culprits`, in which SUBJECT stands for the subject.
+    """
+
+    rule: Rule
+    keys: tuple[tuple[Number, Number], ...]
+    concluded: tuple[Number, Number] | None
+    culprits: tuple[Number, ...]
 
 
 class Schema:
     """An ontology, closed. Contradiction where it contradicts itself.
 
-    `table` are the conclusions from one fact, by its predicate, or by predicate and object; `joins` are the loops of
-    the other rules, and `contradictions` those that find one. `reads_values` tells whether these ask of which
-    datatypes a literal is. `unfit` says in words why facts cannot be closed by all that, None where they can: terms of
-    the ontology are the same, and the rules of equality are left out here.
+    `table` are the conclusions from one fact, by its predicate, or by predicate and object; `conjunctions` those from
+    several facts of one subject; `single` the predicates by which a subject has one object (SUBJECT), or an object one
+    subject (OBJECT). `joins` are the loops of the other rules, and `contradictions` those that find one; `looked_at`
+    are the predicates of the facts that these loops look at, with the objects where these are known, and None for any.
+    `by_object` are the predicates whose facts are told apart by their objects. `reads_values` tells whether rules ask
+    of which datatypes a literal is. `unfit` says in words why facts cannot be closed by all that, None where they can:
+    terms of the ontology are the same, and the rules of equality are left out here.
     """
 
     def __init__(self, triples: Iterable[Triple]):
         self._program = program()
         self.closure = Closure(triples)
         self.kept = self.closure.worth_keeping()
+        self.helpers = self.closure.helpers()
         forms = self.closure.terms.forms
         self.hidden = {number for number, terms in enumerate(forms) if terms and is_hidden(terms[0])}
         self.table: dict[Key, list[Fact]] = {}
+        self.conjunctions: list[Conjunction] = []
+        self.single: set[tuple[Number, int]] = set()
         self.joins: list[Join] = []
         self.contradictions: list[tuple[Rule, Join]] = []
+        self.looked_at: dict[Number | None, set[Number | None]] = {}
         self.reads_values = False
+        self._pairs: dict[Number, frozenset[tuple[Number, Number]]] = {}
         self.unfit = next(self._equalities(), None)
         for rule in self._program.rules:
             if not any(predicate == "owl:sameAs" for _, predicate, _ in rule.body):
                 self._take(rule)
+        keys = [*self.table, *(key for found in self.conjunctions for key in found.keys)]
+        self.by_object = {key[0] for key in keys if isinstance(key, tuple)} | {self._program.type}
+
+    def known(self, key: Key) -> AbstractSet[Any]:
+        """Return what the ontology knows by a key: subjects, or by a predicate alone pairs of subject and object."""
+        facts = self.closure.facts
+        if isinstance(key, tuple):
+            return facts.subjects.get(key[0], {}).get(key[1], _NOTHING)
+        if key not in self._pairs:
+            objects = facts.objects.get(key, {})
+            self._pairs[key] = frozenset((subject, one) for subject, found in objects.items() for one in found)
+        return self._pairs[key]
 
     def _equalities(self) -> Iterator[str]:
         """Yield what the rules of equality would conclude from."""
@@ -52,19 +89,32 @@ class Schema:
                 yield self.closure.in_words(fact)
 
     def _take(self, rule: Rule) -> None:
-        """Put what a rule concludes beside the ontology into the table, or its loops beside it."""
+        """Put what a rule concludes beside the ontology into a table, or its loops beside it."""
         of_facts = [index for index, pattern in enumerate(rule.body) if not self._program.is_of_models(pattern)]
         bindings = list(self._bindings(rule, of_facts)) if of_facts else []
         if not bindings:
             return
+        patterns = [rule.body[index] for index in of_facts]
         if rule.head and len(of_facts) == 1:
-            found = [self._conclusions(rule, rule.body[of_facts[0]], bound) for bound in bindings]
+            found = [self._conclusions(rule, patterns[0], bound) for bound in bindings]
             if None not in found:
                 for key, conclusions in filter(None, found):
                     self.table.setdefault(key, []).extend(conclusions)
                 return
-        kinds = {self._value(rule.body[index][2], bound) for index in of_facts for bound in bindings}
-        self.reads_values |= any(self._is_datatype(kind) for kind in kinds)
+        values = [[tuple(self._value(term, bound) for term in one) for one in patterns] for bound in bindings]
+        self.reads_values |= any(self._is_datatype(pattern[2]) for of_one in values for pattern in of_one)
+        conjunctions = [self._conjunction(rule, *both) for both in zip(values, bindings, strict=True)]
+        if None not in conjunctions:
+            each = {(frozenset(it.keys), it.concluded): it for it in filter(None, conjunctions)}
+            self.conjunctions += each.values()
+            return
+        single = [self._one_value(rule, patterns, of_one) for of_one in values]
+        if None not in single:
+            self.single.update(filter(None, single))
+            return
+        for _, predicate, object in (pattern for of_one in values for pattern in of_one):
+            looked_at = self.looked_at.setdefault(None if isinstance(predicate, str) else predicate, set())
+            looked_at.add(None if isinstance(object, str) else object)
         loops = [compile_join(rule, self._program.number, rule.head or [rule.culprits], new=at) for at in of_facts]
         if rule.head:
             self.joins += loops
@@ -93,6 +143,42 @@ class Schema:
         numbers = {term: ends[value] if isinstance(value, str) else value for term, value in values.items()}
         found = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
         return (predicate if isinstance(object, str) else (predicate, object)), found
+
+    def _conjunction(
+        self, rule: Rule, patterns: list[tuple[Number | Term, ...]], bound: dict[Term, Number]
+    ) -> Conjunction | None:
+        """Return what a rule concludes of a subject that fits all patterns; None where it is no such rule."""
+        subjects = {pattern[0] for pattern in patterns}
+        keys = tuple((p, o) for _, p, o in patterns if not isinstance(p, str) and not isinstance(o, str))
+        decided = all(term in bound for pair in rule.unequal for term in pair)
+        if len(subjects) != 1 or len(keys) != len(patterns) or not decided or len(rule.head) > 1:
+            return None
+        (subject,) = subjects
+        if not isinstance(subject, str):
+            return None
+        if not rule.head:
+            named = [self._value(term, bound) for term in rule.culprits]
+            return Conjunction(rule, keys, None, tuple(SUBJECT if isinstance(it, str) else it for it in named))
+        s, p, o = (self._value(term, bound) for term in rule.head[0])
+        if s != subject or isinstance(p, str) or isinstance(o, str):
+            return None
+        return Conjunction(rule, keys, (p, o), ())
+
+    def _one_value(
+        self, rule: Rule, patterns: list[Pattern], values: list[tuple[Number | Term, ...]]
+    ) -> tuple[Number, int] | None:
+        """Return the predicate of which a rule allows one object, or one subject; None where it is no such rule."""
+        if len(patterns) != 2 or len(rule.head) != 1 or rule.head[0][1] != "owl:sameAs":
+            return None
+        (s, predicate, o), (t, other, u) = values
+        if isinstance(predicate, str) or predicate != other or not all(isinstance(end, str) for end in (s, o, t, u)):
+            return None
+        ends = {(rule.head[0][0], rule.head[0][2])}
+        if s == t and o != u and ends == {(o, u)} == set(rule.unequal):
+            return predicate, SUBJECT
+        if o == u and s != t and ends == {(s, t)} == set(rule.unequal):
+            return predicate, OBJECT
+        return None
 
     def _value(self, term: Term, bound: dict[Term, Number]) -> Number | Term:
         return bound.get(term, term) if term.startswith("?") else self._program.number(term)

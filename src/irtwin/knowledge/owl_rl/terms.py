@@ -55,6 +55,16 @@ class Terms:
         """Return a triple as numbers."""
         return (self.number(triple.subject), self.number(triple.predicate), self.number(triple.object))
 
+    def facts(self, triples: Iterable[Triple]) -> list[Fact]:
+        """Return triples as numbers."""
+        known, number, facts = self._numbers.get, self.number, []
+        for subject, predicate, object in triples:
+            s, p, o = known(subject), known(predicate), known(object)
+            if s is None or p is None or o is None:
+                s, p, o = number(subject), number(predicate), number(object)
+            facts.append((s, p, o))
+        return facts
+
     def triples(self, fact: Fact) -> Iterable[Triple]:
         """Return what numbers stand for: no triple where RDF has none, one for each way to write a literal."""
         if fact[0] in self.literals or fact[1] in self.literals:

@@ -15,8 +15,9 @@ from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
 from irtwin.knowledge.shacl.shapes import Node, Shapes
 from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF, RDFS, SH, XSD
 
+_KIND = "?_kind"
 _TARGETS = {
-    "targetClass": "$this a ?_kind . ?_kind rdfs:subClassOf* {}",
+    "targetClass": "$this a ?_kind {}",
     "targetNode": "VALUES $this {{ {} }}",
     "targetSubjectsOf": "$this {} ?_any",
     "targetObjectsOf": "?_any {} $this",
@@ -33,9 +34,12 @@ class _Unknown(Exception):
     """A constraint that is not known here."""
 
 
-def queries(triples: Iterable[Triple]) -> list[str]:
-    """Return a query for each shape of a shapes graph that has targets; each selects its suspects as `$this`."""
-    return list(_Writer(Shapes(triples, "shapes")).queries())
+def queries(triples: Iterable[Triple], classes: Iterable[Triple]) -> list[str]:
+    """Return a query for each shape of a shapes graph that has targets; each selects its suspects as `$this`.
+
+    classes: what the data say by rdfs:subClassOf.
+    """
+    return list(_Writer(Shapes(triples, "shapes"), classes).queries())
 
 
 def any_suspect(store: Store, asked: Iterable[str]) -> bool:
@@ -44,15 +48,19 @@ def any_suspect(store: Store, asked: Iterable[str]) -> bool:
 
 
 class _Writer:
-    def __init__(self, shapes: Shapes):
+    def __init__(self, shapes: Shapes, classes: Iterable[Triple]):
         self._shapes = shapes
+        self._below: dict[Node, set[Node]] = {}
+        for one in classes:
+            self._below.setdefault(one.object, set()).add(one.subject)
         self._numbers = count()
 
     def queries(self) -> Iterator[str]:
         for shape in self._shapes.all():
-            focus = " UNION ".join(f"{{ {target} }}" for target in self._targets(shape))
-            if not focus or self._shapes.is_deactivated(shape):
+            targets = " UNION ".join(f"{{ {target} }}" for target in self._targets(shape))
+            if not targets or self._shapes.is_deactivated(shape):
                 continue
+            focus = f"{{ SELECT DISTINCT $this {{ {targets} }} }}"  # each node once, however often it is a target
             try:
                 if self._shapes.values(shape, "path"):
                     conditions = list(self._of_values(shape, "?this"))
@@ -67,9 +75,24 @@ class _Writer:
 
     def _targets(self, shape: Node) -> Iterator[str]:
         for name, form in _TARGETS.items():
-            yield from (form.format(value) for value in self._shapes.values(shape, name))
+            for value in self._shapes.values(shape, name):
+                yield form.format(self._of_kind(_KIND, value) if name == "targetClass" else value)
         if {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")} & set(self._shapes.values(shape, RDF + "type")):
-            yield _TARGETS["targetClass"].format(shape)
+            yield _TARGETS["targetClass"].format(self._of_kind(_KIND, shape))
+
+    def _of_kind(self, variable: str, kind: Node) -> str:
+        """Return what is true of a variable that is a class, or below it."""
+        found, todo = {kind}, [kind]
+        while todo:
+            new = self._below.get(todo.pop(), set()) - found
+            found |= new
+            todo += new
+        if all(isinstance(one, NamedNode) for one in found):
+            names = sorted(map(str, found))
+            if variable == _KIND:  # its individuals are looked up
+                return f"VALUES {variable} {{ {' '.join(names)} }}"
+            return f"FILTER({variable} IN ({', '.join(names)}))"
+        return f". {variable} rdfs:subClassOf* {kind}"  # some have no name
 
     def _conditions(self, shape: Node, node: str, *, with_queries: bool = True) -> Iterator[str]:
         """Yield what is true of a node that keeps a shape; its queries are asked apart, or are not known."""
@@ -89,7 +112,7 @@ class _Writer:
             return f"({' || '.join(f'COALESCE({one}, false)' for one in either)})"
         if name == "class":
             kind = self._name()
-            return f"EXISTS {{ {node} a {kind} . {kind} rdfs:subClassOf* {value} }}"
+            return f"EXISTS {{ {node} a {kind} {self._of_kind(kind, value)} }}"
         if name == "datatype":
             return f"(datatype({node}) = {value} && {self._well_formed(value, node)})"
         if name == "in":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import pyshacl
 import rdflib
@@ -67,7 +67,10 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     if in_parts and graph.holds(validated):
         nodes = nodes_of(changed or set())
         report = _by_parts(
-            graph, ontology, parts.some(graph, ontology, nodes), _as_rdflib(graph.triples(GRAPH_VALIDATION))
+            graph,
+            ontology,
+            parts.some(graph, ontology, nodes, asserted=True),
+            _as_rdflib(graph.triples(GRAPH_VALIDATION)),
         )
     elif in_parts:
         report = _by_parts(graph, ontology, parts.each(graph, ontology), _empty())
@@ -142,27 +145,37 @@ def _report(data: Iterable[Triple], ontology: Ontology, files: Files) -> rdflib.
     said = shapes.unions.union(data)
     store = Store()
     store.extend(in_graph(said))
-    if not any_suspect(store, shapes.queries):
+    classes = {quad.triple for quad in store.quads_for_pattern(None, SUB_CLASS_OF, None, None)}
+    if not any_suspect(store, shapes.suspects(frozenset(classes))):
         return None
     report: rdflib.Graph
     _, report, _ = pyshacl.validate(_as_rdflib(said), shacl_graph=shapes.graph)
     return report
 
 
-@dataclass(frozen=True)
 class _Constraints:
-    """The shapes; what they have to find in the data: which classes are below unions; how suspects are found."""
+    """The shapes; `unions`, what they have to find in the data: which classes are below unions."""
 
-    graph: rdflib.Graph
-    unions: frozenset[Triple]
-    queries: tuple[str, ...]
+    def __init__(self, shapes: set[Triple]):
+        self._shapes = shapes
+        self._suspects: dict[frozenset[Triple], list[str]] = {}
+        self.unions = {triple for triple in shapes if triple.predicate == SUB_CLASS_OF}
+
+    @cached_property
+    def graph(self) -> rdflib.Graph:
+        """The shapes, for pySHACL."""
+        return _as_rdflib(self._shapes)
+
+    def suspects(self, classes: frozenset[Triple]) -> list[str]:
+        """Return the queries for suspects, where data say this by rdfs:subClassOf."""
+        if classes not in self._suspects:
+            self._suspects = {classes: queries(self._shapes, classes)}
+        return self._suspects[classes]
 
 
 @lru_cache(maxsize=1)
 def _shapes(ontology: frozenset[Triple], files: Files) -> _Constraints:
-    shapes = with_ontology((triple for file in files for triple in read_turtle(file.path)), ontology)
-    unions = frozenset(triple for triple in shapes if triple.predicate == SUB_CLASS_OF)
-    return _Constraints(_as_rdflib(shapes), unions, tuple(queries(shapes)))
+    return _Constraints(with_ontology((triple for file in files for triple in read_turtle(file.path)), ontology))
 
 
 def _as_rdflib(triples: Iterable[Triple]) -> rdflib.Graph:

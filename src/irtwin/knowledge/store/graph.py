@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -58,7 +59,7 @@ class KnowledgeGraph:
 
     Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
     in `workspace`, which a folder's parent is if none is given. Its individuals lie below `base`, else below what the
-    graph says of itself.
+    graph says of itself. `asserted_since` counts the writes, by this object, of what nobody inferred.
     """
 
     def __init__(
@@ -73,6 +74,7 @@ class KnowledgeGraph:
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         self._resources = resources
         self._base = base
+        self.asserted_since = 0
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
             self._store = Store() if place is None else SparqlServer(str(place))
@@ -103,6 +105,7 @@ class KnowledgeGraph:
         graph._store = Store.read_only(str(path))
         graph._workspace, graph._resources, graph._base = workspace or path.parent, None, None
         graph._reading = Reading(graph._store)
+        graph.asserted_since = 0
         return graph
 
     def __enter__(self) -> Self:
@@ -207,6 +210,7 @@ class KnowledgeGraph:
         """
         taken, given = set(removed), set(added)
         taken -= given
+        self.asserted_since += any(map(changes.is_asserted, chain(taken, given)))
         if isinstance(self._store, Store):
             given |= changes.notes(self._store, taken | given)
         if has_blank_node(taken | given):
@@ -379,14 +383,16 @@ class KnowledgeGraph:
             if not isinstance(quad.graph_name, DefaultGraph)
         ]
 
-    def said_of(self, nodes: Iterable[NamedNode | BlankNode]) -> Iterator[Quad]:
-        """Yield the quads of named graphs that have one of some nodes for subject; not of a server's graph."""
+    def said_of(self, nodes: Iterable[NamedNode | BlankNode]) -> Iterator[tuple[Any, Any, Any, NamedNode]]:
+        """Yield subject, predicate, object and named graph of what has one of some nodes for subject.
+
+        Not of a server's graph.
+        """
         named, others = _by_name(nodes)
         for some in named:
             rows = self._store.query(f"SELECT ?s ?p ?o ?g {{ VALUES ?s {{ {some} }} GRAPH ?g {{ ?s ?p ?o }} }}")
-            for subject, predicate, object, graph in cast(QuerySolutions, rows):
-                yield Quad(subject, predicate, object, graph)
-        yield from (quad for node in others for quad in self.about(node) if quad.subject == node)
+            yield from map(tuple, cast(Any, rows))
+        yield from (cast(Any, tuple(quad)) for node in others for quad in self.about(node) if quad.subject == node)
 
     @telling
     def leading_to(self, nodes: Iterable[NamedNode | BlankNode], apart: Iterable[str]) -> set[NamedNode | BlankNode]:
@@ -426,7 +432,10 @@ class KnowledgeGraph:
 
     def _forget_what_was_inferred(self, written: Iterable[str]) -> None:
         """Before graphs are written whole: have everything inferred and validated anew, if they are asserted."""
-        if isinstance(self._store, Store) and not all(name.startswith(changes.NOT_ASSERTED) for name in written):
+        if all(name.startswith(changes.NOT_ASSERTED) for name in written):
+            return
+        self.asserted_since += 1
+        if isinstance(self._store, Store):
             self.change(changes.made_of(self._store), ())
 
     def _functions(self, faults: dict[str, None]) -> Functions:
@@ -452,7 +461,7 @@ def read_turtle(file: Path) -> Iterator[Triple]:
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
     """Say of each triple that it belongs into the named graph, or into the default graph."""
     graph = DefaultGraph() if name is None else NamedNode(name)
-    return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
+    return (Quad(*triple, graph) for triple in triples)  # type: ignore[call-arg]
 
 
 def _by_name(nodes: Iterable[NamedNode | BlankNode]) -> tuple[list[str], list[BlankNode]]:
