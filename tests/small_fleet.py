@@ -59,8 +59,8 @@ LIVE = [  # robot, run, start, s, payload kg, stream, stale since, why
     ("Arm_D", "live_1", "2026-03-05 05:00", 4.0, 2.0, "ended", None, None),
 ]
 EXCURSIONS = [  # of Arm_B.live_1: channel, joint, number, began, ended, s, residual, unit, times its band
-    ("torque", "j2", 1, "2026-03-03 10:00:02", "2026-03-03 10:00:06", 4.0, 7.125, "N m", 2.5),
-    ("torque", "j2", 2, "2026-03-03 10:00:07", "2026-03-03 10:00:08", 1.0, 9.5, "N m", 3.25),  # too short for an alarm
+    ("torque", "j2", 1, "2026-03-03 10:00:02", "2026-03-03 10:00:06", 4.0, 7.125, "N-M", 2.5),
+    ("torque", "j2", 2, "2026-03-03 10:00:07", "2026-03-03 10:00:08", 1.0, 9.5, "N-M", 3.25),  # too short for an alarm
     ("power", None, 1, "2026-03-03 10:00:08", None, 4.0, 80.0, "W", 4.0),
 ]
 LEDGER = {  # run: effect, joint, J

@@ -19,6 +19,8 @@ PREFIXES = """
 @prefix effect: <https://w3id.org/irtwin/effect/> .
 @prefix provider: <https://w3id.org/irtwin/provider/> .
 @prefix prov: <http://www.w3.org/ns/prov#> .
+@prefix qudt: <http://qudt.org/schema/qudt/> .
+@prefix unit: <http://qudt.org/vocab/unit/> .
 @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
 @prefix skos: <http://www.w3.org/2004/02/skos/core#> .
 @prefix sh: <http://www.w3.org/ns/shacl#> .
@@ -178,18 +180,18 @@ class Factory:
     def _parameters(self) -> None:
         for number in range(1, self.joints + 1):
             for effect, name, unit, value in (
-                ("coulomb_friction", "Fc", "N m", 7.14 / number),
-                ("viscous_friction", "Fv", "N m s/rad", 8.05 / number if number < 6 else 0.02),
+                ("coulomb_friction", "Fc", "N-M", 7.14 / number),
+                ("viscous_friction", "Fv", "N-M-SEC-PER-RAD", 8.05 / number if number < 6 else 0.02),
             ):
                 self._parameter(effect, name, unit, value, f"irt:of_Joint {self._joint(number)} ;")
         for number in range(1, 13):
-            self._parameter("rigid_body", f"base_{number}", "kg m^2", 0.5 * number, "")
+            self._parameter("rigid_body", f"base_{number}", "KiloGM-M2", 0.5 * number, "")
         self._parameter("standby_power", "P0", "W", 150.0, "")
 
     def _parameter(self, effect: str, name: str, unit: str, value: float, joint: str) -> None:
         self.say(
             f"[] a irt:Twin_Parameter ; irt:parameter_of {self._twin} ; irt:of_Effect effect:{effect} ; {joint}"
-            f' irt:Parameter_Name "{name}" ; irt:Parameter_Value {value}e0 ; irt:Parameter_Unit "{unit}" ;'
+            f' irt:Parameter_Name "{name}" ; irt:Parameter_Value {value}e0 ; qudt:hasUnit unit:{unit} ;'
             f" irt:Interval_Lower {value - 0.1}e0 ; irt:Interval_Upper {value + 0.1}e0 ."
         )
 

@@ -13,14 +13,19 @@ from pathlib import Path
 import pytest
 from alembic.migration import MigrationContext
 from alembic.operations import Operations
-from sqlalchemy import inspect, text
+from sqlalchemy import create_engine, inspect, text
 from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
 from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
-from irtwin.storage.revisions.versions import r0001_tables_of_0_1, r0002_base_of_individuals, r0003_made_and_slower
+from irtwin.storage.revisions.versions import (
+    r0001_tables_of_0_1,
+    r0002_base_of_individuals,
+    r0003_made_and_slower,
+    r0005_units_of_live_gaps,
+)
 from irtwin.storage.schema import Base
 
 BEFORE = migration.newest()
@@ -157,6 +162,17 @@ def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_pa
         assert connection.execute(text("SELECT subject FROM activity")).scalars().all() == ["run/Arm_A.fit_1"]
         found = connection.execute(text("SELECT entity FROM activity_use")).scalars()
         assert set(found) == {"run/Arm_A.fit_1", "https://plant.example/x"}
+
+
+def test_units_of_live_gaps_are_as_qudt_names_them() -> None:
+    with create_engine("sqlite://").begin() as connection:
+        for table in ("gap_state", "gap_excursion"):
+            connection.execute(text(f"CREATE TABLE {table} (unit VARCHAR)"))
+            connection.execute(text(f"INSERT INTO {table} VALUES ('N m'), ('N'), ('W')"))
+        with Operations.context(MigrationContext.configure(connection)):
+            r0005_units_of_live_gaps.upgrade()
+        for table in ("gap_state", "gap_excursion"):
+            assert connection.execute(text(f"SELECT unit FROM {table}")).scalars().all() == ["N-M", "N", "W"]
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:
