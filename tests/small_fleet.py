@@ -248,7 +248,7 @@ def _twins() -> Iterator[Base]:
             yield schema.TwinEffect(twin_id=twin, effect=effect, activity_id=made)
         for of, name, *_, part in (run[:7] for run in RUNS):
             if of == robot and part == "fit":
-                yield schema.ActivityUse(activity_id=made, entity=f"run/{robot}.{name}")
+                yield schema.ActivityUse(activity_id=made, entity=f"run/{robot}.{name}", relation="wasInformedBy")
             if of == robot:
                 yield schema.TwinRun(twin_id=twin, run_id=f"{robot}.{name}", part=part, activity_id=made)
     for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
@@ -264,8 +264,8 @@ def _twins() -> Iterator[Base]:
     for number, (tried, before, after, outcome) in enumerate(ROUNDS, 1):
         made = f"improvement.Arm_A.{number}"
         yield _activity(made, "Arm_A", "improvement", "2026-03-05 12:04")
-        yield schema.ActivityUse(activity_id=made, entity="run/Arm_A.check_1")
-        yield schema.ActivityUse(activity_id=made, entity="twin/Arm_A.t0")
+        yield schema.ActivityUse(activity_id=made, entity="run/Arm_A.check_1", relation="wasInformedBy")
+        yield schema.ActivityUse(activity_id=made, entity="twin/Arm_A.t0", relation="used")
         yield schema.ImprovementRound(
             round_id=f"Arm_A.{number}", robot_id="Arm_A", number=number, tried=tried, effects="rigid_body",
             earlier_twin_id="Arm_A.t0", tried_twin_id=f"Arm_A.t{number}", error_before_percent=before,

@@ -199,7 +199,7 @@ class Factory:
         self.say(
             f"{self._act(provider)} a irt:Provider_Activity ; prov:wasAssociatedWith provider:{provider} ;"
             f' irt:Software "irtwin 0.1.0" ; prov:startedAtTime "2026-03-09T09:0{minute}:00Z"^^xsd:dateTime ;'
-            f' prov:endedAtTime "2026-03-09T09:0{minute}:12Z"^^xsd:dateTime ; prov:used {self._run("x")} .'
+            f' prov:endedAtTime "2026-03-09T09:0{minute}:12Z"^^xsd:dateTime ; prov:wasInformedBy {self._run("x")} .'
         )
 
     def _samples(self) -> pa.Table:

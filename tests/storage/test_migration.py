@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from alembic.migration import MigrationContext
 from alembic.operations import Operations
-from sqlalchemy import create_engine, inspect, text
+from sqlalchemy import create_engine, insert, inspect, text
 from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
@@ -24,9 +24,10 @@ from irtwin.storage.revisions.versions import (
     r0001_tables_of_0_1,
     r0002_base_of_individuals,
     r0003_made_and_slower,
-    r0005_units_of_live_gaps,
+    r0005_units_and_relations,
 )
-from irtwin.storage.schema import Base
+from irtwin.storage.rows import values
+from irtwin.storage.schema import Activity, Base
 
 BEFORE = migration.newest()
 # As a later irtwin would have it: runs have got the column `sample_rate_hz`.
@@ -70,6 +71,7 @@ def digest() -> str:
 AFTER_0_1 = {  # columns that revisions have added
     "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
+    "activity_use": ("relation",),
 }
 
 
@@ -157,22 +159,30 @@ def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_pa
     used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
     with Workspace(tmp_path) as place:
         older(place, of_0_1=True)
-        place.replace_activity(activity("a.1", "run_state", used), [used, "https://plant.example/x"], [])
+        with place.engine.begin() as connection:
+            about = values(activity("a.1", "run_state", used))
+            connection.execute(insert(Activity).values(about))
+            for entity in (used, "https://plant.example/x"):
+                connection.execute(text("INSERT INTO activity_use VALUES ('a.1', :entity)"), {"entity": entity})
     with Workspace(tmp_path) as place, place.engine.connect() as connection:
         assert connection.execute(text("SELECT subject FROM activity")).scalars().all() == ["run/Arm_A.fit_1"]
         found = connection.execute(text("SELECT entity FROM activity_use")).scalars()
         assert set(found) == {"run/Arm_A.fit_1", "https://plant.example/x"}
 
 
-def test_units_of_live_gaps_are_as_qudt_names_them() -> None:
+def test_units_of_live_gaps_and_relations_of_uses_are_written() -> None:
     with create_engine("sqlite://").begin() as connection:
         for table in ("gap_state", "gap_excursion"):
             connection.execute(text(f"CREATE TABLE {table} (unit VARCHAR)"))
             connection.execute(text(f"INSERT INTO {table} VALUES ('N m'), ('N'), ('W')"))
+        connection.execute(text("CREATE TABLE activity_use (entity VARCHAR)"))
+        connection.execute(text("INSERT INTO activity_use VALUES ('run/Arm_A.1'), ('twin/Arm_A.t1')"))
         with Operations.context(MigrationContext.configure(connection)):
-            r0005_units_of_live_gaps.upgrade()
+            r0005_units_and_relations.upgrade()
         for table in ("gap_state", "gap_excursion"):
             assert connection.execute(text(f"SELECT unit FROM {table}")).scalars().all() == ["N-M", "N", "W"]
+        uses = connection.execute(text("SELECT entity, relation FROM activity_use")).all()
+        assert [*map(tuple, uses)] == [("run/Arm_A.1", "wasInformedBy"), ("twin/Arm_A.t1", "used")]
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:

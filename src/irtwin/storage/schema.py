@@ -177,13 +177,23 @@ class Activity(Base):
     software: Mapped[str]  # "irtwin 0.1.0"
 
 
+def relation_to(read: str) -> str:
+    """Return the term of PROV that leads from an activity to what it read, by an IRI whole or below the base.
+
+    A run is an activity too, and no entity.
+    """
+    is_run = read.startswith("run/") or ("://" in read and "/run/" in read)
+    return "wasInformedBy" if is_run else "used"
+
+
 class ActivityUse(Base):
-    """An entity that an activity read: a run's series or a twin, by its IRI below the workspace's base."""
+    """What an activity read: a run, a run's series or a twin, by its IRI below the workspace's base."""
 
     __tablename__ = "activity_use"
 
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), primary_key=True)
     entity: Mapped[str] = mapped_column(primary_key=True)
+    relation: Mapped[str]  # as PROV names it, see `relation_to`
 
 
 class RunState(Base):

@@ -17,7 +17,7 @@ WHERE {
 }
 ORDER BY ?finished ?activity"""
 
-_INPUTS = "SELECT ?entity WHERE { ?activity prov:used ?entity } ORDER BY ?entity"
+_INPUTS = "SELECT ?entity WHERE { ?activity prov:used|prov:wasInformedBy ?entity } ORDER BY ?entity"
 
 _FILES = """
 SELECT ?file ?checksum (COALESCE(?own, ?shared) AS ?folder)
@@ -44,7 +44,12 @@ WHERE {
 }
 ORDER BY ?file"""
 
-_RUN = "SELECT ?run WHERE { ?thing irt:series_of ?run FILTER NOT EXISTS { ?thing prov:wasGeneratedBy ?activity } }"
+_RUN = """
+SELECT ?run
+WHERE {
+  ?thing irt:series_of ?run
+  FILTER NOT EXISTS { ?thing prov:wasGeneratedBy / prov:wasAssociatedWith ?provider }
+}"""
 
 _ACTIVITY = """
 SELECT ?activity ?provider ?software ?finished
