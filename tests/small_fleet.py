@@ -94,6 +94,7 @@ def fill(workspace: Workspace) -> None:
     with Session(workspace.engine) as session, session.begin():
         for row in [
             *_robots(),
+            *(schema.RobotNote(robot_id=of, name=name, number=at, text=text) for of, name, at, text in NOTES),
             *_structures(),
             *_plans(),
             *_runs(),
@@ -105,6 +106,14 @@ def fill(workspace: Workspace) -> None:
         ]:
             session.add(row)
             session.flush()
+
+
+NOTES = (
+    ("Arm_A", "location", 1, "cell 4"),
+    ("Arm_C", "supply.voltage", 1, "400"),
+    ("Arm_C", "tools", 1, "gripper"),
+    ("Arm_C", "tools", 2, "welder"),
+)
 
 
 def _robots() -> Iterator[Base]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,14 +63,19 @@ class Factory:
     def say(self, text: str) -> None:
         self.text.append(text)
 
-    def robot(self, note: str = "{}", facts: bool = True) -> Factory:
+    def robot(self, note: Mapping[str, str] | None = None, facts: bool = True) -> Factory:
         more = 'irt:Manufacturer "Maker" ; irt:IR_Type "articulated" ; irt:IR_Weight 50.0e0 ; irt:Rated_Payload 6.0e0 ;'
         self.say(
             f"<{self.iri}> a irt:Industrial_Robot ; irt:has_Information <{self.iri}/information> ."
             f"<{self.iri}/information> a irt:IR_Information ; irt:IR_Name {_text(self.name)} ;"
             f' irt:Controlled_Axes {self.joints} ; {more if facts else ""} irt:Power_Measured_At "mains" ;'
-            f" irt:Simulated {str(self.simulated).lower()} ; irt:Note {_text(note)} ."
+            f" irt:Simulated {str(self.simulated).lower()}."
         )
+        for name, said in (note or {}).items():
+            self.say(
+                f"[] a irt:Robot_Note ; irt:note_of <{self.iri}> ;"
+                f" irt:Note_Name {_text(name)} ; irt:Note_Text {_text(said)} ."
+            )
         for number, name in enumerate(self.names, 1):
             self.say(
                 f"<{self.iri}> irt:has_Joint {self._joint(number)} . {self._joint(number)} a irt:Robot_Joint ;"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from sqlalchemy import create_engine, insert, inspect, text
 from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
+from irtwin.providers.records import flat_notes
 from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
@@ -25,6 +27,7 @@ from irtwin.storage.revisions.versions import (
     r0002_base_of_individuals,
     r0003_made_and_slower,
     r0005_units_and_relations,
+    r0006_notes_of_robots,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base
@@ -88,6 +91,7 @@ def older(place: Workspace, *, of_0_1: bool = False) -> None:
                 for column in gone:
                     of.drop_column(column)
         if of_0_1:
+            connection.execute(text("DROP TABLE robot_note"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
@@ -183,6 +187,19 @@ def test_units_of_live_gaps_and_relations_of_uses_are_written() -> None:
             assert connection.execute(text(f"SELECT unit FROM {table}")).scalars().all() == ["N-M", "N", "W"]
         uses = connection.execute(text("SELECT entity, relation FROM activity_use")).all()
         assert [*map(tuple, uses)] == [("run/Arm_A.1", "wasInformedBy"), ("twin/Arm_A.t1", "used")]
+
+
+def test_notes_become_rows() -> None:
+    said = '{"location": "cell 4", "supply": {"voltage": 400}, "tools": ["gripper", "welder"]}'
+    with create_engine("sqlite://").begin() as connection:
+        connection.execute(text("CREATE TABLE robot (robot_id VARCHAR PRIMARY KEY, notes VARCHAR)"))
+        connection.execute(text("INSERT INTO robot VALUES ('Arm_A', :said), ('Arm_B', '{}')"), {"said": said})
+        with Operations.context(MigrationContext.configure(connection)):
+            r0006_notes_of_robots.upgrade()
+        found = connection.execute(text("SELECT * FROM robot_note")).all()
+    expected = {(name, 1, value[0]) for name, value in flat_notes(json.loads(said)).items()} | {("tools", 2, "welder")}
+    assert {tuple(row) for row in found} == {("Arm_A", *row) for row in expected}
+    assert ("supply.voltage", 1, "400") in expected
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:

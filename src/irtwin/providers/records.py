@@ -8,10 +8,11 @@ import json
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -40,6 +41,7 @@ from irtwin.storage.schema import (
     Base,
     Joint,
     Robot,
+    RobotNote,
     Run,
     SourceFile,
 )
@@ -72,6 +74,11 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
         announce(line)
     parts: list[Base] = [
         *_source_files(robot_id, data_set),
+        *(
+            RobotNote(robot_id=robot_id, name=name, number=number, text=text)
+            for name, values in flat_notes(data_set.notes).items()
+            for number, text in enumerate(values, start=1)
+        ),
         *(_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)),
         *structure_rows(robot_id, data_set.robot, meshes),
         *device_rows(robot_id, data_set),
@@ -319,6 +326,23 @@ def _source_files(robot_id: str, data_set: log.DataSet) -> list[SourceFile]:
         for file, checksum in data_set.sha256.items()
         for path in [_within(data_set.folder, file)]
     ]
+
+
+def flat_notes(notes: Mapping[str, Any], below: str = "") -> dict[str, list[str]]:
+    """Return the values of notes as text, by names: "supply.voltage" of a table within, several of a list."""
+    found: dict[str, list[str]] = {}
+    for name, value in notes.items():
+        if isinstance(value, Mapping):
+            found |= flat_notes(value, f"{below}{name}.")
+        elif isinstance(value, list | tuple):
+            found[f"{below}{name}"] = [_text(one) for one in value]
+        else:
+            found[f"{below}{name}"] = [_text(value)]
+    return found
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, default=str)
 
 
 def _within(folder: Path, file: Path) -> str:

@@ -76,7 +76,18 @@ class Robot(Base):
     urdf: Mapped[str]
     urdf_sha256: Mapped[str]
     twin_effects: Mapped[str | None]  # comma separated: what the data set says that its twin models
-    notes: Mapped[str]  # JSON: what the data set says beside the contract
+    notes: Mapped[str]  # JSON: what the data set says beside the contract; for the graph in `robot_note`
+
+
+class RobotNote(Base):
+    """A thing that a data set says of its robot beside the contract: one value under one name."""
+
+    __tablename__ = "robot_note"
+
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)  # of a table within the table: "supply.voltage"
+    number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on, of the values in a list
+    text: Mapped[str]
 
 
 class SourceFile(Base):
