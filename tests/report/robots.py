@@ -247,7 +247,7 @@ class Factory:
 def six_axis(graph: KnowledgeGraph, runs: int = 6, **changes: object) -> Factory:
     """A robot of six axes with torque and power; the last third of its runs is held out."""
     factory = Factory("KUKA_KR6_R700", "KUKA_KR6_R700", simulated=True, **changes)  # type: ignore[arg-type]
-    factory.robot(note='{"torque": "motor current times torque constant", "supply": "3 x 400 V"}')
+    factory.robot(note={"torque": "motor current times torque constant", "supply": "3 x 400 V"})
     names = [f"exciting_{k}" if k % 2 else f"cycle_{k}" for k in range(1, runs + 1)]
     for index, name in enumerate(names):
         factory.run(name, role="reference" if index < runs // 2 else "observed", day=1 + index % factory.days)

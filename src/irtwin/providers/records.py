@@ -48,6 +48,7 @@ from irtwin.storage.schema import (
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
+_HAVE_TERMS = {*log.ROBOT_KEYS} - {"torque_scale_uncertainty"}  # keys of [robot] that are no notes in the graph
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
 _READABLE = 40  # characters of a name that is not plain
 
@@ -77,6 +78,7 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
         *(
             RobotNote(robot_id=robot_id, name=name, number=number, text=text)
             for name, values in flat_notes(data_set.notes).items()
+            if name not in _HAVE_TERMS
             for number, text in enumerate(values, start=1)
         ),
         *(_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)),

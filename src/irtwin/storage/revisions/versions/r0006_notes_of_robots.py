@@ -7,6 +7,10 @@ from alembic import op
 
 revision = "0006"
 down_revision = "0005"
+HAVE_TERMS = (  # in the graph already
+    "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
+    "arm_movement_type", "simulated", "joint",
+)  # fmt: skip
 TABLES = "e379fd3b25001d9a"
 
 
@@ -24,6 +28,7 @@ def upgrade() -> None:
         {"robot_id": robot, "name": name, "number": number, "text": text}
         for robot, said in robots
         for name, number, text in _flat(json.loads(said), "")
+        if name not in HAVE_TERMS
     ]
     if rows:
         op.bulk_insert(notes, rows)
