@@ -59,8 +59,8 @@ LIVE = [  # robot, run, start, s, payload kg, stream, stale since, why
     ("Arm_D", "live_1", "2026-03-05 05:00", 4.0, 2.0, "ended", None, None),
 ]
 EXCURSIONS = [  # of Arm_B.live_1: channel, joint, number, began, ended, s, residual, unit, times its band
-    ("torque", "j2", 1, "2026-03-03 10:00:02", "2026-03-03 10:00:06", 4.0, 7.125, "N m", 2.5),
-    ("torque", "j2", 2, "2026-03-03 10:00:07", "2026-03-03 10:00:08", 1.0, 9.5, "N m", 3.25),  # too short for an alarm
+    ("torque", "j2", 1, "2026-03-03 10:00:02", "2026-03-03 10:00:06", 4.0, 7.125, "N-M", 2.5),
+    ("torque", "j2", 2, "2026-03-03 10:00:07", "2026-03-03 10:00:08", 1.0, 9.5, "N-M", 3.25),  # too short for an alarm
     ("power", None, 1, "2026-03-03 10:00:08", None, 4.0, 80.0, "W", 4.0),
 ]
 LEDGER = {  # run: effect, joint, J
@@ -94,6 +94,7 @@ def fill(workspace: Workspace) -> None:
     with Session(workspace.engine) as session, session.begin():
         for row in [
             *_robots(),
+            *(schema.RobotNote(robot_id=of, name=name, number=at, text=text) for of, name, at, text in NOTES),
             *_structures(),
             *_plans(),
             *_runs(),
@@ -105,6 +106,14 @@ def fill(workspace: Workspace) -> None:
         ]:
             session.add(row)
             session.flush()
+
+
+NOTES = (
+    ("Arm_A", "location", 1, "cell 4"),
+    ("Arm_C", "supply.voltage", 1, "400"),
+    ("Arm_C", "tools", 1, "gripper"),
+    ("Arm_C", "tools", 2, "welder"),
+)
 
 
 def _robots() -> Iterator[Base]:
@@ -248,7 +257,7 @@ def _twins() -> Iterator[Base]:
             yield schema.TwinEffect(twin_id=twin, effect=effect, activity_id=made)
         for of, name, *_, part in (run[:7] for run in RUNS):
             if of == robot and part == "fit":
-                yield schema.ActivityUse(activity_id=made, entity=f"run/{robot}.{name}")
+                yield schema.ActivityUse(activity_id=made, entity=f"run/{robot}.{name}", relation="wasInformedBy")
             if of == robot:
                 yield schema.TwinRun(twin_id=twin, run_id=f"{robot}.{name}", part=part, activity_id=made)
     for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
@@ -264,8 +273,8 @@ def _twins() -> Iterator[Base]:
     for number, (tried, before, after, outcome) in enumerate(ROUNDS, 1):
         made = f"improvement.Arm_A.{number}"
         yield _activity(made, "Arm_A", "improvement", "2026-03-05 12:04")
-        yield schema.ActivityUse(activity_id=made, entity="run/Arm_A.check_1")
-        yield schema.ActivityUse(activity_id=made, entity="twin/Arm_A.t0")
+        yield schema.ActivityUse(activity_id=made, entity="run/Arm_A.check_1", relation="wasInformedBy")
+        yield schema.ActivityUse(activity_id=made, entity="twin/Arm_A.t0", relation="used")
         yield schema.ImprovementRound(
             round_id=f"Arm_A.{number}", robot_id="Arm_A", number=number, tried=tried, effects="rigid_body",
             earlier_twin_id="Arm_A.t0", tried_twin_id=f"Arm_A.t{number}", error_before_percent=before,

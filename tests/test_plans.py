@@ -107,7 +107,7 @@ def test_the_graph_says_of_a_plan_what_the_command_printed(performed: Path, kept
 def test_a_plan_leads_back_to_twin_and_motion(performed: Path) -> None:
     used = asking.ask(
         """SELECT ?kind { ?run irt:Run_Name "reach" ; irt:priced_by ?twin . GRAPH ?g { ?run irt:Planned_Energy ?j }
-        ?g prov:wasGeneratedBy ?activity . ?activity prov:used ?used FILTER(?used IN (?run, ?twin))
+        ?g prov:wasGeneratedBy ?activity . ?activity prov:used|prov:wasInformedBy ?used FILTER(?used IN (?run, ?twin))
         BIND(IF(?used = ?run, "motion", "twin") AS ?kind) } ORDER BY ?kind""",
         performed,
     )

@@ -16,9 +16,12 @@ PREFIXES = """
 @prefix skos: <http://www.w3.org/2004/02/skos/core#> . @prefix qudt: <http://qudt.org/schema/qudt/> .
 @prefix dcterms: <http://purl.org/dc/terms/> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
 """
+MODULE = "<https://w3id.org/irtwin/x> a owl:Ontology ."
 BAD = {  # a small ontology in which :Bad, or :bad, is what the rule is there to find; :Good it must not find
     "label": ":Bad a owl:Class . :Good a owl:Class ; rdfs:label 'good'@en .",
     "definition": ":Bad a owl:Class . :Good a owl:Class ; skos:definition 'Good.'@en .",
+    "defined_by": f""":Bad a owl:Class ; rdfs:isDefinedBy :nothing . {MODULE}
+        :Good a owl:Class ; rdfs:isDefinedBy <https://w3id.org/irtwin/x> .""",
     "definition_style": """:Bad rdfs:label 'bad thing'@en ; skos:definition 'Bad thing.'@en .
         :Good rdfs:label 'good'@en ; skos:definition 'What one likes.'@en .""",
     "language_tag": ":Bad rdfs:label 'bad' . :Good rdfs:label 'good'@en .",

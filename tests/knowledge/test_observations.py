@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import pyshacl
 import pytest
 import rdflib
 from pyoxigraph import RdfFormat, Triple, serialize
-from sqlalchemy.orm import Session
-from tests import rows, small_fleet
+from tests import small_fleet
 
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID
 from irtwin.resources import folder, shipped
-from irtwin.signals.channels import CHANNELS
-from irtwin.storage import structure_schema as structure
 from irtwin.storage.database import Workspace
 
 FILES = ("observation", "robot_structure", "robot", "run_process")
@@ -71,27 +67,6 @@ def test_only_what_was_logged_was_observed(graph: KnowledgeGraph) -> None:
 def test_a_run_whose_log_says_no_time_has_an_interval_without_beginning(graph: KnowledgeGraph) -> None:
     begun = graph.query("SELECT ?i { ?i a <http://www.w3.org/2006/time#ProperInterval> }").rows
     assert len(begun) == len(small_fleet.RUNS) + len(small_fleet.LIVE)
-
-
-def test_each_channel_has_the_unit_of_its_symbol(tmp_path: Path) -> None:
-    units = {unit for one in CHANNELS.values() for unit in (one.unit, one.sliding) if unit}
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    with Workspace(tmp_path) as workspace, Session(workspace.engine) as session:
-        session.add(rows.robot())
-        session.flush()
-        session.add_all(channel(number, unit) for number, unit in enumerate(sorted(units)))
-        session.commit()
-        documents = [folder("mappings") / "robot_structure.r2rml.ttl"]
-        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE)
-    asked = "SELECT ?label ?unit { ?channel irt:Channel_Label ?label ; qudt:hasUnit / qudt:symbol ?unit }"
-    assert {row["label"]: row["unit"] for row in graph.query(asked)} == {unit: unit for unit in units}
-
-
-def channel(number: int, unit: str) -> structure.DeviceChannel:
-    return structure.DeviceChannel(
-        robot_id=rows.ROBOT, column_name=f"c_{number}", device_id="x", label=unit, unit=unit, rate_hz=1.0
-    )
 
 
 def violations(triples: Iterable[Triple], focus: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,8 @@ PREFIXES = """
 @prefix effect: <https://w3id.org/irtwin/effect/> .
 @prefix provider: <https://w3id.org/irtwin/provider/> .
 @prefix prov: <http://www.w3.org/ns/prov#> .
+@prefix qudt: <http://qudt.org/schema/qudt/> .
+@prefix unit: <http://qudt.org/vocab/unit/> .
 @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
 @prefix skos: <http://www.w3.org/2004/02/skos/core#> .
 @prefix sh: <http://www.w3.org/ns/shacl#> .
@@ -61,14 +63,19 @@ class Factory:
     def say(self, text: str) -> None:
         self.text.append(text)
 
-    def robot(self, note: str = "{}", facts: bool = True) -> Factory:
+    def robot(self, note: Mapping[str, str] | None = None, facts: bool = True) -> Factory:
         more = 'irt:Manufacturer "Maker" ; irt:IR_Type "articulated" ; irt:IR_Weight 50.0e0 ; irt:Rated_Payload 6.0e0 ;'
         self.say(
             f"<{self.iri}> a irt:Industrial_Robot ; irt:has_Information <{self.iri}/information> ."
             f"<{self.iri}/information> a irt:IR_Information ; irt:IR_Name {_text(self.name)} ;"
             f' irt:Controlled_Axes {self.joints} ; {more if facts else ""} irt:Power_Measured_At "mains" ;'
-            f" irt:Simulated {str(self.simulated).lower()} ; irt:Note {_text(note)} ."
+            f" irt:Simulated {str(self.simulated).lower()}."
         )
+        for name, said in (note or {}).items():
+            self.say(
+                f"[] a irt:Robot_Note ; irt:note_of <{self.iri}> ;"
+                f" irt:Note_Name {_text(name)} ; irt:Note_Text {_text(said)} ."
+            )
         for number, name in enumerate(self.names, 1):
             self.say(
                 f"<{self.iri}> irt:has_Joint {self._joint(number)} . {self._joint(number)} a irt:Robot_Joint ;"
@@ -178,18 +185,18 @@ class Factory:
     def _parameters(self) -> None:
         for number in range(1, self.joints + 1):
             for effect, name, unit, value in (
-                ("coulomb_friction", "Fc", "N m", 7.14 / number),
-                ("viscous_friction", "Fv", "N m s/rad", 8.05 / number if number < 6 else 0.02),
+                ("coulomb_friction", "Fc", "N-M", 7.14 / number),
+                ("viscous_friction", "Fv", "N-M-SEC-PER-RAD", 8.05 / number if number < 6 else 0.02),
             ):
                 self._parameter(effect, name, unit, value, f"irt:of_Joint {self._joint(number)} ;")
         for number in range(1, 13):
-            self._parameter("rigid_body", f"base_{number}", "kg m^2", 0.5 * number, "")
+            self._parameter("rigid_body", f"base_{number}", "KiloGM-M2", 0.5 * number, "")
         self._parameter("standby_power", "P0", "W", 150.0, "")
 
     def _parameter(self, effect: str, name: str, unit: str, value: float, joint: str) -> None:
         self.say(
             f"[] a irt:Twin_Parameter ; irt:parameter_of {self._twin} ; irt:of_Effect effect:{effect} ; {joint}"
-            f' irt:Parameter_Name "{name}" ; irt:Parameter_Value {value}e0 ; irt:Parameter_Unit "{unit}" ;'
+            f' irt:Parameter_Name "{name}" ; irt:Parameter_Value {value}e0 ; qudt:hasUnit unit:{unit} ;'
             f" irt:Interval_Lower {value - 0.1}e0 ; irt:Interval_Upper {value + 0.1}e0 ."
         )
 
@@ -197,7 +204,7 @@ class Factory:
         self.say(
             f"{self._act(provider)} a irt:Provider_Activity ; prov:wasAssociatedWith provider:{provider} ;"
             f' irt:Software "irtwin 0.1.0" ; prov:startedAtTime "2026-03-09T09:0{minute}:00Z"^^xsd:dateTime ;'
-            f' prov:endedAtTime "2026-03-09T09:0{minute}:12Z"^^xsd:dateTime ; prov:used {self._run("x")} .'
+            f' prov:endedAtTime "2026-03-09T09:0{minute}:12Z"^^xsd:dateTime ; prov:wasInformedBy {self._run("x")} .'
         )
 
     def _samples(self) -> pa.Table:
@@ -240,7 +247,7 @@ class Factory:
 def six_axis(graph: KnowledgeGraph, runs: int = 6, **changes: object) -> Factory:
     """A robot of six axes with torque and power; the last third of its runs is held out."""
     factory = Factory("KUKA_KR6_R700", "KUKA_KR6_R700", simulated=True, **changes)  # type: ignore[arg-type]
-    factory.robot(note='{"torque": "motor current times torque constant", "supply": "3 x 400 V"}')
+    factory.robot(note={"torque": "motor current times torque constant", "supply": "3 x 400 V"})
     names = [f"exciting_{k}" if k % 2 else f"cycle_{k}" for k in range(1, runs + 1)]
     for index, name in enumerate(names):
         factory.run(name, role="reference" if index < runs // 2 else "observed", day=1 + index % factory.days)

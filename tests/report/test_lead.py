@@ -52,7 +52,7 @@ def test_switching_off_while_waiting_has_an_interval_or_is_not_said(graph: Knowl
     factory.text = [text for text in factory.text if "of_Effect effect:standby_power" not in text]
     factory.say(
         f"[] a irt:Twin_Parameter ; irt:parameter_of {factory._twin} ; irt:of_Effect effect:standby_power ;"
-        ' irt:Parameter_Name "P0" ; irt:Parameter_Value 150.0e0 ; irt:Parameter_Unit "W" .'
+        ' irt:Parameter_Name "P0" ; irt:Parameter_Value 150.0e0 ; qudt:hasUnit unit:W .'
     )
     assert lead.could_save(answers(graph, factory.into(graph))) is None
 

@@ -100,7 +100,7 @@ def test_conclusions_say_how_they_are_known(graph: KnowledgeGraph, tmp_path: Pat
 
 
 def test_hostile_names_are_text(graph: KnowledgeGraph, page_of: PageOf):
-    factory = Factory("ODD", HOSTILE, joint_name=HOSTILE + "{}").robot(note='{"<script>": "</script><script>alert(2)"}')
+    factory = Factory("ODD", HOSTILE, joint_name=HOSTILE + "{}").robot(note={"<script>": "</script><script>alert(2)"})
     page = page_of(factory.run(HOSTILE.translate({60: "a", 62: "b", 34: "c", 39: "d"})).into(graph))
     elements = Elements(page)
     assert [a.get("type") for tag, a in elements.found if tag == "script"] == [

@@ -80,11 +80,6 @@ def test_moments_are_utc():
     assert wording.moment(datetime(2026, 3, 1, 8, 30)) == wording.moment(datetime(2026, 3, 1, 8, 30, tzinfo=UTC))
 
 
-def test_notes_are_names_and_text():
-    assert wording.notes('{"supply": "400 V", "axes": [1, 2]}') == {"supply": "400 V", "axes": "[1, 2]"}
-    assert wording.notes(None) == wording.notes("") == {}
-
-
 def test_names_are_listed_as_in_a_sentence():
     assert wording.listed(["a"]) == "a"
     assert wording.listed(["a", "b", "c"]) == "a, b and c"

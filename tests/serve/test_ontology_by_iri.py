@@ -71,3 +71,10 @@ def test_a_browser_gets_the_page_instead(server) -> None:
     assert "Industrial_Robot" in documentation.text and "Content-Security-Policy" in documentation.text
     assert CLIENT.get(server.sparql, headers={"Accept": "image/png"}).status_code == 406
     assert CLIENT.get(server.sparql).headers["content-type"].startswith("text/turtle")
+
+
+def test_the_competency_questions_are_a_page_that_every_page_leads_to(server) -> None:
+    questions = CLIENT.get(f"{server.url}/questions")
+    assert (questions.status_code, questions.headers["content-type"]) == (200, "text/html; charset=utf-8")
+    assert 'id="energy_per_joint"' in questions.text
+    assert 'href="/questions"' in CLIENT.get(f"{server.url}/query").text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -13,10 +14,11 @@ from pathlib import Path
 import pytest
 from alembic.migration import MigrationContext
 from alembic.operations import Operations
-from sqlalchemy import inspect, text
+from sqlalchemy import create_engine, insert, inspect, text
 from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
+from irtwin.providers.records import flat_notes
 from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
@@ -25,8 +27,11 @@ from irtwin.storage.revisions.versions import (
     r0002_base_of_individuals,
     r0003_made_and_slower,
     r0004_halves_of_the_time,
+    r0005_units_and_relations,
+    r0006_notes_of_robots,
 )
-from irtwin.storage.schema import Base
+from irtwin.storage.rows import values
+from irtwin.storage.schema import Activity, Base
 
 BEFORE = migration.newest()
 # As a later irtwin would have it: runs have got the column `sample_rate_hz`.
@@ -72,6 +77,7 @@ AFTER_0_1 = {  # columns that revisions have added
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
     "gap_diagnosis": ("unexplained_because",),
     "gap_cause": ("p_remembered", "part_that_repeats", "first_half_shows_it", "last_half_shows_it"),
+    "activity_use": ("relation",),
 }
 
 
@@ -93,6 +99,7 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
                 for column in gone:
                     of.drop_column(column)
         if of_0_1:
+            connection.execute(text("DROP TABLE robot_note"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
@@ -164,13 +171,45 @@ def test_a_workspace_of_0_1_gets_the_tables_of_now(
 def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:
     used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
     with Workspace(tmp_path) as place:
-        place.ingest(*data_set())
-        place.replace_activity(activity("a.1", "run_state", used), [used, "https://plant.example/x"], [])
-        aged(place, of_0_1=True)
+        older(place, of_0_1=True)
+        with place.engine.begin() as connection:
+            about = values(activity("a.1", "run_state", used))
+            connection.execute(insert(Activity).values(about))
+            for entity in (used, "https://plant.example/x"):
+                connection.execute(text("INSERT INTO activity_use VALUES ('a.1', :entity)"), {"entity": entity})
     with Workspace(tmp_path) as place, place.engine.connect() as connection:
         assert connection.execute(text("SELECT subject FROM activity")).scalars().all() == ["run/Arm_A.fit_1"]
         found = connection.execute(text("SELECT entity FROM activity_use")).scalars()
         assert set(found) == {"run/Arm_A.fit_1", "https://plant.example/x"}
+
+
+def test_units_of_live_gaps_and_relations_of_uses_are_written() -> None:
+    with create_engine("sqlite://").begin() as connection:
+        for table in ("gap_state", "gap_excursion"):
+            connection.execute(text(f"CREATE TABLE {table} (unit VARCHAR)"))
+            connection.execute(text(f"INSERT INTO {table} VALUES ('N m'), ('N'), ('W')"))
+        connection.execute(text("CREATE TABLE activity_use (entity VARCHAR)"))
+        connection.execute(text("INSERT INTO activity_use VALUES ('run/Arm_A.1'), ('twin/Arm_A.t1')"))
+        with Operations.context(MigrationContext.configure(connection)):
+            r0005_units_and_relations.upgrade()
+        for table in ("gap_state", "gap_excursion"):
+            assert connection.execute(text(f"SELECT unit FROM {table}")).scalars().all() == ["N-M", "N", "W"]
+        uses = connection.execute(text("SELECT entity, relation FROM activity_use")).all()
+        assert [*map(tuple, uses)] == [("run/Arm_A.1", "wasInformedBy"), ("twin/Arm_A.t1", "used")]
+
+
+def test_notes_become_rows() -> None:
+    said = '{"name": "Arm A", "location": "cell 4", "supply": {"voltage": 400}, "tools": ["gripper", "welder"]}'
+    with create_engine("sqlite://").begin() as connection:
+        connection.execute(text("CREATE TABLE robot (robot_id VARCHAR PRIMARY KEY, notes VARCHAR)"))
+        connection.execute(text("INSERT INTO robot VALUES ('Arm_A', :said), ('Arm_B', '{}')"), {"said": said})
+        with Operations.context(MigrationContext.configure(connection)):
+            r0006_notes_of_robots.upgrade()
+        found = connection.execute(text("SELECT * FROM robot_note")).all()
+    expected = {(name, 1, value[0]) for name, value in flat_notes(json.loads(said)).items() if name != "name"}
+    expected.add(("tools", 2, "welder"))
+    assert {tuple(row) for row in found} == {("Arm_A", *row) for row in expected}
+    assert ("supply.voltage", 1, "400") in expected
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:

@@ -19,7 +19,8 @@ VERSIONS = {  # where the jars of each lie: with owlready2, fetched by `make tes
     "5.1.20": Path("/usr/share/java"),
 }
 MODULES = ["units", "robot", "structure", "energy", "effects", "gap", "providers", "totals", "live", "alignment"]
-FILES = [*(f"{module}.ttl" for module in MODULES), "irtwin.ttl", "robots/kuka_kr6_r700.ttl"]
+ALIGNMENTS = [f"alignments/{name}.ttl" for name in ("cora", "iof", "saref")]
+FILES = [*(f"{module}.ttl" for module in MODULES), "irtwin.ttl", "robots/kuka_kr6_r700.ttl", *ALIGNMENTS]
 
 pytestmark = pytest.mark.system
 
@@ -38,9 +39,10 @@ def rdf_xml(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The modules in the syntax that every version reads; the Turtle of 3.4 knows no dot in a name."""
     copy = tmp_path_factory.mktemp("ontology")
     (copy / "robots").mkdir()
+    (copy / "alignments").mkdir()
     for name in FILES:
         rdflib.Graph().parse(folder("ontology") / name).serialize(copy / name, format="xml")
-    for name in ("catalog-v001.xml", "robots/catalog-v001.xml"):
+    for name in ("catalog-v001.xml", "robots/catalog-v001.xml", "alignments/catalog-v001.xml"):
         (copy / name).write_bytes((folder("ontology") / name).read_bytes())
     return copy
 

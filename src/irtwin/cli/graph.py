@@ -223,13 +223,28 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float, base: 
 @click.option(
     "--workspace",
     type=click.Path(path_type=Path, exists=True, file_okay=False),
-    help="Folder whose ontology/ is documented too.",
+    help="Folder whose ontology/ and questions/ are documented too; its graph answers the questions.",
 )
-def docs(out: Path, workspace: Path | None) -> None:
+@click.option(
+    "--questions",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="HTML file to write the competency questions to: what the graph can be asked by name.",
+)
+def docs(out: Path, workspace: Path | None, questions: Path | None) -> None:
     """Write the ontology's documentation as one HTML page, with what installed packages add."""
     from irtwin import asking
+    from irtwin.report.ontology import questions_page
     from irtwin.report.ontology.page import write_page
     from irtwin.resources import resources_of
 
-    write_page(out, resources_of() if workspace is None else asking.checked(workspace))
+    known = resources_of() if workspace is None else asking.checked(workspace)
+    write_page(out, known)
     click.echo(out)
+    if questions is None:
+        return
+    if workspace is None:
+        questions_page.write_page(questions, known)
+    else:
+        with asking.open_graph(workspace, None) as graph:
+            questions_page.write_page(questions, known, graph)
+    click.echo(questions)

@@ -14,7 +14,7 @@ from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import DamagedJournal, Header, Rows, left_behind, read_journal
 from irtwin.storage.rows import values
-from irtwin.storage.schema import Activity, Base, Run, RunEnergy
+from irtwin.storage.schema import Activity, Base, Run, RunEnergy, relation_to
 
 Announce = Callable[[str], None]
 
@@ -75,9 +75,13 @@ def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float
     uses = live_energy.used(header.run_id, energy.known)
     return {
         "activity": [activity],
-        "activity_use": [{"activity_id": activity_id, "entity": entity} for entity in uses],
+        "activity_use": [_use(activity_id, entity) for entity in uses],
         **made,
     }
+
+
+def _use(activity_id: str, read: str) -> Values:
+    return {"activity_id": activity_id, "entity": read, "relation": relation_to(read)}
 
 
 def _is_there(place: Workspace, run_id: str) -> bool:
@@ -107,7 +111,7 @@ def _keep_energy(place: Workspace, header: Header, watched: Values) -> Tables:
     about = {**watched, "activity_id": activity_id, "provider": "energy"}
     place.replace_activity(Activity(**about), made.used, made.rows, made.series)
     tables: Tables = {"activity": [about]}
-    tables["activity_use"] = [{"activity_id": activity_id, "entity": entity} for entity in sorted(set(made.used))]
+    tables["activity_use"] = [_use(activity_id, entity) for entity in sorted(set(made.used))]
     for row in made.rows:
         tables.setdefault(row.__tablename__, []).append(_values(row))
     return tables

@@ -19,7 +19,7 @@ from irtwin.storage.database import Workspace
 
 _STATE, _REASON = term("Alarm_State"), term("Alarm_Reason")
 _BESIDE = """CONSTRUCT { ?s ?p ?o } WHERE {
-  { VALUES ?p { irt:Joint_Name } ?s ?p ?o } UNION { ?s a irt:Judgement_Limits ; ?p ?o } }"""
+  { VALUES ?p { irt:Joint_Name qudt:symbol } ?s ?p ?o } UNION { ?s a irt:Judgement_Limits ; ?p ?o } }"""
 
 
 class ShownRuns:

@@ -27,6 +27,12 @@ class Place:
     run_id: Callable[[str], str]
     linear: frozenset[str]
 
+    def unit(self, channel: str, joint: str | None) -> str:
+        """Return the unit of a residual of "torque" or "power"."""
+        if channel != "torque":
+            return "W"
+        return "N" if joint in self.linear else "N m"
+
 
 def rows(said: Document, at: Place) -> Iterator[OfDiagnosis]:
     """Yield all rows of a diagnosis but its own."""
@@ -43,12 +49,12 @@ def _owned(rows: Iterable[OfDiagnosis], at: Place) -> Iterator[OfDiagnosis]:
 
 
 def _rows(said: Document, at: Place) -> Iterator[OfDiagnosis]:
-    yield from _sizes(said)
+    yield from _sizes(said, at)
     yield from _locations(said, at)
     for rank, finding in enumerate(said.findings, start=1):
         yield from _finding(finding, rank)
     for rank, disturbance in enumerate(said.not_repeating or (), start=1):
-        yield from _disturbance(disturbance, rank)
+        yield from _disturbance(disturbance, rank, at)
     for rank, cause in enumerate(said.causes, start=1):
         yield from _cause(cause, rank, at)
     yield from _changes(said)
@@ -93,7 +99,7 @@ def _rows_of_curves(drawn: Curves, at: Place) -> Iterator[OfDiagnosis]:
             before=_finite(one.before),
             after=_finite(one.after),
             noise_floor=_finite(one.floor),
-            unit="W" if one.joint is None else "N" if one.joint in at.linear else "N m",
+            unit=at.unit("power" if one.joint is None else "torque", one.joint),
         )
 
 
@@ -101,7 +107,7 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _sizes(said: Document) -> Iterator[OfDiagnosis]:
+def _sizes(said: Document, at: Place) -> Iterator[OfDiagnosis]:
     sizes = [("torque", joint, size) for joint, size in (said.gap.torque or {}).items()]
     power = [("power", None, said.gap.power)] if said.gap.power is not None else []
     for channel, joint, size in [*sizes, *power]:
@@ -113,7 +119,7 @@ def _sizes(said: Document) -> Iterator[OfDiagnosis]:
             noise_floor=size.noise_floor,
             excess=size.excess,
             sensor_noise=size.sensor_noise,
-            unit="N m" if channel == "torque" else "W",
+            unit=at.unit(channel, joint),
         )
 
 
@@ -169,7 +175,7 @@ def _finding(said: Finding, rank: int) -> Iterator[OfDiagnosis]:
         )
 
 
-def _disturbance(said: NotRepeating, rank: int) -> Iterator[OfDiagnosis]:
+def _disturbance(said: NotRepeating, rank: int, at: Place) -> Iterator[OfDiagnosis]:
     key = {"disturbance_id": said.id}
     yield gap_schema.GapDisturbance(
         **key,
@@ -178,7 +184,7 @@ def _disturbance(said: NotRepeating, rank: int) -> Iterator[OfDiagnosis]:
         joint=said.joint,
         kind=said.kind,
         rms=said.rms,
-        unit="N m" if said.channel == "torque" else "W",
+        unit=at.unit(said.channel, said.joint),
         share=said.share,
         cause_id=said.explained_by,
     )

@@ -41,6 +41,7 @@ _KINDS: Mapping[str, type[schema.Base]] = {
 }
 _AT_ONCE = 4096  # samples of a stored run
 _MOST_RUNS = 40  # that a twin knows tell its band
+_QUDT = {"W": "W", "N m": "N-M", "N": "N"}  # what QUDT calls the units of residuals
 
 
 @dataclass(frozen=True)
@@ -186,9 +187,9 @@ class LiveEnergy:
     def _place(self, place: str) -> Values:
         assert self.known is not None
         if place == ROBOT:
-            return {"place": place, "channel": "power", "joint": None, "unit": CHANNELS["power"].unit}
+            return {"place": place, "channel": "power", "joint": None, "unit": _QUDT[CHANNELS["power"].unit]}
         kind = next(joint.kind for joint in self.known.twin.robot.joints if joint.name == place)
-        return {"place": place, "channel": "torque", "joint": place, "unit": CHANNELS["torque"].unit_of(kind)}
+        return {"place": place, "channel": "torque", "joint": place, "unit": _QUDT[CHANNELS["torque"].unit_of(kind)]}
 
 
 def watching(run_id: str) -> str:

@@ -8,10 +8,11 @@ import json
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -40,12 +41,14 @@ from irtwin.storage.schema import (
     Base,
     Joint,
     Robot,
+    RobotNote,
     Run,
     SourceFile,
 )
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
+_HAVE_TERMS = {*log.ROBOT_KEYS} - {"torque_scale_uncertainty"}  # keys of [robot] that are no notes in the graph
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
 _READABLE = 40  # characters of a name that is not plain
 
@@ -72,6 +75,12 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
         announce(line)
     parts: list[Base] = [
         *_source_files(robot_id, data_set),
+        *(
+            RobotNote(robot_id=robot_id, name=name, number=number, text=text)
+            for name, values in flat_notes(data_set.notes).items()
+            if name not in _HAVE_TERMS
+            for number, text in enumerate(values, start=1)
+        ),
         *(_joint_row(robot_id, place, joint) for place, joint in enumerate(data_set.robot.joints, start=1)),
         *structure_rows(robot_id, data_set.robot, meshes),
         *device_rows(robot_id, data_set),
@@ -319,6 +328,23 @@ def _source_files(robot_id: str, data_set: log.DataSet) -> list[SourceFile]:
         for file, checksum in data_set.sha256.items()
         for path in [_within(data_set.folder, file)]
     ]
+
+
+def flat_notes(notes: Mapping[str, Any], below: str = "") -> dict[str, list[str]]:
+    """Return the values of notes as text, by names: "supply.voltage" of a table within, several of a list."""
+    found: dict[str, list[str]] = {}
+    for name, value in notes.items():
+        if isinstance(value, Mapping):
+            found |= flat_notes(value, f"{below}{name}.")
+        elif isinstance(value, list | tuple):
+            found[f"{below}{name}"] = [_text(one) for one in value]
+        else:
+            found[f"{below}{name}"] = [_text(value)]
+    return found
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, default=str)
 
 
 def _within(folder: Path, file: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -170,14 +169,6 @@ def local_name(iri: str) -> str:
 def short_checksum(checksum: str | None) -> str:
     """Return the start of a checksum, enough to compare by eye."""
     return NONE if checksum is None else checksum.removeprefix("sha256:")[:12]
-
-
-def notes(text: str | None) -> dict[str, str]:
-    """Return the notes of a data set, a JSON object, as name and text."""
-    if not text:
-        return {}
-    read: Any = json.loads(text)
-    return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in read.items()}
 
 
 def interval(value: float, lower: float, upper: float) -> tuple[str, str]:

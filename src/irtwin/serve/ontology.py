@@ -41,6 +41,18 @@ def module(request: Request, known: Resources) -> Response:
     return Response(_written(file, negotiation.TRIPLES[media_type]), media_type=media_type, headers={"Vary": "Accept"})
 
 
+def questions(known: Resources, request: Request) -> Response:
+    """Return the page of the competency questions."""
+    return Response(_questions(known), media_type="text/html", headers=_PAGE_HEADERS)
+
+
+@cache
+def _questions(known: Resources) -> str:
+    from irtwin.report.ontology.questions_page import page
+
+    return page(known)
+
+
 @cache
 def _documentation(known: Resources) -> str:
     from irtwin.report.ontology.page import page, read_modules  # a second to import, for browsers only

@@ -25,7 +25,7 @@ from irtwin.asking import checked
 from irtwin.errors import InputError
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.report.plant.tariff import read_tariff
-from irtwin.serve import individuals, page
+from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
 from irtwin.serve.connections import Connection
 from irtwin.serve.endpoint import Endpoint, refused
@@ -179,6 +179,7 @@ def application(
             *plant.routes(),
             Route("/query", lambda request: page.response(), methods=["GET"]),
             Route("/sparql", Endpoint(pool, updates, limits)),
+            Route("/questions", partial(ontology.questions, resources), methods=["GET"]),
             Route("/questions.json", partial(page.questions, resources, base), methods=["GET"]),
             *reports.routes(),
             *live.routes(),

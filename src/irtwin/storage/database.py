@@ -48,6 +48,7 @@ from irtwin.storage.schema import (
     RunEnergy,
     Series,
     SourceFile,
+    relation_to,
 )
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
 from irtwin.storage.structure_schema import LinkShape
@@ -198,7 +199,9 @@ class Workspace:
             if isinstance(row, RunEnergy) and not row.taken_activity_id:
                 row.taken_activity_id = made[-1][0].activity_id
         uses = {(one.activity_id, entity) for one, read in made for entity in read}
-        read_rows = [ActivityUse(activity_id=of, entity=entity) for of, entity in sorted(uses)]
+        read_rows = [
+            ActivityUse(activity_id=of, entity=entity, relation=relation_to(entity)) for of, entity in sorted(uses)
+        ]
         with self._writing() as session:
             same = select(Activity.activity_id).where(
                 Activity.provider.in_((*(one.provider for one, _ in made), instead_of)),

@@ -21,7 +21,7 @@ class GapState(Base):
     robot_id: Mapped[str]
     channel: Mapped[str]  # "torque" or "power"
     joint: Mapped[str | None]
-    unit: Mapped[str]  # symbol of the unit of residuals: "N m" or "W", "N" at a joint that slides
+    unit: Mapped[str]  # of residuals, as QUDT names it: "N-M" or "W", "N" at a joint that slides
     residual: Mapped[float]  # root mean square of the last two seconds
     band: Mapped[float]  # what that seldom exceeds on runs that the twin knows, likewise
     ratio: Mapped[float]  # residual / band
@@ -42,7 +42,7 @@ class GapExcursion(Base):
     robot_id: Mapped[str]
     channel: Mapped[str]
     joint: Mapped[str | None]
-    unit: Mapped[str]  # symbol of the unit of residuals: "N m" or "W", "N" at a joint that slides
+    unit: Mapped[str]  # of residuals, as QUDT names it: "N-M" or "W", "N" at a joint that slides
     began: Mapped[datetime]
     ended: Mapped[datetime | None]  # none while it lasts
     lasted_s: Mapped[float]  # so far

@@ -76,7 +76,18 @@ class Robot(Base):
     urdf: Mapped[str]
     urdf_sha256: Mapped[str]
     twin_effects: Mapped[str | None]  # comma separated: what the data set says that its twin models
-    notes: Mapped[str]  # JSON: what the data set says beside the contract
+    notes: Mapped[str]  # JSON: what the data set says beside the contract; for the graph in `robot_note`
+
+
+class RobotNote(Base):
+    """A thing that a data set says of its robot beside the contract: one value under one name."""
+
+    __tablename__ = "robot_note"
+
+    robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)  # of a table within the table: "supply.voltage"
+    number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on, of the values in a list
+    text: Mapped[str]
 
 
 class SourceFile(Base):
@@ -177,13 +188,23 @@ class Activity(Base):
     software: Mapped[str]  # "irtwin 0.1.0"
 
 
+def relation_to(read: str) -> str:
+    """Return the term of PROV that leads from an activity to what it read, by an IRI whole or below the base.
+
+    A run is an activity too, and no entity.
+    """
+    is_run = read.startswith("run/") or ("://" in read and "/run/" in read)
+    return "wasInformedBy" if is_run else "used"
+
+
 class ActivityUse(Base):
-    """An entity that an activity read: a run's series or a twin, by its IRI below the workspace's base."""
+    """What an activity read: a run, a run's series or a twin, by its IRI below the workspace's base."""
 
     __tablename__ = "activity_use"
 
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), primary_key=True)
     entity: Mapped[str] = mapped_column(primary_key=True)
+    relation: Mapped[str]  # as PROV names it, see `relation_to`
 
 
 class RunState(Base):

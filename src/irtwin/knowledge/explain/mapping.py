@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from pyoxigraph import NamedNode, Triple
 
-from irtwin.knowledge.mapping.document import LogicalTable, TriplesMap
+from irtwin.knowledge.mapping.document import LogicalTable, TermMap, TriplesMap
 from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.mapping.terms import absolute
 from irtwin.knowledge.vocabulary import RDF
@@ -35,17 +35,18 @@ def _triples_maps(files: Files) -> tuple[tuple[str, TriplesMap], ...]:
 
 
 def _says(triples_map: TriplesMap, triple: Triple, base: str) -> bool:
-    if triples_map.subject.constant != triple.subject and not _fits(triples_map, triple.subject, base):
+    if not _fits(triples_map.subject, triple.subject, base):
         return False
     if triple.predicate == _TYPE and triple.object in triples_map.classes:
         return True
-    return any(triple.predicate == each.constant for pair in triples_map.properties for each in pair.predicates)
+    return any(_fits(each, triple.predicate, base) for pair in triples_map.properties for each in pair.predicates)
 
 
-def _fits(triples_map: TriplesMap, subject: object, base: str) -> bool:
-    template = absolute(triples_map.subject.template, base)
-    parts = (re.escape(part) if isinstance(part, str) else "[^/]+" for part in template)
-    return isinstance(subject, NamedNode) and re.fullmatch("".join(parts), subject.value) is not None
+def _fits(term_map: TermMap, name: object, base: str) -> bool:
+    if term_map.constant is not None:
+        return name == term_map.constant
+    parts = (re.escape(part) if isinstance(part, str) else "[^/]+" for part in absolute(term_map.template, base))
+    return isinstance(name, NamedNode) and re.fullmatch("".join(parts), name.value) is not None
 
 
 def _table(table: LogicalTable) -> str:

@@ -17,7 +17,7 @@ WHERE {
 }
 ORDER BY ?finished ?activity"""
 
-_INPUTS = "SELECT ?entity WHERE { ?activity prov:used ?entity } ORDER BY ?entity"
+_INPUTS = "SELECT ?entity WHERE { ?activity prov:used|prov:wasInformedBy ?entity } ORDER BY ?entity"
 
 _FILES = """
 SELECT ?file ?checksum (COALESCE(?own, ?shared) AS ?folder)
@@ -36,7 +36,7 @@ _TOLD_IN = """
 SELECT ?file ?checksum ?folder
 WHERE {
   ?property irt:told_in ?kind .
-  ?thing (irt:run_of | ^irt:has_Joint | ^irt:has_Information) ?robot .
+  ?thing (irt:run_of | ^irt:has_Joint | ^irt:has_Information | irt:note_of) ?robot .
   ?source irt:source_of ?robot ; irt:Source_Kind ?one ; irt:File ?file ; irt:Checksum ?checksum ;
     irt:Data_Folder ?folder .
   FILTER(?one = ?kind || (?kind = "URDF" && NOT EXISTS { ?other irt:source_of ?robot ; irt:Source_Kind ?kind }))
@@ -44,7 +44,12 @@ WHERE {
 }
 ORDER BY ?file"""
 
-_RUN = "SELECT ?run WHERE { ?thing irt:series_of ?run FILTER NOT EXISTS { ?thing prov:wasGeneratedBy ?activity } }"
+_RUN = """
+SELECT ?run
+WHERE {
+  ?thing irt:series_of ?run
+  FILTER NOT EXISTS { ?thing prov:wasGeneratedBy / prov:wasAssociatedWith ?provider }
+}"""
 
 _ACTIVITY = """
 SELECT ?activity ?provider ?software ?finished

@@ -160,7 +160,7 @@
   const EFFECTS = `SELECT ?label (SUM(?each) AS ?energy) { ?share a irt:Energy_Share ; irt:of_Run ?RUN ; irt:of_Effect ?effect ; irt:Energy ?each .
     ?effect rdfs:label ?label } GROUP BY ?label ORDER BY DESC(?energy)`;
   const GAPS = `SELECT ?label ?residual ?band ?ratio ?unit ?state { ?gap a irt:Gap_State ; irt:gap_of_Run ?RUN ; irt:Gap_Residual ?residual ;
-    irt:Gap_Band ?band ; irt:Gap_Ratio ?ratio ; irt:Residual_Unit ?unit ; irt:Band_State ?state .
+    irt:Gap_Band ?band ; irt:Gap_Ratio ?ratio ; qudt:hasUnit / qudt:symbol ?unit ; irt:Band_State ?state .
     OPTIONAL { ?gap irt:gap_at_Joint ?joint . ?joint irt:Joint_Name ?name ; irt:Joint_Number ?number }
     BIND(COALESCE(?name, "power") AS ?label) } ORDER BY COALESCE(?number, 99)`;
   const ALARMS = `SELECT ?state ?since ?until ?reason ?rule { ?alarm irt:alarm_of_Run ?RUN ; irt:Alarm_State ?state ;

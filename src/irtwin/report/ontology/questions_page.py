@@ -1,0 +1,86 @@
+"""The competency questions of the ontology: one HTML page of what the graph can be asked by name, by whom, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pyoxigraph import QuerySolutions, Store
+
+from irtwin.knowledge.questions.queries import THEMES, Question, named_questions
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report import wording
+from irtwin.report.energy.page import content_policy
+from irtwin.report.heading import heading
+from irtwin.report.templates import environment, style
+from irtwin.resources import Resources, shipped
+from irtwin.storage.files import check_place, write
+
+MOST_ROWS = 3  # of a sample answer
+ASKED_BY = {
+    "robot": "whoever commissions or looks after the robot",
+    "run": "whoever plans what the robot does",
+    "joint": "maintenance",
+    "energy": "whoever answers for the plant's energy",
+    "ledger": "drive and mechanical engineers",
+    "twin": "whoever models the robot",
+    "gap": "whoever models the robot, and maintenance",
+    "provenance": "auditors, and whoever doubts a number",
+    "fleet": "whoever runs the plant",
+}
+
+
+@dataclass(frozen=True)
+class Competency:
+    """A named question as the page shows it: its columns by variable and heading, and rows of a sample answer."""
+
+    asked: Question
+    columns: Mapping[str, str]
+    rows: tuple[tuple[str, ...], ...] = ()
+    more: int = 0  # rows that the answer has beyond
+
+
+def write_page(out: Path, known: Resources | None = None, graph: KnowledgeGraph | None = None) -> None:
+    """Write the page of the questions that are `known`, or else ship, with answers of a graph if one is given.
+
+    Raises InputError where it cannot.
+    """
+    check_place(out)
+    write(out, page(known or shipped(), graph).encode())
+
+
+def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
+    """Return the page."""
+    found = list(competencies(known, graph))
+    return (
+        environment(shipped())
+        .get_template("ontology/questions.html.jinja")
+        .render(
+            themes={theme: [one for one in found if one.asked.theme == theme] for theme in THEMES},
+            asked_by=ASKED_BY,
+            count=len(found),
+            answered=graph is not None,
+            policy=content_policy([]),
+            style=style(shipped()),
+            page_style=style(shipped(), "ontology/style.css"),
+        )
+    )
+
+
+def competencies(known: Resources, graph: KnowledgeGraph | None = None) -> Iterator[Competency]:
+    """Yield the questions, theme by theme, each with the first rows that a graph answers if one is given."""
+    for question in named_questions(known).values():
+        columns = {name: heading(name) for name in _columns(question)}
+        if graph is None:
+            yield Competency(question, columns)
+            continue
+        answer = list(graph.query(question.text))
+        rows = tuple(tuple(wording.shown(row[name]) for name in columns) for row in answer[:MOST_ROWS])
+        yield Competency(question, columns, rows, max(len(answer) - MOST_ROWS, 0))
+
+
+def _columns(question: Question) -> list[str]:
+    """Return the variables that a question selects; no data are needed for that."""
+    solutions = Store().query(question.text)
+    return [one.value for one in solutions.variables] if isinstance(solutions, QuerySolutions) else []

@@ -1,0 +1,39 @@
+"""The page of competency questions: each named question, its columns with units, and the start of its answer."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from irtwin.cli import cli
+from irtwin.knowledge.questions.queries import THEMES, named_questions
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.ontology.questions_page import ASKED_BY, MOST_ROWS, competencies, page
+from irtwin.resources import shipped
+
+
+def test_each_question_has_its_place_its_words_and_its_query(tmp_path: Path) -> None:
+    out = tmp_path / "questions.html"
+    done = CliRunner().invoke(cli, ["docs", "--out", str(tmp_path / "o.html"), "--questions", str(out)])
+    assert (done.exit_code, done.output.split()) == (0, [str(tmp_path / "o.html"), str(out)])
+    text = out.read_text(encoding="utf-8")
+    questions = named_questions()
+    assert re.findall(r'<article id="(\w+)">', text) == list(questions)
+    assert f"{len(questions)} questions" in text
+    assert text.count("<details><summary>SPARQL</summary>") == len(questions)
+    assert '<th scope="col">Energy, J</th>' in text and "<td><code>?energy_J</code></td>" in text
+    assert "No answer" not in text and 'http-equiv="Content-Security-Policy"' in text
+    assert ASKED_BY.keys() == set(THEMES)
+
+
+def test_a_graph_shows_the_first_rows_and_says_where_it_has_none(graph: KnowledgeGraph) -> None:
+    """The ontology alone knows kinds of data, and no robot."""
+    found = {one.asked.name: one for one in competencies(shipped(), graph)}
+    kinds = found["data_kinds"]
+    assert len(kinds.rows) == MOST_ROWS and kinds.more > 0
+    assert not found["robots"].rows
+    text = page(shipped(), graph)
+    assert f"and {kinds.more} rows more" in text and "No answer in this workspace." in text
+    assert all(cell in text for cell in kinds.rows[0])
