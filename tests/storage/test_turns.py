@@ -119,7 +119,10 @@ def test_what_those_who_run_the_server_can_mend_is_one_line(
         Workspace(tmp_path / "guest", guest)
     assert "do-not-tell" not in str(caught.value)
     robots = Base.metadata.tables["robot"].select()
-    end_all = text("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
+    end_all = text(
+        "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+        "WHERE pid <> pg_backend_pid() AND datname = current_database()"
+    )
     with Workspace(tmp_path / "own", url) as own, own.reading() as session:
         session.execute(robots)
         with place.connect() as other:

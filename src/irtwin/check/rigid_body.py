@@ -73,7 +73,8 @@ class Rows:
             model = model.copy()
             model.gravity.linear = model.gravity.linear + np.cross(self.tilt, model.gravity.linear)
         data = model.createData()
-        return np.array([pin.computeJointTorqueRegressor(model, data, *state) for state in self._states()])
+        found = [pin.computeJointTorqueRegressor(model, data, *state) for state in self._states()]
+        return np.array(found).reshape(len(found), self.dq.shape[1], -1)  # of one joint Pinocchio gives one row
 
     def _states(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         return list(zip(self.q, self.dq, self.ddq, strict=True))

@@ -19,6 +19,7 @@ SERVED = (
     "irtwin",
     "live",
     "query",
+    "questions",
     "questions.json",
     "reports",
     "robot",

@@ -23,18 +23,17 @@ _REACH = (1.0, 0.4, 0.4, 0.4, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)  # m, m^2: its first
 def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: SameRobot) -> None:
     """Raise InputError where the torque of the other runs (reference, simulated) is nothing like the observed.
 
-    `system` holds the twin's terms alone; a sign that cannot be true shows by fits without bounds. What changes a
-    healthy robot shows in one joint, or its bodies explain it no better than those of the reference runs; another
-    robot's bodies are wrong in several.
+    `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or its bodies explain it no
+    better than those of the reference runs; another robot's bodies are wrong in several.
     """
     if not system.both:
         return
     others = [run for run in runs if run.role != "observed"]
     moments = system.moments(noise_before(system))
     seen = system.group_observed
-    other = system.solution((), np.sum([m for m, own in zip(moments, seen, strict=True) if not own], axis=0), free=True)
+    other = system.solution((), np.sum([m for m, own in zip(moments, seen, strict=True) if not own], axis=0))
     total = np.sum([m for m, own in zip(moments, seen, strict=True) if own], axis=0)
-    own = system.solution((), total, free=True)
+    own = system.solution((), total)
     foreign = _foreign_share(stack.robot, system, total, own, other, limits) > limits.foreign[others[0].role]
     opposed = _opposed(stack.robot, system, own, other, limits.opposed)
     if foreign.sum() >= limits.foreign_joints or opposed.mean() >= limits.opposed_joints:

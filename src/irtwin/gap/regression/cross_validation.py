@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 
-from irtwin.gap.regression.bounded import bounded_small
-from irtwin.gap.regression.hypotheses import Variant
-from irtwin.gap.regression.normal_equations import Fitted, System
-from irtwin.gap.regression.split import Products, Split, split
+from irtwin.gap.regression.cholesky import factored, solved
+from irtwin.gap.regression.hypotheses import Variant, bounds
+from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
 
-_NEXT_TO_NOTHING = 1e-3  # of the noise's squares: what a bound adds to them at least, to be looked at with a variant
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
 
 
@@ -39,59 +37,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class _Batch:
-    """Variants of one number of coefficients: `place` (V,) in all variants, `columns` (V, o + k), `lowest` likewise.
-
-    The first columns are those that the split holds apart, (o,), the same in each.
-    """
+    """Variants of one number of coefficients: `place` (V,) in all variants, `columns` (V, k), `lowest` (V, k)."""
 
     place: np.ndarray
     columns: np.ndarray
     lowest: np.ndarray
-
-
-class _Fits:
-    """What fits of V variants leave: the objective on train, squares left and added on test; their coefficients."""
-
-    def __init__(self, count: int):
-        self.objective, self.left, self.added = np.empty((3, count))
-        self.values: list[np.ndarray] = [np.zeros(0)] * count
-
-    def fit(self, one: Split, batches: Sequence[_Batch]) -> None:
-        """Fit each variant of some batches on train."""
-        before = one.fitted.values[one.apart]
-        others, last = len(before), len(one.train.whole) - 1
-        for batch in batches:
-            both = np.concatenate([batch.columns, np.full((len(batch.columns), 1), last)], axis=1)
-            on_train, on_test = one.train.of(both), one.test.of(both)
-            own = np.diag(np.arange(batch.columns.shape[1]) >= others)  # the others' prior is in train
-            found = bounded_small(on_train[:, :-1, :-1] + own, on_train[:, :-1, -1], batch.lowest)
-            self.objective[batch.place] = _squares(on_train, found) + (found[:, others:] ** 2).sum(axis=1)
-            self.left[batch.place] = _squares(on_test, found)
-            added = found - np.append(before, np.zeros(found.shape[1] - others))
-            self.added[batch.place] = np.einsum("vi,vij,vj->v", added, on_test[:, :-1, :-1], added)
-            for place, value in zip(batch.place, found[:, others:], strict=True):
-                self.values[place] = value
-
-
-@dataclass(frozen=True)
-class _Moving:
-    """Variants beside which other terms move from or onto their lowest value: these are fitted with each of them.
-
-    `kept`: the columns of the fit, those of the variants and, last, the measurement, among all; `apart` (k,): which of
-    the fit move. Batches count columns as `kept` does.
-    """
-
-    kept: np.ndarray
-    apart: np.ndarray
-    batches: list[_Batch]
-
-    def fit(self, into: _Fits, fitted: Fitted, prior: np.ndarray, train: np.ndarray, test: np.ndarray) -> None:
-        """Fit them, and the terms that they move, to products of all columns."""
-        if not self.batches:
-            return
-        there, inside = np.ix_(self.kept, self.kept), np.arange(len(fitted.inside))
-        one = split(replace(fitted, inside=inside), prior, train[there], test[there], np.flatnonzero(self.apart))
-        into.fit(one, self.batches)
 
 
 def attempt(
@@ -104,34 +54,28 @@ def attempt(
     """
     variants = [variant for group in candidates for variant in group]
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
-    prior, total = system.prior(chosen), reduce(np.add, moments)
-    fitted = system.fitted(chosen, total)
-    whole = split(fitted, prior, total.copy(), total)
-    batches, fits = _batches(system, variants), _Fits(len(variants))
-    fits.fit(whole, batches)
-    batches, moving = _parted(system, whole, variants, batches, fits.values)
-    moving.fit(fits, fitted, prior, total, total)
+    batches = _batches(system, variants)
+    total = reduce(np.add, moments)
+    whole, _ = _project(system, total, total, chosen)
+    objective, _, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss, said = np.empty((2, len(candidates), len(moments)))
     for group, part in enumerate(moments):
-        train, without = total - part, _Fits(len(variants))
-        fitted = system.fitted(chosen, train)
-        moving.fit(without, fitted, prior, train, part)
-        one = split(fitted, prior, train, part)
-        start[group] = one.test.squares
-        without.fit(one, batches)
+        train, test = _project(system, total - part, part, chosen)
+        start[group] = test.squares
+        inner, left_out, added, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
             if is_transient(variant.effect):
-                without.left[place] = _left(one.test, variant.columns, fits.values[place])
-        best = _best(without.objective, owner, len(candidates))
-        loss[:, group], said[:, group] = without.left[best], without.added[best]
-    best = _best(fits.objective, owner, len(candidates))
-    diagonal = whole.train.diagonal
+                left_out[place] = _left(test, variant.columns, values[place])
+        best = _best(inner, owner, len(candidates))
+        loss[:, group], said[:, group] = left_out[best], added[best]
+    best = _best(objective, owner, len(candidates))
+    diagonal = whole.diagonal
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
     visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
     before = np.diag(total)
     share = np.array([_ratio(diagonal[list(variants[k].columns)], before[list(variants[k].columns)]) for k in best])
-    return Trial(start, loss, said, best, tuple(fits.values[k] for k in best), visible, share)
+    return Trial(start, loss, said, best, tuple(values[k] for k in best), visible, share)
 
 
 def scores(
@@ -142,11 +86,10 @@ def scores(
     A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
     """
     total = reduce(np.add, moments)
-    fit = split(system.fitted(chosen, total), system.prior(chosen), total.copy(), total)
-    free, weights = fit.free, fit.weights
+    inside, weights = _weights(system, total, chosen)
     rest = np.zeros(len(total))
     rest[-1] = 1.0
-    rest[fit.fitted.inside] = -fit.fitted.values
+    rest[inside] = -weights[:, -1]
     found = np.empty((len(system.blocks), len(total) - 1))
     for block in range(len(system.blocks)):
         vector = np.zeros(len(total))
@@ -154,8 +97,8 @@ def scores(
             left, products = system.scored(block, equation, rest)
             loud = np.sqrt(left @ left / max(system.blocks[block].rows[equation], 1)) / level
             vector += products / level**2 / max(float(loud), _QUIET)
-        found[block] = (vector - weights.T @ vector[free])[:-1]
-    return found, fit.train.rows(np.arange(len(total)))
+        found[block] = (vector - weights.T @ vector[inside])[:-1]
+    return found, total - total[inside].T @ weights
 
 
 def canonical_correlation(
@@ -165,7 +108,7 @@ def canonical_correlation(
 
     total: (D + 1, D + 1) products of columns. What the prior holds near zero anyway correlates with nothing.
     """
-    whole = split(system.fitted(chosen, total), system.prior(chosen), total.copy(), total).train
+    whole, _ = _project(system, total, total, chosen)
     first = len(sets[0])
     found = []
     for columns in sets:
@@ -182,7 +125,7 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> float:
     return float(part.sum() / whole.sum()) if whole.sum() > 0 else 0.0
 
 
-def _left(test: Products, columns: Sequence[int], values: np.ndarray) -> float:
+def _left(test: _Products, columns: Sequence[int], values: np.ndarray) -> float:
     """Return the squares left on test by known coefficients of some columns."""
     both = np.array([[*columns, len(test.whole) - 1]])
     return float(_squares(test.of(both), values[None])[0])
@@ -192,55 +135,98 @@ def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:
     sizes: dict[int, list[int]] = {}
     for place, variant in enumerate(variants):
         sizes.setdefault(len(variant.columns), []).append(place)
-    found = []
+    batches = []
     for places in sizes.values():
         columns = np.array([variants[place].columns for place in places])
-        found.append(_Batch(np.array(places), columns, system.lowest[columns]))
-    return found
+        lowest = np.array([bounds(variants[place]) for place in places])
+        lowest[columns >= system.changed] = -np.inf
+        batches.append(_Batch(np.array(places), columns, lowest / system.scale[columns]))
+    return batches
 
 
-def _parted(
-    system: System, whole: Split, variants: Sequence[Variant], batches: Sequence[_Batch], values: Sequence[np.ndarray]
-) -> tuple[list[_Batch], _Moving]:
-    """Return the batches without the variants that move other terms from or onto their lowest value, and these."""
-    inside = whole.fitted.inside
-    moves, apart = _moved(system, whole, variants, values)
-    own_columns = [variants[place].columns for place in np.flatnonzero(moves).tolist()]
-    columns = np.array(sorted({k for own in own_columns for k in own}), dtype=int)
-    still, moving = [], []
+def _weights(system: System, total: np.ndarray, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the fitted columns' indices, and their weights in the fit of every column and of the measurement."""
+    inside = np.append(np.arange(system.base), np.array(chosen, dtype=int))
+    return inside, solved(factored(total[np.ix_(inside, inside)], system.prior(chosen)), total[inside])
+
+
+@dataclass(frozen=True)
+class _Products:
+    """Products of what a fit leaves of each column, worked out for the columns that are asked for.
+
+    `whole` (D + 1, D + 1): products of the columns as they are; of each pair (D + 1, K) the product is taken off.
+    """
+
+    whole: np.ndarray
+    pairs: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def of(self, columns: np.ndarray) -> np.ndarray:
+        """Return the products among each row of columns: (V, k) -> (V, k, k)."""
+        found: np.ndarray = self.whole[columns[:, :, None], columns[:, None, :]]
+        for left, right in self.pairs:
+            found = found - left[columns] @ right[columns].swapaxes(1, 2)
+        return found
+
+    @property
+    def squares(self) -> float:
+        """Those of the measurement."""
+        return float(self.of(np.array([[len(self.whole) - 1]]))[0, 0, 0])
+
+    @property
+    def diagonal(self) -> np.ndarray:
+        """(D,) those of each column."""
+        return self.of(np.arange(len(self.whole) - 1)[:, None])[:, 0, 0]
+
+
+def _project(system: System, train: np.ndarray, test: np.ndarray, chosen: Sequence[int]) -> tuple[_Products, _Products]:
+    """Return the products of what a fit on `train` leaves of each column: on train, and on test."""
+    inside, weights = _weights(system, train, chosen)
+    own = np.ascontiguousarray(weights.T)
+    seen = np.ascontiguousarray(test[inside].T)
+    fitted = seen - own @ test[np.ix_(inside, inside)]
+    return (
+        _Products(train, ((np.ascontiguousarray(train[inside].T), own),)),
+        _Products(test, ((own, fitted), (seen, own))),
+    )
+
+
+def _fit(
+    train: _Products, test: _Products, batches: Sequence[_Batch], count: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Fit each variant on train; return the objective there, the squares left and added on test, the coefficients."""
+    objective, left_out, added = np.empty((3, count))
+    values: list[np.ndarray] = [np.zeros(0)] * count
     for batch in batches:
-        own = moves[batch.place]
-        still.append(_Batch(batch.place[~own], batch.columns[~own], batch.lowest[~own]))
-        if own.any():
-            count = own.sum()
-            at = len(inside) + np.searchsorted(columns, batch.columns[own])
-            both = np.concatenate([np.tile(np.flatnonzero(apart), (count, 1)), at], axis=1)
-            lowest = np.concatenate([np.tile(system.lowest[inside[apart]], (count, 1)), batch.lowest[own]], axis=1)
-            moving.append(_Batch(batch.place[own], both, lowest))
-    kept = np.concatenate([inside, columns, [len(whole.train.whole) - 1]])
-    return [batch for batch in still if len(batch.place)], _Moving(kept, apart, moving)
+        target = np.full((len(batch.columns), 1), len(train.whole) - 1)
+        both = np.concatenate([batch.columns, target], axis=1)
+        on_train, on_test = train.of(both), test.of(both)
+        normal, right = on_train[:, :-1, :-1], on_train[:, :-1, -1]
+        solved = _bounded(normal + np.eye(normal.shape[1]), right, batch.lowest)
+        objective[batch.place] = _squares(on_train, solved) + (solved**2).sum(axis=1)
+        left_out[batch.place] = _squares(on_test, solved)
+        added[batch.place] = np.einsum("vi,vij,vj->v", solved, on_test[:, :-1, :-1], solved)
+        for place, value in zip(batch.place, solved, strict=True):
+            values[place] = value
+    return objective, left_out, added, values
 
 
-def _moved(
-    system: System, whole: Split, variants: Sequence[Variant], values: Sequence[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return which variants (V,) move columns of the fit from or onto their lowest value, and which columns, (k,)."""
-    least = _NEXT_TO_NOTHING * float(system.rows.max(axis=1).sum())
-    bound = np.isfinite(system.lowest[whole.free])
-    free, weights, variances = whole.free[bound], whole.weights[bound], whole.variances[bound]
-    pulls, lowest = whole.pulls, system.lowest[free]
-    sizes = np.diagonal(pulls[:, whole.at])
-    moves, terms = np.zeros(len(variants), dtype=bool), set[int]()
-    for place, (variant, value) in enumerate(zip(variants, values, strict=True)):
-        if is_transient(variant.effect):
-            continue
-        columns = list(variant.columns)
-        below = np.maximum(lowest - (weights[:, -1] - weights[:, columns] @ value), 0.0)
-        up = np.maximum(pulls[:, -1] - pulls[:, columns] @ value, 0.0)
-        own = {*free[below**2 > least * variances].tolist(), *whole.at[up**2 > least * sizes].tolist()}
-        moves[place] = bool(own)
-        terms |= own
-    return moves, np.isin(whole.fitted.inside, list(terms))
+def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """Solve V small systems (V, k, k); what falls below its bound is put there, the rest solved again."""
+    solved = np.linalg.solve(normal, right[..., None])[..., 0]
+    fixed = np.zeros(solved.shape, dtype=bool)
+    for _ in range(normal.shape[1]):
+        below = (solved < lowest) & ~fixed
+        if not below.any():
+            break
+        fixed |= below
+        held = np.where(fixed, lowest, 0.0)
+        held[~np.isfinite(held)] = 0.0
+        free = ~fixed
+        system = normal * (free[:, :, None] & free[:, None, :])
+        system[:, range(normal.shape[1]), range(normal.shape[1])] += fixed
+        target = np.where(fixed, held, right - np.einsum("vij,vj->vi", normal, held))
+        solved = np.linalg.solve(system, target[..., None])[..., 0]
+    return solved
 
 
 def _squares(products: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -112,6 +112,11 @@ def hypotheses(
     ]
 
 
+def bounds(variant: Variant) -> np.ndarray:
+    """Return the lowest value of each coefficient of a variant, (k,)."""
+    return np.array([term.lowest for term in variant.terms])
+
+
 def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis]:
     """Return hypotheses without shapes that act in some observed runs only, where these would be `missing` ones.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
-from irtwin.gap.regression.bounded import bounded
+from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.accumulate import Block
@@ -22,15 +22,6 @@ from irtwin.identification.accumulate import Block
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
 _MOST_BYTES = 750_000_000  # of all groups' products; with what is worked out of them, 1.5 GB
 _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A fit of columns `inside` (k,): their coefficients, `values` (k,), and which are `held` (k,) at their lowest."""
-
-    inside: np.ndarray
-    values: np.ndarray
-    held: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -120,13 +111,6 @@ class System:
     def expected(self) -> np.ndarray:
         """(K,) what is expected of the twin's terms."""
         return np.array([term.expected for _, term in self.terms])
-
-    @cached_property
-    def lowest(self) -> np.ndarray:
-        """(D,) the lowest values that can be true, in units of the prior; of changes there are none."""
-        lowest = np.array([term.lowest for term in self.all_terms[: self._size]])
-        lowest[: self.base] -= self.expected
-        return np.asarray(lowest / self.scale)
 
     def prior(self, chosen: Sequence[int] | np.ndarray = ()) -> np.ndarray:
         """Return the products of the prior's rows of the twin's terms and c chosen columns, (K + c, K + c)."""
@@ -283,32 +267,21 @@ class System:
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
         inside = self._inside(chosen)
-        among, right = self._weighted_among(inside, fitted, noise)
-        vector = self._vector(inside, bounded(among, self.prior(chosen), right, self.lowest[inside])[0])
+        vector = self._solved(inside, *self._weighted_among(inside, fitted, noise))
         squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
         return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
-    def solution(self, chosen: Sequence[int], total: np.ndarray, *, free: bool = False) -> np.ndarray:
-        """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns.
-
-        None is below what can be true, unless they are `free`.
-        """
-        fitted = self.fitted(chosen, total, free=free)
-        return self._vector(fitted.inside, fitted.values)
-
-    def fitted(self, chosen: Sequence[int], total: np.ndarray, *, free: bool = False) -> Fitted:
-        """Return the fit of the twin's terms and the chosen columns to products `total`, as `solution` does."""
+    def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
+        """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
         inside = self._inside(chosen)
-        among, right, lowest = total[np.ix_(inside, inside)], total[inside, -1], self.lowest[inside]
-        lowest = np.full(len(inside), -np.inf) if free else lowest
-        return Fitted(inside, *bounded(among, self.prior(chosen), right, lowest))
+        return self._solved(inside, total[np.ix_(inside, inside)], total[inside, -1])
 
     def _inside(self, chosen: Sequence[int]) -> np.ndarray:
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))
 
-    def _vector(self, inside: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def _solved(self, inside: np.ndarray, among: np.ndarray, right: np.ndarray) -> np.ndarray:
         vector = np.zeros(self._size)
-        vector[inside] = values
+        vector[inside] = solved(factored(among, self.prior(inside[self.base :])), right)
         return vector
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pyoxigraph import BlankNode, DefaultGraph, Literal, NamedNode, Store, Triple
 
 from irtwin.knowledge.store.table import to_python
 
 if TYPE_CHECKING:
     import duckdb  # a tenth of a second to import, for those who sum by columns
+    import numpy as np
 
 Term = NamedNode | BlankNode | Literal | Triple
 Groups = dict[tuple[Term, ...], "Totals"]
@@ -112,6 +112,8 @@ class Columns:
             for quad in quads:
                 pairs.append([codes.setdefault(term, len(codes)) for term in (quad.subject, quad.object)])
                 numbers.append(_number(quad.object))
+            import numpy as np
+
             self._tables[property] = self._stored(np.array(pairs, dtype=np.int64).reshape(-1, 2), numbers)
         return self._tables[property]
 
