@@ -62,10 +62,10 @@ def done(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     said = subprocess.run(
         [sys.executable, "-c", WORK, place / "workspace", data, bumped],
         env={**os.environ, "PYTHONPATH": path},
-        check=True,
         capture_output=True,
         text=True,
     )
+    assert said.returncode == 0, said.stderr
     return place / "workspace", json.loads(said.stdout)
 
 
