@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check fuzz lint wheel ontology lock clean
+.PHONY: demo test nightly check fuzz lint wheel ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -12,8 +12,13 @@ demo: $(VENV)/demo
 check: $(VENV)/test lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not slow and not system"
 
+# Three processes on two cores: many tests wait for a server, a browser or a clock.
 test: $(VENV)/test lint
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(( $$(nproc) * 3 / 2 )) --dist worksteal -m "not nightly"
+
+# What repeats at length what other tests hold in short.
+nightly: $(VENV)/test
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m nightly
 
 # Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test

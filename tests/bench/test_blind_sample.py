@@ -30,11 +30,12 @@ def test_a_healthy_robot_raises_no_alarm(scored):
     assert scored("healthy", "clean_null")["false alarms, clean nulls"] == 0
 
 
+@pytest.mark.nightly
 def test_a_slightly_imperfect_robot_raises_no_alarm(scored):
     assert scored("imperfect", "dirty_null", scope="changed")["false alarms, dirty nulls"] == 0
 
 
-@pytest.mark.parametrize("effect", ["copper_loss", "stribeck_friction"])
+@pytest.mark.parametrize("effect", ["stribeck_friction", pytest.param("copper_loss", marks=pytest.mark.nightly)])
 def test_a_missing_effect_is_named_first(scored, effect):
     scores = scored(f"missing_{effect}", "single", (effect,), 3.0)
     assert scores["right effect first"] == 1

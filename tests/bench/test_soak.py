@@ -15,6 +15,7 @@ TWO_ROBOTS = Path(__file__).parents[1] / "knowledge/data/two_robots.trig"
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_eight_clients_and_a_writer_meet_no_error_and_leave_nothing_behind(tmp_path: Path) -> None:
     with KnowledgeGraph(tmp_path / "graph") as graph:
         graph.load_ontology()

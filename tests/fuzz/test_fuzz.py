@@ -19,6 +19,7 @@ FEW = settings(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @FEW
 @given(cases())
 def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(case: Case):
