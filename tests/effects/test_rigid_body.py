@@ -12,9 +12,9 @@ import pytest
 from tests.synthetic import arm, rigid_torque, swing
 
 from irtwin.effects import rigid_body
-from irtwin.effects.body_regressor import body_regressor
 from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import RigidBody, inverse_dynamics, last_body_columns, model_of, torque_slope
+from irtwin.robot.body_regressor import body_regressor
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.check.moving import Moving
+from irtwin.robot.body_regressor import body_regressor
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -72,9 +73,7 @@ class Rows:
         if any(self.tilt):
             model = model.copy()
             model.gravity.linear = model.gravity.linear + np.cross(self.tilt, model.gravity.linear)
-        data = model.createData()
-        found = [pin.computeJointTorqueRegressor(model, data, *state) for state in self._states()]
-        return np.array(found).reshape(len(found), self.dq.shape[1], -1)  # of one joint Pinocchio gives one row
+        return body_regressor(model, self.q, self.dq, self.ddq)
 
     def _states(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         return list(zip(self.q, self.dq, self.ddq, strict=True))

@@ -9,9 +9,9 @@ from weakref import ReferenceType, ref
 import numpy as np
 import pinocchio as pin
 
-from irtwin.effects.body_regressor import body_regressor
 from irtwin.effects.effect import Effect, Predicted, Term
 from irtwin.errors import InputError
+from irtwin.robot.body_regressor import body_regressor
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange
 from irtwin.signals.motion import Motion

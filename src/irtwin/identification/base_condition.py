@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
+from irtwin.robot.body_regressor import body_regressor
 from irtwin.robot.description import Robot
 
 _SHARPNESS = 4  # of the smooth maximum and minimum of the eigenvalues
@@ -33,7 +33,6 @@ class BaseRegressor:
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
-        self._data = robot.model.createData()
         self._n = len(robot.joints)
         self.columns = base_parameters(Stack(robot, EXCITED)).independent
 
@@ -63,25 +62,19 @@ class BaseRegressor:
         rigid, joint = weight[:, :, : 10 * n], np.arange(n)
         rotor, viscous, coulomb = (weight[:, joint, (10 + k) * n + joint] for k in range(3))
         gradient = MotionGradient(np.zeros_like(q), viscous + coulomb * (1 - sign**2) / slow, rotor.copy())
-        here = self._rigid(q, dq, ddq)
+        here = body_regressor(self._model, q, dq, ddq)
         for j, e in enumerate(np.eye(n)):
             for target, step, moved in (
-                (gradient.q, _STEP, self._rigid(q + _STEP * e, dq, ddq)),
-                (gradient.dq, _STEP, self._rigid(q, dq + _STEP * e, ddq)),
-                (gradient.ddq, 1.0, self._rigid(q, dq, ddq + e)),  # linear in ddq: exact
+                (gradient.q, _STEP, body_regressor(self._model, q + _STEP * e, dq, ddq)),
+                (gradient.dq, _STEP, body_regressor(self._model, q, dq + _STEP * e, ddq)),
+                (gradient.ddq, 1.0, body_regressor(self._model, q, dq, ddq + e)),  # linear in ddq: exact
             ):
                 target[:, j] += np.einsum("nij,nij->n", moved - here, rigid) / step
         return value, gradient
 
-    def _rigid(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
-        stack = np.empty((len(q), self._n, 10 * self._n))
-        for row, sample in enumerate(zip(q, dq, ddq, strict=True)):
-            stack[row] = pin.computeJointTorqueRegressor(self._model, self._data, *sample)
-        return stack
-
     def _all(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, sign: np.ndarray) -> np.ndarray:
         each_joint = [_diagonals(ddq), _diagonals(dq), _diagonals(sign), _diagonals(np.ones_like(dq))]
-        stack = np.concatenate([self._rigid(q, dq, ddq), *each_joint], axis=2)
+        stack = np.concatenate([body_regressor(self._model, q, dq, ddq), *each_joint], axis=2)
         return stack.reshape(-1, stack.shape[2])
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from irtwin.effects import body_regressor as module
-from irtwin.effects.body_regressor import body_regressor
+from irtwin.robot import body_regressor as module
+from irtwin.robot.body_regressor import body_regressor
 
 
 def tree(parents: list[int], slides: list[bool], rng: np.random.Generator) -> pin.Model:
