@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -37,6 +40,33 @@ def test_a_table_that_differs_is_named(folder: Path) -> None:
         assert store_files.fault(folder) == f"{file.name} {fault}"
     file.unlink()
     assert store_files.fault(folder) == f"{file.name} is missing"
+
+
+def test_a_manifest_cut_anywhere_is_told(folder: Path) -> None:
+    (manifest,) = folder.glob("MANIFEST-*")
+    content = manifest.read_bytes()
+    _, noted, _ = json.loads((folder / "irtwin-sums.json").read_text())["manifest"]
+    assert noted > len(content) / 2  # the rest is what closing the store made of it
+    for size in range(1, noted):  # between two records, too, where the store would show an older state
+        manifest.write_bytes(content[:size])
+        assert store_files.fault(folder) == "the manifest was altered"
+    manifest.write_bytes(content)
+    assert store_files.fault(folder) is None
+
+
+def test_a_writer_that_was_killed_is_no_damage(folder: Path) -> None:
+    code = f"""
+import os
+from pathlib import Path
+from irtwin.knowledge.store.graph import KnowledgeGraph
+graph = KnowledgeGraph(Path({str(folder)!r}))
+graph.update("INSERT DATA {{ <urn:c> <urn:b> 1 }}")
+os._exit(0)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert store_files.fault(folder) is None
+    with KnowledgeGraph(folder) as graph:
+        assert graph.query("ASK { <urn:c> <urn:b> 1 }")[0]["answer"]
 
 
 def test_a_manifest_that_makes_no_sense_is_left_to_the_store(folder: Path) -> None:

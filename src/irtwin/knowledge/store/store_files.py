@@ -1,8 +1,10 @@
 """The files that a store consists of, looked through before it is opened.
 
 RocksDB opens sixteen of its tables at once and the others when they are read. An aggregate over a table that is then
-missing or altered never ends, and takes all memory. So the tables that the manifest names are compared with it, and
-with the CRC-32 that was noted when the store was closed; tables never change once they are written.
+missing or altered never ends, and takes all memory; one that opens a manifest cut between two records shows an older
+state, or an empty store. So what was noted when the store was closed is compared: the CRC-32 of the tables that the
+manifest names, which never change once they are written, and that of the manifest, which only grows. A store that is
+opened to write begins a new manifest.
 """
 
 from __future__ import annotations
@@ -11,9 +13,10 @@ import json
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
-_SUMS = "irtwin-sums.json"
+_SUMS = "irtwin-sums.json"  # {"tables": {name: CRC-32}, "manifest": [name, size, CRC-32]}
 _BLOCK, _HEADER = 32768, 7
 _PIECE = 1 << 20
 _TRIES = 20
@@ -35,22 +38,27 @@ def fault(folder: Path) -> str | None:
 
 
 def note_sums(folder: Path) -> None:
-    """Note the CRC-32 of the tables, so that a later change of them is found."""
-    known = _sums(folder)
-    sums = {}
+    """Note the CRC-32 of the tables and of the manifest, so that a later change of them is found."""
+    before = _noted(folder)
+    known, sums = _sums(before), {}
     for name in _tables(folder) or {}:
         with suppress(FileNotFoundError):  # the store has merged it into another meanwhile
             sums[name] = known[name] if name in known else _crc(folder / name)
-    if sums != known:
+    manifest = _manifest(folder)
+    noted = {"tables": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
+    if noted != before:
         temporary = folder / f".{_SUMS}"
-        temporary.write_text(json.dumps(sums))
+        temporary.write_text(json.dumps(noted))
         temporary.replace(folder / _SUMS)
 
 
 def _fault(folder: Path) -> str | None:
     if (folder / "CURRENT").exists() and not _manifest(folder):
         return "the manifest that CURRENT names is missing"
-    sums = _sums(folder)
+    noted = _noted(folder)
+    if _is_altered(folder, noted):
+        return "the manifest was altered"
+    sums = _sums(noted)
     for name, size in (_tables(folder) or {}).items():
         try:
             if (folder / name).stat().st_size != size:
@@ -62,12 +70,26 @@ def _fault(folder: Path) -> str | None:
     return None
 
 
-def _sums(folder: Path) -> dict[str, int]:
+def _noted(folder: Path) -> dict[str, Any]:
     try:
         said = json.loads((folder / _SUMS).read_text())
     except (OSError, ValueError):
         return {}
     return said if isinstance(said, dict) else {}
+
+
+def _sums(noted: dict[str, Any]) -> dict[str, int]:
+    tables = noted.get("tables")
+    return tables if isinstance(tables, dict) else {}
+
+
+def _is_altered(folder: Path, noted: dict[str, Any]) -> bool:
+    """Return whether the manifest is the one that was noted, and does not begin with what it was."""
+    match noted.get("manifest"):
+        case [name, int(size), crc]:
+            manifest = _manifest(folder)
+            return bool(name == _manifest_name(folder) and (len(manifest) < size or crc32(manifest[:size]) != crc))
+    return False
 
 
 def _crc(file: Path) -> int:
@@ -78,10 +100,17 @@ def _crc(file: Path) -> int:
     return crc
 
 
+def _manifest_name(folder: Path) -> str:
+    try:
+        return (folder / "CURRENT").read_text().strip()
+    except (OSError, ValueError):
+        return ""
+
+
 def _manifest(folder: Path) -> bytes:
     try:
-        return (folder / (folder / "CURRENT").read_text().strip()).read_bytes()
-    except (OSError, ValueError):
+        return (folder / _manifest_name(folder)).read_bytes()
+    except OSError:
         return b""
 
 
