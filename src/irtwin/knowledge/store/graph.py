@@ -36,6 +36,7 @@ from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import Table, to_python
+from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, check, keeping_union
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_UPDATE, ID, VOID, prefixes
@@ -189,7 +190,7 @@ class KnowledgeGraph:
         if isinstance(self._store, Store) and not old:
             self._forget_what_was_inferred(below)
             with self._writing() as store:
-                store.bulk_extend(_with_union(quads))
+                store.bulk_extend(with_union(quads))
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
@@ -198,7 +199,7 @@ class KnowledgeGraph:
         if changed:
             self._forget_what_was_inferred(changed)
             with self._writing():
-                self._write(";\n".join(_replacement(name, _read(new, name)) for name in changed))
+                self._write(";\n".join(replacement(name, _read(new, name)) for name in changed))
             self._store.flush()
         return changed
 
@@ -220,11 +221,11 @@ class KnowledgeGraph:
         lost = triples - remaining - {quad.triple for quad in given}
         with self._writing() as store:
             if not taken and isinstance(store, Store):
-                store.extend(_with_union(given))
+                store.extend(with_union(given))
             elif taken or given:
                 self._write(
-                    f"DELETE DATA {{ {_triples(lost)}\n{_data(taken)} }} ;\n"
-                    f"INSERT DATA {{ {_triples({quad.triple for quad in given})}\n{_data(given)} }}"
+                    f"DELETE DATA {{ {triple_data(lost)}\n{quad_data(taken)} }} ;\n"
+                    f"INSERT DATA {{ {triple_data({quad.triple for quad in given})}\n{quad_data(given)} }}"
                 )
 
     def _write(self, text: str) -> None:
@@ -479,43 +480,12 @@ def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
         yield quad
 
 
-def _with_union(quads: Iterable[Quad]) -> Iterator[Quad]:
-    """Yield each quad, and its triple for the default graph."""
-    for quad in quads:
-        yield quad
-        yield Quad(*quad.triple)
-
-
 def _names(store: Store | SparqlServer) -> list[str]:
     return [graph.value for graph in store.named_graphs() if isinstance(graph, NamedNode)]
 
 
 def _read(store: Store | SparqlServer, name: str) -> set[Triple]:
     return {quad.triple for quad in store.quads_for_pattern(None, None, None, NamedNode(name))}
-
-
-def _replacement(name: str, triples: set[Triple]) -> str:
-    """Return the SPARQL Update that swaps a named graph's content, and keeps the default graph the union."""
-    text = "\n".join(f"{triple} ." for triple in triples)
-    return f"""
-    DELETE {{ ?s ?p ?o }} WHERE {{
-      GRAPH <{name}> {{ ?s ?p ?o }}
-      FILTER NOT EXISTS {{ GRAPH ?other {{ ?s ?p ?o }} FILTER(?other != <{name}>) }}
-    }} ;
-    DROP SILENT GRAPH <{name}> ;
-    INSERT DATA {{ {text} GRAPH <{name}> {{ {text} }} }}"""
-
-
-def _data(quads: Iterable[Quad]) -> str:
-    """Write quads of named graphs as SPARQL's QuadData, the triples of each graph together."""
-    by_graph: dict[Any, list[Triple]] = {}
-    for quad in quads:
-        by_graph.setdefault(quad.graph_name, []).append(quad.triple)
-    return "\n".join(f"GRAPH {name} {{ {_triples(triples)} }}" for name, triples in by_graph.items())
-
-
-def _triples(triples: Iterable[Triple]) -> str:
-    return " .\n".join(map(str, triples))
 
 
 def _graph_name(iri: str) -> NamedNode:
