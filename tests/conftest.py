@@ -20,6 +20,22 @@ _CHROMIUM = (
 )  # fmt: skip
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Deal the modules out to the processes, slow ones first: else one that began late is what all wait for.
+
+    pytest-xdist gives each process a run of tests, and who has done his takes from the end of another's.
+    """
+    processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    modules: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        modules.setdefault(item.path, []).append(item)
+    if processes > 1:
+        slow = [of for of in modules.values() if any(item.get_closest_marker("slow") for item in of)]
+        quick = [of for of in modules.values() if of not in slow]
+        dealt = [[*slow[at::processes], *quick[at::processes]] for at in range(processes)]
+        items[:] = [item for share in dealt for module in share for item in module]
+
+
 def _server_programs() -> Path | None:
     found = sorted(Path("/usr/lib/postgresql").glob("*/bin/pg_ctl"))
     path = shutil.which("pg_ctl")

@@ -47,21 +47,21 @@ def workspace(tmp_path: Path) -> Path:
 
 
 def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(workspace: Path) -> None:
-    out, said = irtwin("live", "--workspace", workspace).communicate(lines(50) + "junk\njunk\n", timeout=120)
+    _, said = irtwin("live", "--workspace", workspace).communicate(lines(50) + "junk\njunk\n", timeout=120)
     assert said.count("line refused: a line is not JSON") == 1
     assert "50 samples stored, 2 lines refused" in said
     archive = workspace.with_name("kept.zip")
-    out, said = irtwin("backup", archive, "--workspace", workspace).communicate(timeout=120)
-    assert (out.strip(), said) == (str(archive), "")
+    kept = in_this_process("backup", archive, "--workspace", workspace)
+    assert (kept.out.strip(), kept.err) == (str(archive), "")
     after = workspace.with_name("after")
-    irtwin("restore", archive, "--workspace", after).communicate(timeout=120)
+    in_this_process("restore", archive, "--workspace", after)
     question = "SELECT (series:integral(?run, 'power', 0, 9) AS ?joules) { ?run irt:State_Time ?at }"
     for folder in (workspace, after):
-        out, said = irtwin("query", question, "--format", "json", "--workspace", folder).communicate(timeout=120)
-        assert json.loads(out) == [{"joules": pytest.approx(490.0)}], said
-    process = irtwin("restore", archive, "--workspace", after)
-    assert "already exists" in process.communicate(timeout=120)[1]
-    assert process.returncode == 2
+        asked = in_this_process("query", question, "--format", "json", "--workspace", folder)
+        assert json.loads(asked.out) == [{"joules": pytest.approx(490.0)}], asked.err
+    again = in_this_process("restore", archive, "--workspace", after)
+    assert "already exists" in again.err
+    assert again.status == 2
 
 
 def test_a_signal_ends_the_watching_and_nothing_is_lost(workspace: Path) -> None:
@@ -81,9 +81,9 @@ def test_a_signal_ends_the_watching_and_nothing_is_lost(workspace: Path) -> None
 
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
     for command in (["live"], ["backup", tmp_path / "a.zip"]):
-        process = irtwin(*command, "--workspace", tmp_path / "none")
-        assert "no workspace here" in process.communicate(timeout=120)[1]
-        assert process.returncode == 2
+        refused = in_this_process(*command, "--workspace", tmp_path / "none")
+        assert "no workspace here" in refused.err
+        assert refused.status == 2
     assert not list(tmp_path.iterdir())
 
 
@@ -107,9 +107,9 @@ def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
     stored = int(said.partition(" samples stored")[0].rpartition("\n")[2])
     assert 190 <= stored <= controller.sent
     question = "SELECT (series:mean(?run, 'power', 0, 1) AS ?watts) { ?run irt:State_Time ?at }"
-    out, said = irtwin("query", question, "--format", "json", "--workspace", place).communicate(timeout=120)
-    (answer,) = json.loads(out)
-    assert 96.0 < answer["watts"] < 144.0, said
+    asked = in_this_process("query", question, "--format", "json", "--workspace", place)
+    (answer,) = json.loads(asked.out)
+    assert 96.0 < answer["watts"] < 144.0, asked.err
 
 
 def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
@@ -122,10 +122,9 @@ def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
     ):
         told = in_this_process("live", *given, "--workspace", workspace)
         assert (told.status, message in told.err) == (2, True), told.err
-    process = irtwin("live", "--rtde", "127.0.0.1:9", "--robot", "UR5", "--workspace", workspace)
-    _, said = process.communicate(timeout=120)
-    assert process.returncode == 2
-    assert 'no robot "UR5" here; the nearest is "KUKA KR6 R700"' in said
+    told = in_this_process("live", "--rtde", "127.0.0.1:9", "--robot", "UR5", "--workspace", workspace)
+    assert told.status == 2
+    assert 'no robot "UR5" here; the nearest is "KUKA KR6 R700"' in told.err
 
 
 @pytest.mark.parametrize(
@@ -147,7 +146,7 @@ def test_options_that_do_not_go_together(tmp_path: Path, options: list[str], sai
 
 
 def test_a_log_of_a_robot_that_is_not_there(workspace: Path) -> None:
-    process = irtwin("live", "--workspace", workspace, "--replay", "log.csv", "--robot", "nobody")
-    assert 'no robot "nobody" here' in process.communicate(timeout=120)[1]
-    assert process.returncode == 2
+    told = in_this_process("live", "--workspace", workspace, "--replay", "log.csv", "--robot", "nobody")
+    assert 'no robot "nobody" here' in told.err
+    assert told.status == 2
     assert not list((workspace / "live").iterdir())

@@ -16,6 +16,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap import predict as predicted
+from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.planning.admission import check_motion
 from irtwin.planning.plan import Plan, Task, nominal_twin
 from irtwin.planning.plan import plan as make_plan
@@ -54,7 +55,8 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     own = own_runs(given.runs)
     cutoff = choose_cutoff(own)
     motions = [condition(run, given.robot, cutoff) for run in own]
-    return fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
+    twin = fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
+    return replace(twin, torque_scale=torque_scale_of(twin, given, motions))
 
 
 def predict(

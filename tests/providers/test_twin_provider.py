@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -56,3 +57,34 @@ def test_a_run_that_takes_no_energy_has_no_relative_error(tmp_path: Path) -> Non
     (fit,) = validate(from_json(twin.decode(), Path("twin.json")), dead[:1])
     assert fit.measured_energy == 0
     assert fit.energy_error is None
+
+
+def weighed(folder: Path, **said: object) -> tuple[schema.Twin, list[schema.Parameter], dict[str, object]]:
+    """The twin of a robot whose data set says some more: its row, its parameters and its file."""
+    robot = with_constants(arm(1))
+    runs = tuple(as_run(measure(robot, swing(robot, k, seconds=6.0), noise=0.05)) for k in range(2))
+    told = replace(DataSet(Path(), robot, runs, None, None, "mains", False, {}), **said)
+    with Workspace(folder) as workspace:
+        ingest(workspace, told)
+        made = identification.provide(workspace, "arm_1")
+    (row,) = (row for row in made.rows if isinstance(row, schema.Twin))
+    (document,) = made.documents.values()
+    return row, [row for row in made.rows if isinstance(row, schema.Parameter)], json.loads(document)
+
+
+def test_a_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path: Path) -> None:
+    row, parameters, document = weighed(tmp_path, notes={"torque_scale_uncertainty": 0.05})
+    assert row.torque_scale_uncertainty == document["torque_scale"]["uncertainty"] == 0.05
+    assert row.torque_scale_why == "The scale of torque is uncertain by 5 %: the data set states it"
+    friction = next(one for one in parameters if one.name == "Fv")
+    assert friction.scaled_lower < min(friction.lower, friction.value / 1.04)
+    assert friction.scaled_upper > max(friction.upper, 1.04 * friction.value)
+    assert all(one.scaled_lower is None for one in parameters if one.unit == "W")
+    written = next(one for one in document["parameters"] if one["name"] == "Fv")
+    assert (written["lower"], written["upper"]) == (friction.lower, friction.upper)
+
+
+def test_a_simulators_torque_has_a_scale_that_is_exact(tmp_path: Path) -> None:
+    row, parameters, _ = weighed(tmp_path, simulated=True)
+    assert row.torque_scale_uncertainty == 0.0
+    assert all(one.scaled_lower is None for one in parameters)

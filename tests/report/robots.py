@@ -48,6 +48,7 @@ class Factory:
     days: int = 3
     seed: int = 1
     joint_name: str = "joint_{}"
+    scale_why: str | None = None  # how sure the scale of the twin's torque is
     text: list[str] = field(default_factory=list)
     inferred: list[str] = field(default_factory=list)
     series: dict[str, pa.Table] = field(default_factory=dict)
@@ -110,6 +111,8 @@ class Factory:
             f' irt:Data_Split "fitted on {len(fit)} runs, held out {len(held_out)}" ;'
             f' irt:Checksum "{"ab" * 32}" ; prov:wasGeneratedBy {self._act("identification")} .'
         )
+        if self.scale_why:
+            self.say(f"{self._twin} irt:Torque_Scale_Reason {_text(self.scale_why)} .")
         self._parameters()
         for part, runs in (("fit", fit), ("held_out", held_out), ("both", both)):
             for index, name in enumerate(runs):
@@ -194,10 +197,13 @@ class Factory:
         self._parameter("standby_power", "P0", "W", 150.0, "")
 
     def _parameter(self, effect: str, name: str, unit: str, value: float, joint: str) -> None:
+        weighed = self.scale_why is not None and unit != "W"
+        ends = f"; irt:Scaled_Interval_Lower {0.9 * value}e0 ; irt:Scaled_Interval_Upper {1.1 * value}e0"
+        scaled = ends if weighed else ""
         self.say(
             f"[] a irt:Twin_Parameter ; irt:parameter_of {self._twin} ; irt:of_Effect effect:{effect} ; {joint}"
             f' irt:Parameter_Name "{name}" ; irt:Parameter_Value {value}e0 ; qudt:hasUnit unit:{unit} ;'
-            f" irt:Interval_Lower {value - 0.1}e0 ; irt:Interval_Upper {value + 0.1}e0 ."
+            f" irt:Interval_Lower {value - 0.1}e0 ; irt:Interval_Upper {value + 0.1}e0 {scaled} ."
         )
 
     def _activity(self, provider: str, minute: int) -> None:

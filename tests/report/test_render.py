@@ -50,6 +50,13 @@ def text(page: str) -> str:
     return without_scripts(page).replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
 
 
+def test_the_twin_says_how_sure_the_scale_of_its_torque_is(graph: KnowledgeGraph, page_of: PageOf):
+    said = "The scale of torque is uncertain by 10 %: torque of drives comes from nominal constants"
+    page = text(page_of(six_axis(graph, scale_why=said)))
+    assert f"{said}. All that goes with torque is off together by it" in page
+    assert page.count("with the scale</th>") == 2 and page.count('class="scaled"') == 12
+
+
 def test_key_numbers_stand_at_the_top(graph: KnowledgeGraph, page_of: PageOf):
     page = text(page_of(six_axis(graph)))
     assert "These logs are simulated." in page

@@ -16,6 +16,14 @@ def test_joint_parameters_make_a_matrix_and_the_rest_lists(graph: KnowledgeGraph
     assert [line.cell and line.cell.interval for line in others["standby power"]] == ["149.90 … 150.10"]
 
 
+def test_what_goes_with_torque_has_a_second_interval(graph: KnowledgeGraph):
+    found = answers(graph, six_axis(graph, scale_why="torque of drives comes from nominal constants"))
+    parameters = tables.parameters(found["parameters"].rows, found["joints"].rows)
+    cell = parameters.per_joint[0].cells["joint_1"]
+    assert (cell.interval, cell.scaled) == ("7.04 … 7.24", "6.43 … 7.85")
+    assert [line.cell and line.cell.scaled for line in dict(parameters.others)["standby power"]] == [None]
+
+
 def test_conclusions_gather_what_they_are_about_and_who_drew_them(graph: KnowledgeGraph):
     found = answers(graph, six_axis(graph))
     by_label = {conclusion.label: conclusion for conclusion in tables.conclusions(found["conclusions"].rows)}

@@ -29,6 +29,7 @@ from irtwin.storage.revisions.versions import (
     r0004_halves_of_the_time,
     r0005_units_and_relations,
     r0006_notes_of_robots,
+    r0007_scale_of_torque,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base
@@ -78,6 +79,9 @@ AFTER_0_1 = {  # columns that revisions have added
     "gap_diagnosis": ("unexplained_because",),
     "gap_cause": ("p_remembered", "part_that_repeats", "first_half_shows_it", "last_half_shows_it"),
     "activity_use": ("relation",),
+    "twin": ("torque_scale_uncertainty", "torque_scale_why"),
+    "parameter": ("scaled_lower", "scaled_upper"),
+    "base_parameter": ("scaled_lower", "scaled_upper"),
 }
 
 
@@ -128,6 +132,7 @@ def test_the_newest_revision_is_of_these_tables() -> None:
 def test_each_revision_follows_another() -> None:
     assert r0003_made_and_slower.down_revision == r0002_base_of_individuals.revision
     assert r0004_halves_of_the_time.down_revision == r0003_made_and_slower.revision
+    assert r0007_scale_of_torque.down_revision == r0006_notes_of_robots.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:

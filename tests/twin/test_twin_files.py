@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
+from irtwin.twin.torque_scale import TorqueScale
 
 ROBOT = arm(3)
 MOTION = measure(ROBOT, swing(ROBOT, 1), noise=0.3)
@@ -31,6 +33,19 @@ def test_a_saved_twin_is_the_same_twin(tmp_path):
     (tmp_path / "again.json").write_text(to_json(again))
     assert (tmp_path / "again.json").read_text() == (tmp_path / "twin.json").read_text()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again.json", "twin.json"]
+
+
+def test_a_saved_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path):
+    scale = TorqueScale(0.1, "assumed", 0.95, 1.05, "torque of drives comes from nominal constants")
+    (tmp_path / "twin.json").write_text(to_json(replace(TWIN, torque_scale=scale)))
+    again = load(tmp_path / "twin.json")
+    assert again.torque_scale == scale and TWIN.torque_scale is None
+    np.testing.assert_allclose(again.covariance, TWIN.covariance)
+    document = json.loads((tmp_path / "twin.json").read_text())
+    document["torque_scale"]["low"] = "small"
+    (tmp_path / "twin.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match='in "torque_scale": "low" is no float'):
+        load(tmp_path / "twin.json")
 
 
 def spoil(document, *keys, value=None, drop=False):

@@ -38,11 +38,12 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
     from irtwin import asking
     from irtwin.knowledge.questions.queries import to_csv, to_json
     from irtwin.knowledge.store.no_network import leave_network
+    from irtwin.storage.series_place import are_elsewhere
 
     if question is None:
         answer = asking.questions(workspace)
     else:
-        if graph_url is None:
+        if graph_url is None and not are_elsewhere(workspace):
             leave_network()
         answer = asking.ask(question, workspace, robot=robot, graph_url=graph_url)
     for fault in answer.faults:

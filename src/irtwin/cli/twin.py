@@ -16,6 +16,7 @@ from irtwin.cli.options import (
     payload_com_option,
     payload_mass_option,
     say,
+    series_option,
     workspace_option,
 )
 
@@ -30,8 +31,15 @@ if TYPE_CHECKING:
 @graph_option
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @base_option
+@series_option
 def run(
-    dataset: Path, workspace: Path, database: str | None, graph_url: str | None, repair: bool, base: str | None
+    dataset: Path,
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+    repair: bool,
+    base: str | None,
+    series_url: str | None,
 ) -> None:
     """Build a twin, a graph and a report from a data set.
 
@@ -42,7 +50,14 @@ def run(
     from irtwin.workflow import run as run_all
 
     report = run_all(
-        dataset, workspace, database=database, graph_url=graph_url, repair=repair, base=base, announce=announce
+        dataset,
+        workspace,
+        database=database,
+        graph_url=graph_url,
+        repair=repair,
+        base=base,
+        series_url=series_url,
+        announce=announce,
     )
     click.echo(report)
 
@@ -75,14 +90,25 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 @database_option
 @graph_option
 @base_option
-def demo(workspace: Path, database: str | None, graph_url: str | None, base: str | None) -> None:
+@series_option
+def demo(
+    workspace: Path, database: str | None, graph_url: str | None, base: str | None, series_url: str | None
+) -> None:
     """Run the example data set: simulated logs of a KUKA KR6 R700."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
     data_set = unpack_demo(workspace)
     announce(f"The example data set is in {data_set}. Use it as a template for your own.")
-    report = run_all(data_set, workspace, database=database, graph_url=graph_url, base=base, announce=announce)
+    report = run_all(
+        data_set,
+        workspace,
+        database=database,
+        graph_url=graph_url,
+        base=base,
+        series_url=series_url,
+        announce=announce,
+    )
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
     click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
 

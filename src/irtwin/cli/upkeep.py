@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import database_option, graph_option, say, workspace_option
+from irtwin.cli.options import database_option, graph_option, say, series_option, workspace_option
 
 
 @click.command()
@@ -86,12 +86,15 @@ def backup(archive: Path, workspace: Path, database: str | None, graph_url: str 
 @workspace_option
 @database_option
 @graph_option
-def restore(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
+@series_option
+def restore(
+    archive: Path, workspace: Path, database: str | None, graph_url: str | None, series_url: str | None
+) -> None:
     """Create a new workspace from an ARCHIVE that `backup` wrote.
 
     A damaged archive restores nothing, and nothing is overwritten.
     """
     from irtwin.knowledge.store.backup import restore as restore_all
 
-    restore_all(archive, workspace, database, graph_url)
+    restore_all(archive, workspace, database, graph_url, series_url)
     click.echo(workspace)

@@ -80,8 +80,7 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     known = robot_motions(workspace, robot_id)
     parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
-    read = inputs(workspace, robot_id, known.keys.values())
-    made = twin_made(robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts, read)
+    made = twin_made(workspace, robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts)
     used = [*made.used, f"gap_diagnosis/{found.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")

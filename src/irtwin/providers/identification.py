@@ -6,21 +6,23 @@ import hashlib
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
+from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import inputs
+from irtwin.providers.records import inputs, stored_data_set
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
 from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
-from irtwin.twin.twin import Twin
+from irtwin.twin.twin import BaseParameter, Parameter, Twin
 from irtwin.twin.validate import validate
 
 
@@ -34,11 +36,13 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
     parts = split(known.own, known.repeats)
     twin = identify(known.robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
-    return twin_made(robot_id, twin, known.keys, parts, inputs(workspace, robot_id, known.keys.values()))
+    return twin_made(workspace, robot_id, twin, known.keys, parts)
 
 
-def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split, used: Sequence[str]) -> Made:
-    """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id; `used`: IRIs."""
+def twin_made(workspace: Workspace, robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> Made:
+    """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id."""
+    said = stored_data_set(workspace, robot_id, twin.robot)
+    twin = replace(twin, torque_scale=torque_scale_of(twin, said, parts.fit))
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"
@@ -52,10 +56,12 @@ def twin_made(robot_id: str, twin: Twin, keys: dict[str, str], parts: Split, use
         condition_number=twin.condition_number,
         base_parameter_count=body_combinations(twin),
         split=parts.rule,
+        torque_scale_uncertainty=twin.torque_scale and twin.torque_scale.uncertainty,
+        torque_scale_why=twin.torque_scale and twin.torque_scale.why,
     )
     return Made(
         robot_id=robot_id,
-        used=used,
+        used=inputs(workspace, robot_id, keys.values()),
         rows=[
             row,
             *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effect_ids),
@@ -101,7 +107,15 @@ def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[schema.Para
             unit=parameter.unit,
             lower=parameter.lower,
             upper=parameter.upper,
+            **_scaled(twin, parameter),
         )
+
+
+def _scaled(twin: Twin, one: Parameter | BaseParameter) -> dict[str, float]:
+    """Return the ends of a parameter's interval with the scale of torque in it; none where it does not go with that."""
+    scale = twin.torque_scale
+    found = None if scale is None else scale.interval(one.value, one.unit, one.lower, one.upper)
+    return {} if found is None else {"scaled_lower": found[0], "scaled_upper": found[1]}
 
 
 def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]:
@@ -114,6 +128,7 @@ def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]
             unit=parameter.unit,
             lower=parameter.lower,
             upper=parameter.upper,
+            **_scaled(twin, parameter),
         )
 
 

@@ -6,11 +6,9 @@ log.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from pathlib import Path
 
 from sqlalchemy import func, select
 
@@ -22,7 +20,7 @@ from irtwin.identification.validation import FIT_SHARE, Split
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions
 from irtwin.providers.provider import Made, software
-from irtwin.providers.records import inputs, load_run, load_twin, robot_iri, twin_iri
+from irtwin.providers.records import inputs, load_run, load_twin, robot_iri, stored_data_set, twin_iri
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -199,21 +197,11 @@ def _worst(twin: Twin, motions: Sequence[Motion]) -> float:
 
 def _data_set(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> DataSet:
     """Return what was fitted as a data set, so that a diagnosis sees nothing of what judges."""
-    with workspace.reading() as session:
-        row = session.get_one(schema.Robot, robot_id)
     cut = {motion.run: float(motion.time[0]) for motion in parts.held_out}
     names = {motion.run for motion in parts.fit}
     runs = [_fitted(load_run(workspace, known.robot, known.keys[name]), cut.get(name), names) for name in sorted(names)]
-    return DataSet(
-        folder=Path(robot_id),
-        robot=known.robot,
-        runs=tuple(runs),
-        effects=twin.effect_ids,
-        ambient_temperature=row.ambient_temperature_degc,
-        power_at=row.power_measured_at,
-        simulated=row.simulated,
-        notes=json.loads(row.notes),
-    )
+    said = stored_data_set(workspace, robot_id, known.robot)
+    return replace(said, runs=tuple(runs), effects=twin.effect_ids)
 
 
 def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
@@ -222,8 +210,7 @@ def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
 
 
 def _made(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:
-    used = inputs(workspace, robot_id, known.keys.values())
-    made = twin_made(robot_id, twin, known.keys, parts, used)
+    made = twin_made(workspace, robot_id, twin, known.keys, parts)
     return next(row.twin_id for row in made.rows if isinstance(row, schema.Twin)), made
 
 

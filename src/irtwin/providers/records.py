@@ -238,6 +238,24 @@ def twin_iri(twin_id: str) -> str:
     return f"twin/{twin_id}"
 
 
+def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robot) -> log.DataSet:
+    """Return what the data set of a robot said, but for its runs and effects."""
+    with workspace.reading() as session:
+        row = session.get_one(Robot, robot_id)
+    notes = json.loads(row.notes)
+    return log.DataSet(
+        folder=Path(robot_id),
+        robot=robot,
+        runs=(),
+        effects=None,
+        ambient_temperature=row.ambient_temperature_degc,
+        power_at=row.power_measured_at,
+        simulated=row.simulated,
+        notes=notes,
+        torque_scale_uncertainty=notes.get("torque_scale_uncertainty"),
+    )
+
+
 def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
     """Give back a robot with its data sheet."""
     with workspace.reading() as session:

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.storage.series_place import are_elsewhere
 
 Current = Callable[[bool], KnowledgeGraph]  # the graph as it is now; True: not even half a second old
 
@@ -37,6 +38,11 @@ class Source:
     def folder(self) -> Path:
         """Where the graph lies if no server keeps it."""
         return self.workspace / "graph"
+
+    @property
+    def needs_network(self) -> bool:
+        """Whether the graph, or the samples that queries ask for, are elsewhere."""
+        return self.url is not None or are_elsewhere(self.workspace)
 
     @contextmanager
     def reading(self) -> Iterator[Current]:

@@ -76,7 +76,7 @@ def main(memory: int) -> None:
     """Do the update on standard input; write what is wrong with it. Both are JSON."""
     request = json.load(sys.stdin.buffer)
     source = Source.told(request["source"])
-    if source.url is None:
+    if not source.needs_network:
         leave_network()
     answer: dict[str, object] = {}
     try:

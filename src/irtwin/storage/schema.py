@@ -265,6 +265,8 @@ class Twin(Base):
     condition_number: Mapped[float | None]  # of the scaled base regressor
     base_parameter_count: Mapped[int | None]
     split: Mapped[str]  # in words: which data were fitted, which held out
+    torque_scale_uncertainty: Mapped[float | None]  # a share, half a 95 % interval; none where no torque was fitted
+    torque_scale_why: Mapped[str | None]  # in words
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -327,6 +329,8 @@ class Parameter(Base):
     unit: Mapped[str]  # symbol: "N m s/rad"
     lower: Mapped[float | None]
     upper: Mapped[float | None]
+    scaled_lower: Mapped[float | None]  # with the scale of torque in it; none where it does not go with that
+    scaled_upper: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
@@ -342,6 +346,8 @@ class BaseParameter(Base):
     unit: Mapped[str]
     lower: Mapped[float]
     upper: Mapped[float]
+    scaled_lower: Mapped[float | None]  # as a parameter's
+    scaled_upper: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

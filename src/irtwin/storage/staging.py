@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 
 from sqlalchemy import update
@@ -22,7 +23,8 @@ from irtwin.storage.rows import (
     release_plans,
 )
 from irtwin.storage.schema import Robot
-from irtwin.storage.series import is_whole
+from irtwin.storage.series import FOLDER, fetch_series, is_series, is_whole
+from irtwin.storage.series_place import elsewhere
 
 _PREFIX = ".staged-"
 
@@ -39,14 +41,14 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
         Workspace(folder, resources=place.resources, base=place.base) as apart,
     ):
         before = _rows(place, robot_id)
-        _put(place, before, apart, robot_id)
+        whole = _put(place, before, apart, robot_id)
         try:
             yield apart
         except InputError as error:
             raise InputError(str(error).replace(str(folder), str(place.folder))) from error
         after = _rows(apart, robot_id)
-        if after != before or not all(is_whole(place.folder, *file) for file in files_of(before).items()):
-            _put(apart, after, place, robot_id)
+        if after != before or whole != set(files_of(before)):
+            _put(apart, after, place, robot_id, whole)
             place.remove_orphans()
 
 
@@ -55,12 +57,15 @@ def _rows(place: Workspace, robot_id: str) -> Rows:
         return recorded_rows(session, robot_id)
 
 
-def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> None:
-    """Make the rows, and the files that they name, all that the target has of the robot but its live runs."""
+def _put(
+    source: Workspace, rows: Rows, target: Workspace, robot_id: str, had: AbstractSet[str] = frozenset()
+) -> set[str]:
+    """Make the rows, and the files that they name, all that the target has of the robot but its live runs.
+
+    Returns the files that were whole; whoever needs another says so. `had` are those that the target had whole.
+    """
     with engine.writing(target.engine) as session:
-        for path, checksum in files_of(rows).items():
-            if is_whole(source.folder, path, checksum):  # else whoever needs it says so
-                _link(source, target, path)
+        whole = _bring(source, target, files_of(rows), had)
         of_live = modelled_of_live_runs(session, robot_id)
         drop_recorded(session, robot_id)
         if session.get(Robot, robot_id) is None:
@@ -71,6 +76,37 @@ def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> Non
         if {row["twin_id"] for row in of_live["run_energy"]} <= {row["twin_id"] for row in rows["twin"]}:
             insert_values(session, of_live)  # it is the same twin: what it says of live runs holds
         release_plans(session, robot_id)
+    return whole
+
+
+def _bring(source: Workspace, target: Workspace, named: Mapping[str, str], had: AbstractSet[str]) -> set[str]:
+    """Give the target what is whole of the files that are named, by path and SHA-256; return their paths."""
+    fetched = _fetch(source, target, named)
+    whole = {
+        path for path, checksum in named.items() if path not in fetched and is_whole(source.folder, path, checksum)
+    }
+    storage = elsewhere(target.folder)
+    series = set() if storage is None else {path for path in whole if is_series(path)}
+    if storage is not None:
+        lacking = series - (had & storage.paths(FOLDER))
+        storage.put({path: inside(source.folder, path) for path in lacking})
+    for path in whole - series:
+        _link(source, target, path)
+    return whole | {path for path, is_good in fetched.items() if is_good}
+
+
+def _fetch(source: Workspace, target: Workspace, named: Mapping[str, str]) -> dict[str, bool]:
+    """Bring series out of object storage; return of each whether it was whole, nothing where a folder has them."""
+    storage = elsewhere(source.folder)
+    if storage is None:
+        return {}
+    series = {path for path in named if is_series(path)}
+    fetch_series(storage, target.folder, series & storage.paths(FOLDER))
+    found = {path: is_whole(target.folder, path, named[path]) for path in series}
+    for path, is_good in found.items():
+        if not is_good:
+            inside(target.folder, path).unlink(missing_ok=True)
+    return found
 
 
 def _link(source: Workspace, target: Workspace, path: str) -> None:

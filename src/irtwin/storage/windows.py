@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
+from irtwin.storage.files import inside
+from irtwin.storage.object_storage import ObjectStorage
+from irtwin.storage.series import storage_of
 from irtwin.storage.summary import Channel, Floats, Summary, read_summary
 
 if TYPE_CHECKING:
@@ -28,16 +32,18 @@ class SeriesWindows:
     not have, and answers None where the window holds no sample.
     """
 
-    def __init__(self, file: Path) -> None:
-        """Read the file's metadata. Raises InputError where there is no such file, or it is damaged."""
-        if not file.is_file():
-            raise InputError(f"{file}: the series is missing; ingest the data set again")
-        self._file = str(file)
-        try:
-            schema = pq.read_schema(file)
-            self._summary = read_summary(schema)
-        except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(_damaged(self._file)) from error
+    def __init__(self, file: Path | str, storage: ObjectStorage | None = None) -> None:
+        """Read a file's metadata, or an object's by its path. InputError where there is none, or it is damaged."""
+        self._file = str(file) if storage is None else storage.address(str(file))
+        self._storage = storage
+        with _opened(file, storage) as content:
+            if content is None:
+                raise InputError(f"{self._file}: the series is missing; ingest the data set again")
+            try:
+                schema = pq.read_schema(content)
+                self._summary = read_summary(schema)
+            except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as error:
+                raise InputError(_damaged(self._file)) from error
         self.channels = tuple(name for name in schema.names if name != "time")
 
     @cached_property
@@ -152,6 +158,8 @@ class SeriesWindows:
         try:
             return ask()
         except duckdb.Error as error:
+            if self._storage is not None:
+                self._storage.owner()  # says so where the storage cannot be reached
             raise InputError(_damaged(self._file)) from error
 
     def _run(self, text: str, *values: float) -> duckdb.DuckDBPyConnection:
@@ -163,9 +171,24 @@ def _damaged(file: str) -> str:
 
 
 @lru_cache(maxsize=256)
-def open_series(file: Path) -> SeriesWindows:
-    """Return the series of a file, whose name says its content: it never becomes another."""
-    return SeriesWindows(file)
+def open_series(workspace: Path, path: str) -> SeriesWindows:
+    """Return a series by its path in a workspace, which says its content: it never becomes another."""
+    file, storage = inside(workspace, path), storage_of(workspace, path)
+    if storage is None:
+        return SeriesWindows(file)
+    _let_read(storage)
+    return SeriesWindows(path, storage)
+
+
+@contextmanager
+def _opened(file: Path | str, storage: ObjectStorage | None) -> Iterator[Path | IO[bytes] | None]:
+    """Give what pyarrow reads a series from; None where there is none."""
+    if storage is None:
+        there = Path(file)
+        yield there if there.is_file() else None
+    else:
+        with storage.opened(str(file)) as stream:
+            yield stream
 
 
 @lru_cache(maxsize=1)
@@ -173,6 +196,12 @@ def _database() -> duckdb.DuckDBPyConnection:
     import duckdb
 
     return duckdb.connect(config={"autoload_known_extensions": False, "autoinstall_known_extensions": False})
+
+
+def _let_read(storage: ObjectStorage) -> None:
+    """Let DuckDB read objects, only the parts that it needs."""
+    if "s3" not in _database().list_filesystems():
+        _database().register_filesystem(storage.files)
 
 
 def _connection() -> duckdb.DuckDBPyConnection:

@@ -16,6 +16,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
+from irtwin.twin.torque_scale import TorqueScale
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 _FORMAT, _VERSION = "irtwin twin", 1
@@ -30,6 +31,13 @@ _PARAMETER: _Columns = {
     "unit": (str,),
     "lower": (float, None),
     "upper": (float, None),
+}
+_TORQUE_SCALE: _Columns = {
+    "uncertainty": (float,),
+    "source": (str,),
+    "low": (float,),
+    "high": (float,),
+    "why": (str,),
 }
 _BASE_PARAMETER: _Columns = {
     "name": (str,),
@@ -74,6 +82,8 @@ def to_json(twin: Twin) -> str:
     }
     if twin.covariance is not None:
         document["covariance"] = [" ".join(map(repr, row[: k + 1])) for k, row in enumerate(twin.covariance.tolist())]
+    if twin.torque_scale is not None:
+        document["torque_scale"] = asdict(twin.torque_scale)
     if twin.quantities:
         document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
@@ -102,6 +112,7 @@ def from_json(text: str, path: Path) -> Twin:
         quantities=tuple(Parameter(**row) for row in reader.rows("quantities", _PARAMETER))
         if "quantities" in document
         else (),
+        torque_scale=_torque_scale(reader) if "torque_scale" in document else None,
     )
     _check_complete(path, twin)
     return replace(twin, covariance=_covariance(reader)) if "covariance" in document else twin
@@ -145,7 +156,14 @@ class _Reader:
 
     def rows(self, key: str, columns: _Columns) -> list[dict[str, Any]]:
         rows = [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
-        return [{name: row.take(name, *kinds) for name, kinds in columns.items()} for row in rows]
+        return [row.columns(columns) for row in rows]
+
+    def columns(self, columns: _Columns) -> dict[str, Any]:
+        return {name: self.take(name, *kinds) for name, kinds in columns.items()}
+
+
+def _torque_scale(reader: _Reader) -> TorqueScale:
+    return TorqueScale(**reader.inner("torque_scale").columns(_TORQUE_SCALE))
 
 
 def _covariance(reader: _Reader) -> np.ndarray:

@@ -77,7 +77,7 @@ def identify(
             values = torque.values
             stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values))
             if any(effect.carries_torque for effect in stack.effects):
-                torque = fit_both(stack, measured, values)
+                torque = fit_both(stack, measured, values, blocks if len(with_torque) == len(measured) else None)
             of_power = [(free_terms(stack), fit_power(stack, with_power, torque.values))]
         found: list[Found] = [(stack.torque_terms, torque), *of_power]
         base, condition = _base(stack, blocks, torque)

@@ -14,6 +14,7 @@ from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
+from irtwin.twin.torque_scale import TorqueScale
 
 _PIECE = 8192  # samples whose regressor is held at once
 
@@ -60,6 +61,8 @@ class Twin:
     `cutoff` (Hz) is that of the filter in the fit; `condition_number` that of the scaled base regressor. `parameters`
     are the coefficients that predict; `quantities` what they say in the catalogue's terms, where that differs.
     `covariance` (p, p) is that of the p parameters, so that 1.96 deviations are half a 95 % interval; None: not known.
+    Neither it nor the parameters' intervals hold how sure the scale of the fitted torque is: `torque_scale`; None: no
+    torque was fitted, or nobody asked.
     """
 
     robot: Robot
@@ -72,6 +75,7 @@ class Twin:
     fitted: tuple[str, ...] = ()  # runs
     quantities: tuple[Parameter, ...] = ()
     covariance: np.ndarray | None = field(default=None, repr=False, compare=False)
+    torque_scale: TorqueScale | None = None
 
     @property
     def knows_power(self) -> bool:

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from irtwin.effects.effect import Quantity, Term
+from irtwin.effects.effect import Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.channel_equations import Torque
-from irtwin.gap.thresholds import ScaleOfTorque
+from irtwin.gap.thresholds import DEFAULT, ScaleOfTorque
 from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.identification.estimators import estimate
 from irtwin.identification.uncertainty import half_widths
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
+from irtwin.twin.torque_scale import TorqueScale
+from irtwin.twin.twin import Twin
 
 STATED, SIMULATED, SENSOR, ASSUMED = "stated", "simulated", "sensor", "assumed"
 _SENSOR = re.compile(r"\b(?:sensors?|link-side)\b", re.IGNORECASE)
-_FORCES = re.compile(r"\b(?:kg|N)\b")
-_POWER_OF = re.compile(r"\)\^(\d+)$")
 _LOSSES = (  # of joint torques and speeds, (N, n) each
     lambda torque, speed: torque**2,
     lambda torque, speed: np.abs(torque),
@@ -33,46 +33,6 @@ _LOSSES = (  # of joint torques and speeds, (N, n) each
     lambda torque, speed: speed**2,
 )
 _SPREAD = 1e3  # of a loss' coefficient: no more is known of it
-
-
-@dataclass(frozen=True)
-class TorqueScale:
-    """Half the 95 % interval of the scale, a share, and where that comes from.
-
-    low, high: the ends of what true torque is over logged torque; `why` says all of it in words.
-    """
-
-    uncertainty: float
-    source: str
-    low: float
-    high: float
-    why: str
-
-    def widened(self, one: Quantity) -> Quantity:
-        """Return a quantity with the scale in its interval; one that does not go with torque as it is."""
-        degree = torque_degree(one.unit)
-        if degree == 0 or one.lower is None or one.upper is None:
-            return one
-        ends = sorted(one.value * factor**degree for factor in (self.low, self.high))
-        below, above = max(one.value - ends[0], 0.0), max(ends[1] - one.value, 0.0)
-        return replace(
-            one,
-            lower=one.value - float(np.hypot(one.value - one.lower, below)),
-            upper=one.value + float(np.hypot(one.upper - one.value, above)),
-        )
-
-
-def torque_degree(unit: str) -> int:
-    """Return the power of torque that a quantity of this unit goes with: kg and N m 1, W/(N m)^2 -2, rad 0."""
-    above, _, below = unit.partition("/")
-    return _degree(above) - _degree(below)
-
-
-def _degree(part: str) -> int:
-    if not _FORCES.search(part):
-        return 0
-    power = _POWER_OF.search(part)
-    return int(power[1]) if power else 1
 
 
 def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque, limits: ScaleOfTorque) -> TorqueScale:
@@ -87,6 +47,13 @@ def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque, l
         return known
     told = _told_by_power(with_power, torque)
     return known if told is None else _narrowed(known, *told, limits)
+
+
+def torque_scale_of(twin: Twin, data_set: DataSet, motions: Sequence[Motion]) -> TorqueScale | None:
+    """Return how sure the scale is by which a twin was fitted to motions; None where these have no torque."""
+    if not any(motion.torque is not None for motion in motions):
+        return None
+    return torque_scale(data_set, motions, twin.joint_torque, DEFAULT.scale_of_torque)
 
 
 def _stated(data_set: DataSet, limits: ScaleOfTorque) -> TorqueScale:

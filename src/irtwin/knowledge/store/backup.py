@@ -31,7 +31,8 @@ from irtwin.storage.database import DIAGNOSES, MESHES, TARIFF, TWINS, Workspace
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
-from irtwin.storage.series import FOLDER
+from irtwin.storage.series import FOLDER, fetch_series, moved_out
+from irtwin.storage.series_place import elsewhere, look
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
@@ -50,6 +51,9 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
     Raises InputError where a file that the database names is missing or altered, or the graph is damaged.
     """
     with files.working_folder(place.folder, ".backup-") as held:
+        storage = elsewhere(place.folder)
+        if storage is not None:  # before writers have to wait: the network may be slow
+            fetch_series(storage, held, storage.paths(FOLDER))
         with place.engine.connect() as connection:
             connection.execution_options(**snapshot_options(place.engine))
             with connection.begin():
@@ -72,14 +76,23 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
             raise InputError(_incomplete(place.folder, lost, "altered", "nothing was written"))
 
 
-def restore(archive: Path, folder: Path, database: str | None = None, graph_url: str | None = None) -> None:
+def restore(
+    archive: Path,
+    folder: Path,
+    database: str | None = None,
+    graph_url: str | None = None,
+    series_url: str | None = None,
+) -> None:
     """Make a workspace of an archive, whole or not at all, where there is none.
 
-    With `database` the rows go there, into tables that must be empty; with `graph_url` the graph goes to that server.
+    With `database` the rows go there, into tables that must be empty; with `graph_url` the graph goes to that server;
+    with `series_url` the series go to object storage, which must hold no other workspace's.
     Raises InputError where the archive is damaged or not ours, or where there is something already.
     """
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise InputError(f"{folder}: already exists; restore into a new folder")
+    if series_url is not None:
+        look(series_url)
     folder.absolute().parent.mkdir(parents=True, exist_ok=True)
     with files.working_folder(folder.absolute().parent, ".irtwin-restore-") as working:
         held = working / "workspace"
@@ -106,7 +119,8 @@ def restore(archive: Path, folder: Path, database: str | None = None, graph_url:
                     names = (str(quad.graph_name) for quad in _read_quads(archive, held / _GRAPH))
                     if robots and not any(name.startswith(f"<{GRAPH_SOURCE}") for name in names):
                         raise InputError(f"{archive}: incomplete: its graph knows no robot; use another backup")
-                    graph.replace(_read_quads(archive, held / _GRAPH), "")
+                    with moved_out(held, series_url):
+                        graph.replace(_read_quads(archive, held / _GRAPH), "")
         shutil.rmtree(held / "rows", ignore_errors=True)
         (held / _GRAPH).unlink(missing_ok=True)
         if folder.exists():
@@ -124,8 +138,13 @@ def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) ->
 
 def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
     """Link a workspace's files into a folder; those that still grow are copied."""
+    storage = elsewhere(folder)
+    if storage is not None:
+        there = storage.paths(FOLDER)
+        fetch_series(storage, held, there)
+        yield from ((path, held / path) for path in sorted(there))
     for name in _FOLDERS:
-        (held / name).mkdir()
+        (held / name).mkdir(exist_ok=True)
         for file in filter(Path.is_file, sorted((folder / name).glob("[!.]*"))):
             target = held / name / file.name
             try:

@@ -18,7 +18,6 @@ from pyoxigraph import BlankNode, DefaultGraph, Literal, NamedNode, Store, Tripl
 from irtwin.errors import InputError
 from irtwin.knowledge.store.table import to_python
 from irtwin.knowledge.vocabulary import RDF, SERIES, shorten, term
-from irtwin.storage.files import inside
 
 if TYPE_CHECKING:
     from irtwin.storage.windows import SeriesWindows  # pyarrow: a tenth of a second, for those who ask for samples
@@ -94,7 +93,7 @@ class _Asker:
         for series in self._objects(run, "has_Series"):
             if kind in map(to_python, self._objects(series, "Series_Kind")):
                 for file in self._objects(series, "File"):
-                    return open_series(inside(self._workspace, str(to_python(file))))
+                    return open_series(self._workspace, str(to_python(file)))
         raise InputError(f"{shorten(run.value)}: the graph has no {kind} series of this run")
 
     def _seconds(self, run: NamedNode, series: SeriesWindows, moment: Term) -> float:

@@ -18,11 +18,15 @@ Explain = Callable[[str, str, str], Explanation | None]  # subject, predicate an
 
 @dataclass(frozen=True)
 class Cell:
-    """A parameter's value and 95 % interval as text; `unsure` where it is known to no better than half its value."""
+    """A parameter's value and 95 % interval as text; `unsure` where it is known to no better than half its value.
+
+    scaled: the interval that holds the scale of torque, too, where that is to be seen.
+    """
 
     value: str
     interval: str | None
     unsure: bool
+    scaled: str | None = None
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,15 @@ def _cell(row: Row) -> Cell:
     if lower is None or upper is None:
         return Cell(wording.number(row["value"]), None, True)
     value, interval = wording.interval(row["value"], lower, upper)
-    return Cell(value, interval, is_unsure(row["value"], lower, upper))
+    scaled = scaled_interval(row)
+    return Cell(value, interval, is_unsure(row["value"], lower, upper), None if scaled == interval else scaled)
+
+
+def scaled_interval(row: Row) -> str | None:
+    """Return a parameter's interval with the scale of torque in it as text; None where it does not go with that."""
+    lower: Any = row["scaled_lower"]
+    upper: Any = row["scaled_upper"]
+    return None if lower is None or upper is None else wording.interval(row["value"], lower, upper)[1]
 
 
 def is_unsure(value: float, lower: float | None, upper: float | None) -> bool:
