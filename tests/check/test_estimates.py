@@ -12,7 +12,7 @@ from tests.check.test_check import exchanged, found, healthy, one, spoilt
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.check.check import check
-from irtwin.check.estimates import estimate_findings
+from irtwin.check.estimates import Lateness, estimate_findings
 from irtwin.check.moving import Moving, moving
 from irtwin.signals.channels import Signals
 from irtwin.signals.finding import Finding
@@ -89,3 +89,27 @@ def test_exchanged_speeds_of_nearly_opposite_motions_are_not_called_reversed():
 def test_nothing_moves_nothing_is_said():
     still = Moving((), (), np.zeros(4, dtype=bool))
     assert estimate_findings(ROBOT, still) == []
+
+
+ON_TIME = [(0.001, 0.002), (0.003, 0.002), (0.002, 0.001)]  # s, of the friction of other joints
+
+
+def test_friction_tells_a_delay_where_that_of_other_joints_is_on_time():
+    torque = Lateness(bodies=(0.01, 0.02), friction=(0.022, 0.002))
+    delay, deviation = torque.beside(ON_TIME)
+    assert delay == pytest.approx(0.02, abs=0.001)
+    assert deviation < 0.004
+
+
+def test_friction_that_looks_late_at_every_joint_is_no_delay():
+    torque = Lateness(bodies=(0.0, 0.005), friction=(0.022, 0.002))
+    assert abs(torque.beside([(late + 0.02, deviation) for late, deviation in ON_TIME])[0]) < 0.001
+
+
+def test_too_few_other_joints_tell_nothing_of_friction():
+    torque = Lateness(bodies=(0.001, 0.005), friction=(0.022, 0.002))
+    assert torque.beside([*ON_TIME[:2], (0.002, 0.05)]) == torque.bodies
+
+
+def test_a_torque_that_shows_no_delay_at_all():
+    assert Lateness((0.0, np.inf), (0.0, np.inf)).beside(ON_TIME) == (0.0, np.inf)

@@ -101,3 +101,23 @@ def test_one_joint_alone_is_as_among_others(effect):
     (one,) = effect.on(robot.joint_names[1]).samples(robot, motion, predicted)
     np.testing.assert_allclose(one[:, 1], every[:, 1], rtol=1e-12, atol=1e-12)
     assert every[:, 1].any() and not one[:, [0, 2]].any()
+
+
+def test_a_gap_that_is_known_about_passes_the_mean_of_it_and_of_those_about_it():
+    robot = arm(1)
+    motion = swing(robot, 5, seconds=4)
+    said = Predicted(np.zeros_like(motion.dq), load=20 * np.sin(motion.q * 9), inertia=np.full_like(motion.dq, 2.0))
+    (about,) = Backlash(b=1e-3, about=True).samples(robot, motion, said)
+    each = [Backlash(b=1e-3 * 2 ** (2 * k / 3)).samples(robot, motion, said)[0] for k in (-1, 0, 1)]
+    np.testing.assert_allclose(about, np.mean(each, axis=0), atol=1e-9)
+
+
+def test_gaps_that_are_tried_together_are_as_each_alone():
+    robot = arm(1)
+    motion = swing(robot, 5, seconds=4)
+    said = Predicted(np.zeros_like(motion.dq), load=20 * np.sin(motion.q * 9), inertia=np.full_like(motion.dq, 2.0))
+    tried = Backlash().candidates(robot)[3:5]
+    for one in tried:
+        (alone,) = one.samples(robot, motion, Predicted(said.torque, load=said.load, inertia=said.inertia))
+        np.testing.assert_allclose(one.samples(robot, motion, said)[0], alone, rtol=1e-12)
+        assert alone.any()

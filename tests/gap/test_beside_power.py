@@ -16,7 +16,7 @@ from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.estimates import estimate_of
 from irtwin.gap.isolation.finding import find, keeping
 from irtwin.gap.regression.channel_equations import torque_system
-from irtwin.gap.regression.cross_fitted import LeftOut
+from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import Run
@@ -62,7 +62,8 @@ def found(one: Case, *, power: bool = True):
         system = torque_system(stack, one.with_torque, one.grouping, tried, plain.below)
         return find("torque", one, system, FLOOR.torque, 0)
     drawn = [shape for name in DRAWN for shape in catalogue()[name].candidates(ROBOT)]
-    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, FLOOR, 0)[0]
+    before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
+    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR, 0)[0]
 
 
 def names(finding) -> list[str]:

@@ -72,6 +72,8 @@ def json_of(node: dict[str, Any]) -> st.SearchStrategy[Any]:
 def _typed(kind: str, node: dict[str, Any]) -> st.SearchStrategy[Any]:
     if kind == "string":
         return st.text(max_size=5)
+    if kind == "boolean":
+        return st.booleans()
     if kind == "number":
         low, high = node.get("minimum"), node.get("maximum")
         return st.floats(low, high, allow_nan=False, allow_infinity=False)

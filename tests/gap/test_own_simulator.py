@@ -59,6 +59,7 @@ def diagnosed(folder, effect, friction):
     return said.out, {cause["effect"]: set(cause["joints"]) for cause in causes}
 
 
+@pytest.mark.nightly
 def test_the_friction_that_the_simulator_lacks_is_named_on_its_joint(tmp_path):
     said, causes = diagnosed(tmp_path, stribeck, friction=1.0)
     assert causes.pop("stribeck_friction") == {"joint_3"}
@@ -67,6 +68,7 @@ def test_the_friction_that_the_simulator_lacks_is_named_on_its_joint(tmp_path):
     assert "stribeck friction" in said
 
 
+@pytest.mark.nightly
 def test_a_simulator_without_friction_lacks_all_of_it(tmp_path):
     _, causes = diagnosed(tmp_path, lambda motion: 0.0, friction=0.0)
     everywhere = set(DRAWN.joint_names)

@@ -42,6 +42,11 @@ def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():
     assert found.p <= 0.01
 
 
+def test_of_six_runs_joints_tell_what_signs_of_runs_cannot():
+    assert search((1, 4, 5), observed=range(6)).effect.runs == ("run_1", "run_4", "run_5")
+    assert search((), observed=range(6)) is None
+
+
 def test_the_heavier_part_is_the_one_that_carries():
     assert search((0, 2, 3, 4, 6, 7)).effect.runs == tuple(f"run_{seed}" for seed in (0, 2, 3, 4, 6, 7))
 

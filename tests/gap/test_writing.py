@@ -8,7 +8,7 @@ import pytest
 from tests.gap_cases import document
 
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.gap.writing import _members
+from irtwin.gap.writing import _members, folded
 
 
 def test_what_few_runs_leave_open_is_open_for_rivals_too():
@@ -20,3 +20,10 @@ def test_what_few_runs_leave_open_is_open_for_rivals_too():
     assert [member.confidence for member in _members(open_still, DEFAULT.confidence)] == pytest.approx(
         [one / 4 for one in told]
     )
+
+
+def test_a_cause_that_no_finding_that_matters_has_is_marked():
+    said = document("ambiguous")
+    assert not any(one.folded_away for one in folded(said.causes, said.findings))
+    little = [replace(one, matters=False) for one in said.findings]
+    assert all(one.folded_away for one in folded(said.causes, little))

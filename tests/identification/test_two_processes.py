@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import sys
 import threading
+import time
 
 import pytest
 
@@ -82,3 +84,16 @@ def test_an_error_in_what_was_begun_is_raised_when_it_is_asked_for(monkeypatch):
     result = begun(work, worth=True)
     with pytest.raises(InputError, match="the log is wrong"):
         result()
+
+
+def test_work_that_is_dropped_ends(monkeypatch):
+    monkeypatch.setattr(two_processes, "can_copy", lambda: True)
+
+    def work():
+        time.sleep(60)
+
+    dropped = begun(work, worth=True)
+    (copy,) = multiprocessing.active_children()
+    dropped.drop()
+    assert not copy.is_alive()
+    begun(work, worth=False).drop()

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.robot import body_regressor as module
-from irtwin.robot.body_regressor import body_regressor
+from irtwin.robot.body_regressor import body_regressor, point_jacobian
 
 
 def tree(parents: list[int], slides: list[bool], rng: np.random.Generator) -> pin.Model:
@@ -50,3 +50,14 @@ def test_pieces_join(monkeypatch, samples):
     found = body_regressor(model, *states)
     assert found.shape == (samples, 3, 30)
     np.testing.assert_allclose(found, one_by_one(model, *states), rtol=1e-11, atol=1e-11)
+
+
+def test_the_jacobian_of_a_point_is_what_pinocchio_says_of_each_sample(monkeypatch):
+    monkeypatch.setattr(module, "_PIECE", 3)
+    rng = np.random.default_rng(0)
+    model = tree([0, 1, 1, 3], [False, True, False, False], rng)
+    place = pin.SE3(pin.exp3(rng.standard_normal(3)), rng.uniform(-1, 1, 3))
+    frame = model.addFrame(pin.Frame("tip", 4, 0, place, pin.FrameType.OP_FRAME))
+    q, data = rng.uniform(-3, 3, (8, 4)), model.createData()
+    single = [pin.computeFrameJacobian(model, data, each, frame, pin.LOCAL_WORLD_ALIGNED)[:3].T.copy() for each in q]
+    np.testing.assert_allclose(point_jacobian(model, frame, q), single, atol=1e-12)

@@ -6,7 +6,7 @@ motions do not show it, it is not sure, and nothing is said. The thresholds' ori
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,17 +23,20 @@ _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _MOST_JOINTS = 12
 _SURE = 4.0  # standard deviations of a number from none
 _BEYOND = 2.0  # standard deviations by which a number exceeds what is tolerated
-_AS_WELL = 3.0  # standard deviations by which bodies come late where a torque as a whole surely does
 _LATE, _LATEST = 0.008, 0.1  # s of a delay; drives filter their currents by a few ms
+_CLEAR = 0.01  # s: deviation below which a joint tells how late friction looks
+_EXACT = 1e-5  # s; no deviation is less
+_ALIKE = 0.003  # s by which that differs between joints at least
 _STEP = 0.005  # s over which the rate of a torque is taken
 _SCALED = 1.6  # times, or its inverse; torque constants are nominal, friction grows with load
 _TELLS = 0.2  # of a scale: deviation below which a joint tells what is usual
-_OTHERS = 3  # such joints, beside the one that differs
+_OTHERS = 3  # joints, beside the one that differs, that tell what is usual
+_MAJORITY = 2  # of a scale, where they agree
+_AGREE = 1.2  # times: scales that agree differ by less
 _TURNS = 4  # of a scale far from one
 _ZERO = 0.03  # rad; links and gears give way by as much
-_GAIN = 2.0  # in the product of all residuals that a corrected zero has to bring
 _SHOWN = 0.015  # rad: half of it; a deviation beyond means that the motions do not show where the zero is
-_NEARER = 2  # looks at a zero that seems to be off
+_NEARER = 2  # looks at a delay, or at a zero that seems to be off
 _TURN = 1e-3  # rad over which a torque's change with a position is taken
 
 
@@ -43,29 +46,67 @@ def estimate_findings(robot: Robot, moving: Moving) -> list[Finding]:
     if rows is None or len(rows.q) < _FEWEST or len(robot.joint_names) > _MOST_JOINTS:
         return []
     fitted = _fit(rows)
-    return _scales(robot, moving, fitted) or _delays(robot, moving, fitted) or _zeros(robot, moving, rows, fitted)
+    return _scales(robot, moving, fitted) or _delays(robot, moving, rows, fitted) or _zeros(robot, moving, rows, fitted)
 
 
-def _delays(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
+def _delays(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Finding]:
     after, before = (rows_of(robot, moving, _ROWS, later) for later in (_STEP, -_STEP))
     if after is None or before is None:
         return []
-    rates = (after.columns() - before.columns()) / (2 * _STEP)
-    bodies, friction = fitted.parts(rates)
+    slopes = (after.columns() - before.columns()) / (2 * _STEP)
+    rates = fitted.parts(slopes)
+    joints = np.flatnonzero(moving.joints).tolist()
+    late = {joint: _lateness(fitted, rates, joint) for joint in joints}
     names = CHANNELS["torque"].columns(robot.joint_names)
     found = []
-    for joint in np.flatnonzero(moving.joints).tolist():
-        body, rubbed = _only(-bodies, joint), _only(-friction, joint)
-        whole = fitted.estimate(body + rubbed)
-        if not _LATE < whole[0] < _LATEST:
+    for joint in joints:
+        others = [late[other].friction for other in joints if other != joint]
+        number, deviation = late[joint].beside(others)
+        if number < _STEP or number < _BEYOND * deviation:
             continue
-        # friction near a reversal looks like a delay of itself: what bodies do must come late as well
-        of_bodies = fitted.estimate(body, (rubbed,))
-        if _beyond(*of_bodies, _LATE):
-            found.append(_delay(names[joint], *of_bodies, moving))
-        elif _beyond(*whole, _LATE) and of_bodies[0] > max(_LATE, _AS_WELL * of_bodies[1]):
-            found.append(_delay(names[joint], *whole, moving))
+        for _ in range(_NEARER):  # a rate tells small delays alone
+            earlier = fitted.body.fit(_earlier(robot, moving, rows, joint, number))
+            more, deviation = _lateness(earlier, earlier.parts(slopes), joint).beside(others)
+            number += more
+            if not 0 < number < _LATEST:
+                break
+        if _LATE < number < _LATEST and _beyond(number, deviation, _LATE):
+            found.append(_delay(names[joint], number, deviation, moving))
     return found
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """By how much (s) what bodies do, and what friction does, comes late in a torque, each with its deviation."""
+
+    bodies: tuple[float, float]
+    friction: tuple[float, float]
+
+    def beside(self, others: list[tuple[float, float]]) -> tuple[float, float]:
+        """Return the delay of the torque and its deviation.
+
+        Near a reversal friction looks late by itself; by how much, that of the other joints tells.
+        """
+        clear = [late for late, deviation in others if deviation < _CLEAR]
+        if len(clear) < _OTHERS:
+            return self.bodies
+        spread = max(float(np.std(clear, ddof=1)), _ALIKE)
+        known = [self.bodies, (self.friction[0] - float(np.median(clear)), float(np.hypot(self.friction[1], spread)))]
+        weights = np.array([max(deviation, _EXACT) ** -2 for _, deviation in known])
+        if not weights.any():
+            return 0.0, np.inf
+        return float(weights @ [late for late, _ in known] / weights.sum()), float(weights.sum() ** -0.5)
+
+
+def _earlier(robot: Robot, moving: Moving, rows: Rows, joint: int, by: float) -> np.ndarray:
+    """Return the torques (N, n), that of the joint as it is logged so much later."""
+    later = rows_of(robot, moving, _ROWS, of_torque=by)
+    return rows.torque if later is None else np.where(np.arange(len(robot.joints)) == joint, later.torque, rows.torque)
+
+
+def _lateness(fitted: Fitted, rates: tuple[np.ndarray, np.ndarray], joint: int) -> Lateness:
+    body, rubbed = (_only(-rate, joint) for rate in rates)
+    return Lateness(fitted.estimate(body, (rubbed,)), fitted.estimate(rubbed, (body,)))
 
 
 def _delay(name: str, late: float, deviation: float, moving: Moving) -> Finding:
@@ -85,22 +126,30 @@ def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
     found = [
         (_rescaled(fitted, joint, np.exp(log)).left, joint)
         for joint, (log, deviation) in scales.items()
-        if len(telling - {joint}) >= _OTHERS and _beyond(abs(log), deviation, np.log(_SCALED))
+        if len(telling - {joint}) >= _MAJORITY and _beyond(abs(log), deviation, np.log(_SCALED))
     ]
-    if not found:
+    _, joint = min(found, default=(0.0, -1))  # of one that differs, others seem to differ as well
+    alike = _rescaled(fitted, joint, np.exp(scales[joint][0])) if found else fitted
+    if not found or not _agree(alike, telling - {joint}) or _gained(fitted, alike) < _SURE:
         open_to_it = {names[joint] for joint in telling if abs(scales[joint][0]) > np.log(_SCALED) + scales[joint][1]}
         return [finding for finding in scale_findings(robot, moving) if finding.channel in open_to_it]
-    _, joint = min(found)  # of one that differs, others seem to differ as well
     log, deviation = scales[joint]
-    own, cured = fitted.body.held_out(fitted.torque), fitted.body.held_out(_rescaled(fitted, joint, np.exp(log)).torque)
-    if own.t(cured) < _SURE:
-        return []
     evidence = {"ratio": round(float(np.exp(log)), 3), "deviation": round(float(np.exp(log)) * deviation, 3)}
     say = (
         f"{names[joint]} is {np.exp(log):.2g} times (± {deviation:.0%}) as large as the bodies that it carries are by "
         "the torques of other joints; check its unit, torque constant and gear ratio"
     )
     return [Finding("scale", names[joint], moving.names, False, False, evidence, say)]
+
+
+def _gained(fitted: Fitted, cured: Fitted) -> float:
+    """Return by how many standard deviations torques that were held out are predicted better once cured."""
+    return fitted.body.held_out(fitted.torque).t(cured.body.held_out(cured.torque))
+
+
+def _agree(fitted: Fitted, telling: set[int]) -> bool:
+    """Return whether joints that tell what scale is usual say the same; of three or more, most do."""
+    return len(telling) >= _OTHERS or all(abs(_scale(fitted, joint)[0]) < np.log(_AGREE) for joint in telling)
 
 
 def _scale(fitted: Fitted, joint: int) -> tuple[float, float]:
@@ -142,7 +191,7 @@ def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Fin
         return []
     _, joint, off, deviation = min(found)  # of one that is off, others seem to be off as well
     own, cured = (WholeBody.of(each).held_out(rows.torque) for each in (rows, _turned(rows, joint, -off)))
-    if own.gain(cured) < np.log(_GAIN) or own.t(cured) < _SURE:
+    if own.t(cured) < _SURE:
         return []
     name = CHANNELS["q"].column(robot.joints[joint].name)
     evidence = {"offset_rad": round(off, 4), "deviation_rad": round(deviation, 4)}

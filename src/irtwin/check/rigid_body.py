@@ -79,10 +79,10 @@ class Rows:
         return list(zip(self.q, self.dq, self.ddq, strict=True))
 
 
-def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0) -> Rows | None:
+def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torque: float = 0.0) -> Rows | None:
     """Return at most so many samples of the runs with torque, of the payload that most have; None where none has it.
 
-    `later`: by how much (s) the motion is that of a later time than the torque.
+    `later`, `of_torque`: by how much (s) the motion, and the torque, are those of a later time.
     """
     motions = _alike([motion for motion in moving.motions if motion.torque is not None])
     if not motions:
@@ -92,7 +92,13 @@ def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0) -> Rows
         np.vstack([_at(motion.time[::step] + later, motion.time, getattr(motion, name)) for motion in motions])
         for name in ("q", "dq", "ddq")
     )
-    torque = np.vstack([motion.torque[::step] for motion in motions if motion.torque is not None])
+    torque = np.vstack(
+        [
+            _at(motion.time[::step] + of_torque, motion.time, motion.torque)
+            for motion in motions
+            if motion.torque is not None
+        ]
+    )
     return Rows(robot, q, dq, ddq, torque, np.concatenate([motion.time[::step] for motion in motions]))
 
 

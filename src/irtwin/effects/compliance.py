@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -33,6 +33,9 @@ _INERTIA_EVERY = 0.016  # s
 _LIGHTEST = 1e-6  # kg m^2: a link without inertia is no link
 _CONTACT, _CONTACT_DAMPING = 30.0, 0.5  # Hz: of gears that touch again, well above what moves a robot
 _DAMPING = 0.1  # of an elastic joint's swing
+_GAPS = tuple(3e-4 * 2.0 ** (2 * k / 3) for k in range(10))  # rad: 0.3 to 19 mrad, those of worn gears too
+_SMALL = (3e-4, 6e-4)  # rad: tried with a part of the rotor before the gap, too
+_WITHIN = 2.0 ** (np.arange(-1, 2) * 2 / 3)  # of a gap: those before and after it among the gaps
 _SLOWEST = 1.0  # Hz, of that swing: no controller would hold an arm that swings slower
 
 
@@ -64,16 +67,16 @@ def transmitted(
     rate: float,
     speed: np.ndarray | float,
     damping: float,
-    play: float = 0.0,
+    play: np.ndarray | float = 0.0,
     start: int = 0,
 ) -> np.ndarray:
     """Return (N, n) the torque that passes a spring with `play` (rad) between a motor and a link that swings behind it.
 
     load: (N, n) N m, what a link stiffly joined to the measured motor would take; inertia: (N, n) kg m^2; rate: Hz;
-    speed: (N, n) rad/s, of the link's swing while the motor holds, or one for all; `start`: where the first sample lies
-    in its run, so that parts of a run are computed alike. With x the motor's lead over the link,
-    x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the two-mass
-    model (Spong 1987), link by link.
+    speed: (N, n) rad/s, of the link's swing while the motor holds, or one for all; play: (n,), or one for all; `start`:
+    where the first sample lies in its run, so that parts of a run are computed alike. With x the motor's lead over the
+    link, x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the
+    two-mass model (Spong 1987), link by link.
     """
     ahead, length = round(_WARM_UP * rate), max(1, round(_WINDOW * rate))
     starts = np.arange(-(start % length), len(load), length)
@@ -105,16 +108,18 @@ class _Swing:
     All arrays are written over: a substep is a few operations on a few numbers.
     """
 
-    def __init__(self, x: np.ndarray, play: float):
-        self._x, self._gained, self._play = x, np.zeros_like(x), play
+    def __init__(self, x: np.ndarray, play: np.ndarray | float):
+        self._x, self._gained = x, np.zeros_like(x)
+        self._high = np.broadcast_to(np.asarray(play) / 2, x.shape).copy()
+        self._low, self._play = -self._high, bool(np.any(play))
         self._given, self._force, self._rubbed = np.empty((3, *x.shape))
 
     def move(self, push: np.ndarray, pull: np.ndarray, rub: np.ndarray, force: np.ndarray | None) -> None:
         """Go on by a substep; `force` is given that of the spring, before."""
         if self._play:
             give, rubbed = self._given, self._rubbed
-            np.maximum(self._x, -self._play / 2, out=give)  # np.clip is slower on a few numbers
-            np.minimum(give, self._play / 2, out=give)
+            np.maximum(self._x, self._low, out=give)  # np.clip is slower on a few numbers
+            np.minimum(give, self._high, out=give)
             np.subtract(self._x, give, out=give)
             np.multiply(self._gained, give != 0, out=rubbed)
             rubbed *= rub
@@ -127,6 +132,28 @@ class _Swing:
         self._gained += push
         self._gained -= total
         self._x += self._gained
+
+
+def _passed(load: np.ndarray, inertia: np.ndarray, motion: Motion, gaps: np.ndarray) -> np.ndarray:
+    """Return (N, G, n) what passes each of G gaps: moved side by side, many cost little more than one."""
+    load_of_all, inertia_of_all = (np.tile(each, (1, len(gaps))) for each in (load, inertia))
+    plays, speed = np.repeat(gaps, load.shape[1]), 2 * np.pi * _CONTACT
+    passed = transmitted(load_of_all, inertia_of_all, motion.rate, speed, _CONTACT_DAMPING, plays, motion.start)
+    return passed.reshape(len(load), len(gaps), -1)
+
+
+def _passed_about(
+    load: np.ndarray, inertia: np.ndarray, motion: Motion, gaps: Sequence[float]
+) -> dict[float, np.ndarray]:
+    """Return (N, n) what passes each of some gaps: the mean of it and of those 1.6 times smaller and larger.
+
+    A gear's gap differs over its turn, and a little more or less of it closes at another moment: what a single gap says
+    of a moment is right by chance, what the mean says holds.
+    """
+    wanted = {gap: np.round(np.log2(gap * _WITHIN), 9) for gap in gaps}
+    logs = np.unique(np.concatenate(list(wanted.values())))
+    passed = _passed(load, inertia, motion, 2.0**logs)
+    return {gap: passed[:, np.isin(logs, own)].mean(axis=1) for gap, own in wanted.items()}
 
 
 def _free(load: np.ndarray, q: np.ndarray, dq: np.ndarray, rate: float, gap: float) -> np.ndarray:
@@ -168,7 +195,8 @@ class Backlash(_Compliance):
     How long depends on how fast the torque grows and on the link's inertia if both move on together, or, `by_way`, on
     how soon the motor has crossed the gap where the link stays behind. The coefficient is the share of what a gap of b
     makes. `rotor_share` is how much of the inertia that the link is said to have lies before the gap: torque hardly
-    tells rotor from link, and small gaps close at another time.
+    tells rotor from link, and small gaps close at another time. `about`: what passes is a mean over b and
+    gaps 1.6 times smaller and larger, as long as it is known no better.
     """
 
     id: ClassVar[str] = "backlash"
@@ -178,12 +206,14 @@ class Backlash(_Compliance):
     b: float = 1e-3  # rad
     rotor_share: float = 0.0
     by_way: bool = False
+    about: bool = False
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return gaps over the range and of worn gears beyond it."""
-        small = replace(self, rotor_share=0.25).variants(b=(3e-4, 6e-4))
+        about = replace(self, about=True)
+        small = replace(about, rotor_share=0.25).variants(b=_SMALL)
         crossed = replace(self, by_way=True).variants(b=(3e-3, 1e-2, 3e-2))
-        return (*self.variants(b=(3e-4, 6e-4, 1.2e-3, 2.4e-3, 5e-3, 1e-2, 2e-2)), *small, *crossed)
+        return (*about.variants(b=_GAPS), *small, *crossed)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the share."""
@@ -199,9 +229,16 @@ class Backlash(_Compliance):
         inertia = load_inertia(robot, motion, predicted)[:, acting]
         load = load - self.rotor_share * inertia * motion.ddq[:, acting]
         inertia = (1 - self.rotor_share) * inertia
-        speed = 2 * np.pi * _CONTACT
-        passed = transmitted(load, inertia, motion.rate, speed, _CONTACT_DAMPING, self.b, motion.start)
-        return (_at(acting, motion, passed - load),)
+        if not self.about:
+            passed = _passed(load, inertia, motion, np.array([self.b]))[:, 0]
+            return (_at(acting, motion, passed - load),)
+        kept = {} if predicted is None else predicted.kept
+        key = (self.id, self.rotor_share, tuple(acting), motion.start)
+        if self.b not in kept.get(key, {}):
+            tried = _SMALL if self.rotor_share else _GAPS
+            gaps = tried if self.b in tried and predicted is not None else (self.b,)
+            kept[key] = kept.get(key, {}) | _passed_about(load, inertia, motion, gaps)
+        return (_at(acting, motion, kept[key][self.b] - load),)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

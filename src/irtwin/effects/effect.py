@@ -47,7 +47,7 @@ class Predicted:
     axes: (N,) W, the part that the joints' drives take from their bus; bodies: (10 n,) inertial parameters with
     payload, None for those of the URDF; load: (N, n) N m, what the links of these bodies take beyond the gears, and
     inertia: (N, n) kg m^2, what each joint moves there, None where nobody has computed it. A part knows the `whole`
-    that it was cut from.
+    that it was cut from. `kept`: what shapes of one effect have in common, worked out once.
     """
 
     torque: np.ndarray
@@ -57,9 +57,12 @@ class Predicted:
     load: np.ndarray | None = None
     inertia: np.ndarray | None = None
     whole: Predicted | None = field(default=None, repr=False, compare=False)
+    kept: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def part(self, start: int, stop: int) -> Predicted:
         """Return what is predicted for samples start..stop (exclusive)."""
+        if start == 0 and stop >= len(self.torque):
+            return self
         cut = slice(start, stop)
         return Predicted(
             self.torque[cut],

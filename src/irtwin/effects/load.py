@@ -24,6 +24,7 @@ from irtwin.effects.effect import (
     size,
 )
 from irtwin.effects.rigid_body import flange_frame, inverse_dynamics, last_body_columns, model_of, to_body
+from irtwin.robot.body_regressor import point_jacobian
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -211,13 +212,11 @@ class ExternalContact(Effect):
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, n, 3) the Jacobian, transposed, during the event."""
-        model = robot.model
-        data = model.createData()
-        frame = model.getFrameId(flange_frame(robot).name, pin.FrameType.BODY)
+        frame = robot.model.getFrameId(flange_frame(robot).name, pin.FrameType.BODY)
         columns = np.zeros((*motion.q.shape, 3))
-        for row in np.flatnonzero((motion.time >= self.start) & (motion.time <= self.stop)):
-            jacobian = pin.computeFrameJacobian(model, data, motion.q[row], frame, pin.LOCAL_WORLD_ALIGNED)
-            columns[row] = jacobian[:3].T
+        during = (motion.time >= self.start) & (motion.time <= self.stop)
+        if during.any():
+            columns[during] = point_jacobian(robot.model, frame, motion.q[during])
         return columns
 
     def parameters(

@@ -205,15 +205,20 @@ class Stack:
         return torque
 
     def predicted_power_columns(
-        self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None = None
+        self,
+        motion: Motion,
+        torque_values: np.ndarray,
+        power_values: np.ndarray | None = None,
+        torque: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the (N, L) power regressor of the torque that (K,) coefficients predict.
 
         `power_values` (L,): coefficients with which effects predict the power that others are built on; None: as
-        expected.
+        expected. `torque` (N, n): the real joint torque by `torque_values`, N m, where that is known already.
         """
         if not self.power_coupled:
-            return self.power_columns(motion, self.real_torque(motion, torque_values))
+            known = self.real_torque(motion, torque_values) if torque is None else torque
+            return self.power_columns(motion, known)
         below = self._powers(motion, torque_values, power_values)
         parts = [self.columns(effect, motion, below[effect.stage]) for effect in self._power]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)

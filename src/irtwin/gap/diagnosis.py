@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
 from irtwin.gap.experiment.planned_equations import planned_equations
+from irtwin.gap.experiment.programmes import excitation_of
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
@@ -38,14 +39,14 @@ from irtwin.gap.isolation.memory import standing
 from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
-from irtwin.gap.isolation.torque_scale import TorqueScale, torque_scale
+from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.isolation.verdict import NO_GAP, UNEXPLAINED, UNSURE, left_open, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.not_repeating import NotRepeating, with_removed
 from irtwin.gap.regression.candidate_columns import Below
-from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
@@ -58,6 +59,7 @@ from irtwin.identification.two_processes import begun
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
+from irtwin.twin.torque_scale import TorqueScale
 from irtwin.twin.twin import Twin
 
 Progress = Callable[[str], None]
@@ -119,6 +121,7 @@ class Diagnosis:
         causes = apart.causes(written, weights)
         found = writing.findings(robot, self.channels, named, written, self.thresholds)
         found = apart.findings(found, causes, self.thresholds.matters)
+        causes = writing.folded(causes, found)
         judged = verdict_of(found, self.thresholds.verdict)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
         shrink = writing.shrink(
@@ -174,6 +177,7 @@ def diagnose(
     case = case_of(data_set, withhold, thresholds, twin)
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
+    excitation = begun(lambda: excitation_of(case.robot), worth=case.long)  # the next experiment's
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = _plain(case, stack, tell)
@@ -185,31 +189,44 @@ def diagnose(
     if case.shows("torque") and plain is not None:
         _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain)
+    loaded = with_load(case.robot, below)
+
+    @cache
+    def before() -> TwinPower:
+        return TwinPower(power_stack, case.with_power, case.grouping, predicted)
+
     explained: list[Explained] = []
     refusals = NOTHING_REFUSED
     scale: TorqueScale | None = None
     torque = predicted
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found, floor, refusals = _torque(case, stack, plain, floor, below, predicted, frozenset(unknown), seed, tell)
-        torque = ExplainedTorque(stack, found, below)
+        found, floor, refusals = _torque(
+            case, stack, plain, floor, loaded, predicted, before, frozenset(unknown), seed, tell
+        )
+        torque = ExplainedTorque(stack, found, loaded)
         if case.shows("power"):
             found = _weighed(found, power_balances(case, power_stack, torque))
-            torque = ExplainedTorque(stack, found, below)
-        torque = ExplainedTorque(stack, _remembering(case, torque, predicted, seed), below)
+            torque = ExplainedTorque(stack, found, loaded)
+        torque = ExplainedTorque(stack, _remembering(case, torque, predicted, seed), loaded)
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
+    causes = [cause for one in explained for cause in one.finding.causes]
+    twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
     if case.shows("power"):
         tell("Trying every effect on power")
-        of_power, wrong = _power(case, power_stack, floor, predicted, torque, frozenset(unknown), seed, tell)
+        of_twin = None if torque is predicted else before
+        of_power, wrong = _power(case, power_stack, floor, of_twin, torque, frozenset(unknown), seed, tell)
         explained.append(of_power)
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
     findings = [one.finding for one in explained]
     tell("Identifying the twin with its causes")
-    causes = [cause for finding in findings for cause in finding.causes]
-    twin_with_causes = begun(lambda: closed_twin(case, causes), worth=case.long)
+    if len(every := [cause for finding in findings for cause in finding.causes]) > len(causes):
+        twin_with_causes.drop()
+        causes = every
+        twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
     blamed = {cause.effect for cause in causes}
     screened = (LocalEffect,) if case.shows("torque") else ()
     silent = [
@@ -226,7 +243,7 @@ def diagnose(
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
     measures = {channel.finding.name: flexible_regression(channel, case.seen, seed) for channel in planned}
     proposal = next_experiment(
-        case.robot, planned, [catalogue()[one.effect] for one in lacking], case.seen, thresholds.experiment
+        case.robot, planned, [catalogue()[one.effect] for one in lacking], case.seen, thresholds.experiment, excitation
     )
     return Diagnosis(
         description=case.robot,
@@ -247,7 +264,7 @@ def diagnose(
         experiment=None if proposal is None else proposal.experiment,
         planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
         curves=drawn(left, located, None if proposal is None else proposal.curve),
-        twin=twin_with_causes(),
+        twin=replace(twin_with_causes(), torque_scale=scale),
         energies=energies,
         not_repeating=tuple(differ),
         removed=tuple(taken),
@@ -290,19 +307,38 @@ def _torque(
     floor: Floor,
     below: Below,
     predicted: Torque,
+    before: Callable[[], TwinPower],
     unknown: Set[str],
     seed: int,
     tell: Progress,
 ) -> tuple[Finding, Floor, Refusals]:
-    """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
+    """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both.
+
+    `before` gives the power that the twin takes by the joint torque `predicted`.
+    """
     found = screen(case, stack, plain, seed)
+    if case.long:  # what is needed next is worked out beside the search for contacts
+        for motion in case.measured:
+            below(motion)
+        if case.shows("power"):
+            before()
     tried = found.shapes(_variants(case, "torque"))
     if case.shows("power"):
         both = (tried, _variants(case, "power"))
 
         def beside_power(without: Set[Without]) -> tuple[Finding, Floor]:
             return find_beside_power(
-                case, stack, both, below, predicted, floor, seed, transient=found.contact, without=without, tell=tell
+                case,
+                stack,
+                both,
+                below,
+                predicted,
+                before(),
+                floor,
+                seed,
+                transient=found.contact,
+                without=without,
+                tell=tell,
             )
 
         return find_possible(case, beside_power, unknown)
@@ -328,19 +364,19 @@ def _power(
     case: Case,
     stack: Stack,
     floor: Floor,
-    predicted: Torque,
+    before: Callable[[], TwinPower] | None,
     torque: Torque,
     unknown: Set[str],
     seed: int,
     tell: Progress,
 ) -> tuple[Explained, Refusals]:
-    """Find the causes of power on the joint torque that is explained; `predicted` is that of the twin as it is."""
+    """Find the causes of power on the joint torque that is explained; `before`: power on that of the twin, if other."""
     power_of = TwinPower(stack, case.with_power, case.grouping, torque)
     tried = _variants(case, "power")
     system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
     _check_observed(system)
     level = None if floor.power is None else np.array([floor.power])
-    plain = None if torque is predicted else TwinPower(stack, case.with_power, case.grouping, predicted).system
+    plain = before().system if before else None
 
     def search(without: Set[Without]) -> tuple[Finding, Floor]:
         return find("power", case, system, level, seed, without, plain), floor

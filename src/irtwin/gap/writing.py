@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import compress
 from typing import Any
 
@@ -22,13 +23,13 @@ from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
 from irtwin.gap.isolation.refusal import Refused
-from irtwin.gap.isolation.torque_scale import TorqueScale
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Confidence, Thresholds
 from irtwin.robot.description import Robot
+from irtwin.twin.torque_scale import TorqueScale
 
 _HALVES = ("first", "last")
 
@@ -135,6 +136,12 @@ def findings(
             )
         )
     return tuple(found)
+
+
+def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding]) -> tuple[document.Cause, ...]:
+    """Return the causes, those marked that no finding that matters has: sure as they may be, no verdict counts them."""
+    told = {cause for finding in findings if finding.matters for cause in finding.causes}
+    return tuple(one if one.id in told else replace(one, folded_away=True) for one in causes)
 
 
 def _joints(robot: Robot, branch: Branch) -> tuple[str, ...]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from irtwin.effects.drive import CopperLoss
 from irtwin.effects.effect import Effect, Term
 from irtwin.effects.stack import Stack
-from irtwin.identification.accumulate import Block, Equations, Rows, accumulate
+from irtwin.identification.accumulate import Block, Equations, Rows, accumulate, accumulate_any
 from irtwin.identification.estimators import Estimate, estimate
-from irtwin.identification.power_line import power_line, rows_of_both
+from irtwin.identification.power_line import PowerLine, power_line, power_rows, rows_of_both
 from irtwin.signals.motion import Motion
 
 Terms = Sequence[tuple[Effect, Term]]
@@ -65,13 +66,16 @@ def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray
     return found
 
 
-def fit_both(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Estimate:
+def fit_both(
+    stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, of_torque: Sequence[Block] | None = None
+) -> Estimate:
     """Fit the coefficients of torque to torque and power at once, starting from those that torque alone gives.
 
     A real torque acts in both signals, what a sensor shows in torque alone. Power is linear about the torque that is
     predicted, by Gauss-Newton. Each signal is weighed by its own residual, and by how long that remembers. So that what
     the twin lacks of power does not look like friction, heat of windings and how real work stands to that of logged
     torque are found beside, and samples in which the joints give power back are left out of power: it may be burnt.
+    `of_torque`: the equations of torque of all these motions, if they were reduced before.
     """
     if CopperLoss.id not in stack.ids:
         stack = stack.with_effects([*stack.effects, CopperLoss()])
@@ -89,7 +93,12 @@ def fit_both(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray)
     values = np.concatenate([torque_values, power.values, [0.0]])
     for _ in range(_STEPS):
         before = values
-        blocks = accumulate(motions, _both_equations(stack, values), pattern)
+        if of_torque is None or stack.coupled:
+            blocks = of_torque = accumulate(motions, _both_equations(stack, values), pattern)
+        else:  # that of power alone follows the values
+            blocks = _beside(
+                of_torque, accumulate_any(motions, _line_equations(stack, values), pattern[joints:]), pattern
+            )
         found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
         values, sure = found.values, np.sqrt(np.diag(found.covariance))
         if np.all(np.abs(values - before)[:count] < _SETTLED * sure[:count]):
@@ -99,21 +108,61 @@ def fit_both(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray)
 
 def _both_equations(stack: Stack, values: np.ndarray) -> Equations:
     """Return the equations of torque and of power about the coefficients of torque, of power, and the scale."""
+    line_of = _line_about(stack, values)
+
+    def equations(motion: Motion) -> Rows:
+        own, line, work = line_of(motion)
+        rows = [*([columns] for columns in own), [line.carried, line.free, work[:, None]]]
+        return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known), work < 0)
+
+    return equations
+
+
+def _line_equations(stack: Stack, values: np.ndarray) -> Equations:
+    """Return the last of these equations alone, that of power."""
+    line_of = _line_about(stack, values)
+
+    def equations(motion: Motion) -> Rows:
+        _, line, work = line_of(motion)
+        return power_rows(motion, [line.carried, line.free, work[:, None]], line.known, work < 0)
+
+    return equations
+
+
+def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[list[np.ndarray], PowerLine, np.ndarray]]:
+    """Return what gives the columns of torque, power's line about the coefficients, and the joints' work (N,), W."""
     torque_values, free, scale = np.split(values, [len(stack.torque_terms), len(values) - 1])
     power_values = _expected(stack.power_terms)
     power_values[stack.fixed] *= 1 + scale
     power_values[~stack.fixed] = free
 
-    def equations(motion: Motion) -> Rows:
+    def line_of(motion: Motion) -> tuple[list[np.ndarray], PowerLine, np.ndarray]:
         own = stack.columns_by_joint(motion, torque_values)
         torque = stack.sum_by_joint(own, np.where(stack.real, torque_values + stack.shift(motion), 0.0))
-        now = stack.predicted_power_columns(motion, torque_values, power_values)
+        now = stack.predicted_power_columns(motion, torque_values, power_values, torque)
         line = power_line(stack, motion, own, torque, now, power_values)
-        work = now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
-        rows = [*([columns] for columns in own), [line.carried, line.free, work[:, None]]]
-        return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known), work < 0)
+        return own, line, now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
 
-    return equations
+    return line_of
+
+
+def _beside(of_torque: Sequence[Block], of_power: Sequence[Block], pattern: np.ndarray) -> list[Block]:
+    """Return blocks of the equations of torque, the first of `of_torque`, and last that of power, by stretch of time.
+
+    Where one has no rows, its factor is empty.
+    """
+    joints = len(pattern) - 1
+    nothing = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
+    torque = {(block.run, block.start): block for block in of_torque}
+    power = {(block.run, block.start): block for block in of_power}
+    found = []
+    for place, block in sorted({**power, **torque}.items()):
+        mine, own = torque.get(place), power.get(place)
+        rows = [*(mine.rows[:joints] if mine else [0] * joints), own.rows[0] if own else 0]
+        factors = (*(mine.factors if mine else nothing)[:joints], *(own.factors if own else nothing[joints:]))
+        if any(rows):
+            found.append(replace(block, rows=np.array(rows), factors=factors))
+    return found
 
 
 def free_terms(stack: Stack) -> Terms:

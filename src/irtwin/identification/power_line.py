@@ -112,3 +112,10 @@ def rows_of_both(
             ]
         ),
     )
+
+
+def power_rows(motion: Motion, columns: Given, known: np.ndarray, unsure: np.ndarray | bool) -> Rows:
+    """Return the last of these rows alone, those of power; arguments as above."""
+    power = np.zeros_like(known) if motion.power is None else motion.power
+    undecided = np.full(len(known), motion.power is None) | unsure
+    return Rows([columns], known[:, None], power[:, None], undecided[:, None])

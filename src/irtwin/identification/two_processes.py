@@ -44,20 +44,32 @@ def shared(work: Callable[[Sequence[Item]], Sequence[Made]], items: Sequence[Ite
         return [*work(items[:middle]), *other.made()]
 
 
-def begun(work: Callable[[], Made], *, worth: bool) -> Callable[[], Made]:
-    """Return what gives the result of `work`: from a copy that begins now, if it is `worth` one and may be made.
+class Begun(Generic[Made]):
+    """Work in a copy that began at once, or that is done when its result is asked for.
 
-    Otherwise it is worked out when it is asked for. Raises, when asked, as `shared` does.
+    Asked, by a call, it raises as `shared` does.
     """
-    if not (worth and can_copy()):
-        return work
-    other = _Copy(lambda: [work()])
 
-    def result() -> Made:
-        with other:
+    def __init__(self, work: Callable[[], Made], other: _Copy[Made] | None):
+        self._work, self._other = work, other
+
+    def __call__(self) -> Made:
+        """Return the result."""
+        if self._other is None:
+            return self._work()
+        with self._other as other:
             return other.made()[0]
 
-    return result
+    def drop(self) -> None:
+        """End the work: nobody will ask."""
+        if self._other is not None:
+            with self._other:
+                return
+
+
+def begun(work: Callable[[], Made], *, worth: bool) -> Begun[Made]:
+    """Return what gives the result of `work`: from a copy that begins now, if it is `worth` one and may be made."""
+    return Begun(work, _Copy(lambda: [work()]) if worth and can_copy() else None)
 
 
 class _Copy(Generic[Made]):
@@ -88,7 +100,7 @@ class _Copy(Generic[Made]):
 
     def __exit__(self, *_: object) -> None:
         self._from.close()
-        self._process.terminate()
+        self._process.kill()  # it may have taken over what this process does when it is told to end
         self._process.join()
 
 

@@ -14,7 +14,6 @@ import numpy as np
 import pinocchio as pin
 
 _PIECE = 2048  # samples that are worked on at once: they stay in the processor's cache
-_INERTIA = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # in Pinocchio's order
 
 
 @dataclass(frozen=True)
@@ -54,6 +53,25 @@ def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
     return found.transpose(2, 0, 1)
 
 
+def point_jacobian(model: pin.Model, frame: int, q: np.ndarray) -> np.ndarray:
+    """Return (N, n, 3): how fast a frame's origin moves along the base's axes by a unit of each joint's speed."""
+    found = np.zeros((len(q), model.nv, 3))
+    joints, place = _joints(model), model.frames[frame].placement.translation
+    chain = [index - 1 for index in model.supports[model.frames[frame].parentJoint] if index]
+    lever = np.concatenate([np.eye(3), -pin.skew(place)], axis=1)
+    for first in range(0, len(q), _PIECE):
+        cut = slice(first, first + _PIECE)
+        states = np.ascontiguousarray(q[cut].T)
+        # a motion along each of the base's axes, and what a unit of speed of each carrier makes
+        motions = np.repeat(np.eye(6)[:3, :, None], states.shape[1], axis=2)
+        for index in chain:
+            axis = np.broadcast_to(joints[index].axis[:, None], (1, 6, states.shape[1]))
+            motions = np.concatenate([joints[index].seen(motions, states[index]), axis])
+        along, carried = motions[:3, :3], lever @ motions[3:]
+        found[cut, chain] = np.einsum("akn,mkn->nma", along, carried)
+    return found
+
+
 def _joints(model: pin.Model) -> list[_Joint]:
     data = model.createData()
     pin.computeJointJacobians(model, data, np.zeros(model.nq))
@@ -85,34 +103,50 @@ def _fill(
         own[1] += joint.axis[:, None] * ddq[index] + joint.crossed @ own[0] * dq[index]
         motions.append(own)
         carriers.append([*carrying, index])
-        by_parameter = np.einsum("mkn,kpn->mpn", own[2:], _by_axis(own[0], own[1]))
-        for carrier, torque in zip(carriers[-1], by_parameter, strict=True):
+        for carrier, torque in zip(carriers[-1], _torques(own[2:], own[0], own[1]), strict=True):
             found[carrier, 10 * index : 10 * index + 10] = torque
 
 
-def _by_axis(speed: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Return (6, 10, N): what a body's parameters make of the torque of an axis, by the six numbers of the axis.
+def _torques(carried: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Return (m, 10, N): what a body's parameters make of the torque of m axes.
 
-    speed, acceleration: (6, N), the latter less gravity.
+    carried: (m, 6, N), what a unit of each axis' speed makes of the body's motion; speed, acceleration: (6, N) of the
+    body, the latter less gravity. Mass acts along the line alone, inertia about the turn alone.
     """
-    w, dw = speed[3:], acceleration[3:]
-    turning = _skew(w)
-    a = acceleration[:3] + _times(turning, speed[:3])
-    found = np.zeros((6, 10, speed.shape[1]))
-    line, turn = found[:3], found[3:]
-    line[:, 0] = a
-    line[:, 1:4] = _skew(dw) + w[:, None] * w
-    turn[:, 1:4] = -_skew(a)
-    swept = turning[:, :, None] * w  # (3, 3, 3, N): by axis, and by row and column of the inertia
-    squared = (w * w).sum(axis=0)
-    for k in range(3):
-        line[k, 1 + k] -= squared
-        swept[k, k] += dw
-    for place, (row, column) in enumerate(_INERTIA, start=4):
-        turn[:, place] = swept[:, row, column]
-        if row != column:
-            turn[:, place] += swept[:, column, row]
+    a = acceleration[:3] + _times(_skew(speed[3:]), speed[:3])
+    found = np.empty((len(carried), 10, speed.shape[1]))
+    np.einsum("mkn,kn->mn", carried[:, :3], a, out=found[:, 0])
+    np.einsum("mkn,kpn->mpn", carried, _by_first_moments(a, speed[3:], acceleration[3:]), out=found[:, 1:4])
+    np.einsum("mkn,kpn->mpn", carried[:, 3:], _by_inertia(speed[3:], acceleration[3:]), out=found[:, 4:])
     return found
+
+
+def _by_first_moments(a: np.ndarray, w: np.ndarray, dw: np.ndarray) -> np.ndarray:
+    """Return (6, 3, N): force w x (w x c) + dw x c and torque c x a of three first moments c."""
+    x, y, z = w
+    xx, yy, zz = w * w
+    return np.array(
+        [
+            [-yy - zz, x * y - dw[2], x * z + dw[1]],
+            [x * y + dw[2], -xx - zz, y * z - dw[0]],
+            [x * z - dw[1], y * z + dw[0], -xx - yy],
+            *-_skew(a),
+        ]
+    )
+
+
+def _by_inertia(w: np.ndarray, dw: np.ndarray) -> np.ndarray:
+    """Return (3, 6, N): torque I dw + w x I w of six numbers of the inertia I, in Pinocchio's order."""
+    x, y, z = w
+    xx, yy, zz = w * w
+    xy, xz, yz = x * y, x * z, y * z
+    return np.array(
+        [
+            [dw[0], dw[1] - xz, -yz, dw[2] + xy, yy - zz, yz],
+            [xz, dw[0] + yz, dw[1], zz - xx, dw[2] - xy, -xz],
+            [-xy, xx - yy, xy, dw[0] - yz, dw[1] + xz, dw[2]],
+        ]
+    )
 
 
 def _skew(vector: np.ndarray) -> np.ndarray:

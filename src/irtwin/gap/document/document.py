@@ -115,7 +115,8 @@ class Evidence:
 class Cause:
     """An effect held responsible for part of the gap; `joints` none: it acts on the whole robot.
 
-    `id` names it within the document; `confidence`: the share of causes given with this number that are right.
+    `id` names it within the document; `confidence`: the share of causes given with this number that are right, however
+    little they close; `folded_away`: where no finding that matters has it, so that the verdict passes it by.
     """
 
     id: str
@@ -126,6 +127,7 @@ class Cause:
     parameters: tuple[Parameter, ...]
     indistinguishable_from: tuple[str, ...]
     evidence: Evidence
+    folded_away: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

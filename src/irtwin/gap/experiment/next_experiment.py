@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
 from irtwin.gap.thresholds import NextExperiment, Thresholds
+from irtwin.identification.excitation import Excitation
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -212,12 +213,13 @@ def next_experiment(
     lacking: Sequence[Effect],
     seen: Sequence[Motion],
     limits: NextExperiment,
+    excitation: Callable[[], Excitation | None] | None = None,
 ) -> Proposal | None:
     """Design what tells the rivals of causes that matter apart; where there are none, what shows the effects `lacking`.
 
-    `channels`: planned equations of each; `seen`: the motions that were judged. Of the programmes that reach a
-    separation of `limits.enough` in every question the one that takes the least time is chosen, else the one that
-    answers the most. None where there is nothing to ask.
+    `channels`: planned equations of each; `seen`: the motions that were judged; `excitation` as for `programmes`. Of
+    the programmes that reach a separation of `limits.enough` in every question the one that takes the least time is
+    chosen, else the one that answers the most. None where there is nothing to ask.
     """
     questions = [q for channel in channels for cause in _mattering(channel) if (q := _rivals(channel, cause))]
     if questions:
@@ -233,7 +235,7 @@ def next_experiment(
     effects = [catalogue()[name] for name in names]
     warm = any("temperature" in effect.requires for effect in effects)
     off = [effect for effect in effects if effect.taken_off]
-    tried = programmes(robot, joints, seen, warm=warm, take_off=off) if questions else ()
+    tried = programmes(robot, joints, seen, warm=warm, take_off=off, excitation=excitation) if questions else ()
     weighed = [(one, _weigh(one, questions)) for one in tried]
     note = _note([weights for _, weights in weighed])
     if questions and not weighed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap.document import experiment
 from irtwin.gap.document.experiment import Settings
-from irtwin.identification.excitation import excite
+from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import JointLimits, Workspace
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -81,22 +82,38 @@ class Programme:
         )
 
 
+def excitation_of(robot: Robot) -> Excitation | None:
+    """Return an exciting motion of all joints, good enough to compare; None where the robot's limits allow none."""
+    try:
+        return excite(robot, _EXCITING, iterations=_ITERATIONS)
+    except InputError:
+        return None
+
+
 def programmes(
-    robot: Robot, joints: Sequence[str], seen: Sequence[Motion], *, warm: bool = False, take_off: Sequence[Effect] = ()
+    robot: Robot,
+    joints: Sequence[str],
+    seen: Sequence[Motion],
+    *,
+    warm: bool = False,
+    take_off: Sequence[Effect] = (),
+    excitation: Callable[[], Excitation | None] | None = None,
 ) -> Iterator[Programme]:
     """Yield the programmes that are worth weighing for some joints (none: all), the plain ones first.
 
     `seen`: motions of the robot, whose poses, filter and rate the programmes take over; `warm`: with a warm-up;
-    `take_off`: effects to be removed for a run. Where the URDF gives no limits, those of `seen` are kept.
+    `take_off`: effects to be removed for a run; `excitation`: gives the robot's exciting motion, where that was sought
+    before. Where the URDF gives no limits, those of `seen` are kept.
     """
     yard = _Yard(robot, joints or robot.joint_names, seen)
     for build in (_ladder, _sweep, _reversals, _steps, _poses):
         made = yard.clear(build)
         if made is not None:
             yield made
-    exciting = _exciting(robot, yard) if yard.within(_EXCITING) else None
-    if exciting is None:
+    found = (excitation or partial(excitation_of, robot))() if yard.within(_EXCITING) else None
+    if found is None:
         return
+    exciting = _exciting(robot, yard, found)
     yield exciting
     if mass := _payload(robot):
         yield _loaded(exciting, mass)
@@ -330,11 +347,7 @@ def _poses(yard: _Yard) -> Programme:
     )
 
 
-def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
-    try:
-        found = excite(robot, _EXCITING, iterations=_ITERATIONS)
-    except InputError:
-        return None
+def _exciting(robot: Robot, yard: _Yard, found: Excitation) -> Programme:
     time, q, dq, ddq = found.sample(yard.rate)
     motion = Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff)
     return Programme(

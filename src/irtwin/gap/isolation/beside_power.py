@@ -36,6 +36,7 @@ def find_beside_power(
     effects: tuple[Sequence[Effect], Sequence[Effect]],
     below: Below,
     predicted: Torque,
+    before: TwinPower,
     floor: Floor,
     seed: int,
     *,
@@ -47,9 +48,9 @@ def find_beside_power(
 
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
-    `predicted` the joint torque by the twin. Where real torque was found, the search is repeated with the floor that is
-    left, and with power linear about that torque if losses, which grow with its square, make a difference; each effect
-    is then tried in its best shape only.
+    `predicted` the joint torque by the twin, `before` the power that it takes. Where real torque was found, the search
+    is repeated with the floor that is left, and with power linear about that torque if losses, which grow with its
+    square, make a difference; each effect is then tried in its best shape only.
     """
 
     def about(torque: Torque, power: TwinPower, of_torque: Sequence[Effect]) -> JointEquations:
@@ -57,7 +58,6 @@ def find_beside_power(
         found = joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell)
         return replace(found, whole=replace(found.whole, transient=transient))
 
-    before = TwinPower(stack, case.with_power, case.grouping, predicted)
     equations = about(predicted, before, effects[0])
     first, both = _find(case, equations, floor, seed, without)
     if not any(cause.carries_power for cause in first.causes):

@@ -153,13 +153,13 @@ def find(
 
 
 def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
-    """Return a finding with some of its causes alone, all fitted again."""
+    """Return a finding with some of its causes alone, each perhaps at more joints, all fitted again."""
     system, found = finding.system, finding.attribution
-    if len(causes) == len(finding.causes):
+    chosen = [k for cause in causes for k in cause.columns]
+    if chosen == finding.chosen:
         return replace(finding, attribution=replace(found, causes=tuple(causes)))
     places = {(cause.effect, cause.scope) for cause in causes}
     fallen = tuple(cause for cause in finding.causes if (cause.effect, cause.scope) not in places)
-    chosen = [k for cause in causes for k in cause.columns]
     beside = finding.beside and finding.beside.keeping(chosen)
     noise = system.residual_rms(chosen, found.noise) if beside is None else beside.noise[:-1]
     found = replace(found, causes=tuple(causes), noise=noise)

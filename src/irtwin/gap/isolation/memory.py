@@ -2,8 +2,8 @@
 
 The search draws signs for blocks of time, and compares stretches of a run, as if these were independent. A cause that
 passes is judged again, with blocks as alike as what is left without it is correlated, and by whether halves of the time
-agree on it. Where each programmed motion is a
-group, runs that know nothing of each other agree on a cause, and nothing is to be judged again.
+agree on it; it is then looked for at further joints. Where each programmed motion is a group, runs that know nothing of
+each other agree on a cause, and nothing is to be judged again.
 """
 
 from __future__ import annotations
@@ -16,19 +16,18 @@ import numpy as np
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import Explained
 from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.further_joints import at_further_joints
 from irtwin.gap.isolation.repeating import Repeats, repeating
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.regression.cross_validation import scores
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 from irtwin.gap.regression.residuals import as_filtered, power_traces, torque_traces
-from irtwin.gap.regression.significance import likeness, p_values
+from irtwin.gap.regression.significance import FINE, likeness, p_values
 from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.thresholds import Selection
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
-
-_DRAWS = 3999  # so that another seed moves a p of 0.1 by 0.005, one standard deviation
 
 
 def standing(
@@ -42,10 +41,12 @@ def standing(
     finding = explained.finding
     if not finding.causes or not _cut(finding):
         return finding.causes
-    told = zip(finding.causes, memory(explained, motions, torque), repeating(finding, limits), strict=True)
-    return tuple(
-        one for cause, memories, repeats in told if (one := _judged(finding, cause, memories, repeats, limits, seed))
-    )
+    remembered = memory(explained, motions, torque)
+    told = zip(finding.causes, remembered, repeating(finding, limits), strict=True)
+    judged = (_judged(finding, *each, limits, seed) for each in told)
+    kept = [cause for cause in judged if cause is not None]
+    by_effect = {cause.effect: memories for cause, memories in zip(finding.causes, remembered, strict=True)}
+    return at_further_joints(finding, kept, by_effect, limits, seed)
 
 
 def _cut(finding: Finding) -> bool:
@@ -115,4 +116,4 @@ def _p(finding: Finding, cause: Cause, alike: np.ndarray, seed: int) -> float:
         if not any(set(variant.columns) & {*others, *columns} for variant in one.variants)
     ]
     block_scores, products = scores(system, system.moments(noise), noise, others)
-    return float(p_values(block_scores, products, [whole, *rest], seed, alike, _DRAWS)[0])
+    return float(p_values(block_scores, products, [whole, *rest], seed, alike, FINE)[0])

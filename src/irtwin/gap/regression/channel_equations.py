@@ -40,7 +40,7 @@ def torque_system(
     tried = candidate_pattern(robot, effects, columns)
     pattern = np.concatenate([stack.pattern, tried], axis=1)
 
-    candidates = Candidates(robot, effects, tried, with_load(robot, below))
+    candidates = Candidates(robot, effects, tried, below or _nothing)
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
@@ -87,16 +87,22 @@ def power_system(
     return enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
 
-def with_load(robot: Robot, below: Below | None) -> Below:
-    """Return what candidates of torque are built on, with what the links take beyond the gears."""
+def with_load(robot: Robot, below: Below) -> Below:
+    """Return what candidates of torque are built on, with what the links take beyond the gears, kept for each run."""
+    held: dict[str, tuple[Motion, Predicted]] = {}
 
     def loaded(whole: Motion) -> Predicted:
-        assert below is not None, "candidates are built on what the twin predicts"
-        before = below(whole)
-        load, inertia = load_torque(robot, whole, before), load_inertia(robot, whole, before)
-        return replace(before, load=load, inertia=inertia)
+        if whole.run not in held or held[whole.run][0] is not whole:
+            before = below(whole)
+            load, inertia = load_torque(robot, whole, before), load_inertia(robot, whole, before)
+            held[whole.run] = whole, replace(before, load=load, inertia=inertia)
+        return held[whole.run][1]
 
     return loaded
+
+
+def _nothing(whole: Motion) -> Predicted:
+    raise AssertionError("candidates are built on what the twin predicts")
 
 
 def enough(system: System) -> System:

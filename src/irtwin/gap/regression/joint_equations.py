@@ -10,7 +10,7 @@ import numpy as np
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate_pattern
-from irtwin.gap.regression.channel_equations import Torque, enough, with_load
+from irtwin.gap.regression.channel_equations import Torque, enough
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Variant, candidate_columns
@@ -71,7 +71,7 @@ def joint_equations(
         torque = predicted(whole)
         return Predicted(torque, *power(whole, torque))
 
-    shown = Candidates(robot, of_torque, tried, with_load(robot, below))
+    shown = Candidates(robot, of_torque, tried, below)
     added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
 
     def equations(motion: Motion) -> Rows:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.effect import Effect
 from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import flange_frame, to_body
 from irtwin.gap.regression.cholesky import factored, solved
@@ -27,10 +26,11 @@ class UntoldPayload:
     """A payload in some runs: `effect` has the `runs`.
 
     gain: mean square that it explains, of joints by which it was not told which runs carry it, without the runs' group;
-    t: of that between groups; p: under random signs of the groups.
+    t: of that between groups; p: under random signs of the groups, or of each joint in each where groups are so few
+    that all of one sign would still be chance.
     """
 
-    effect: Effect
+    effect: Payload
     gain: float
     t: float
     p: float
@@ -49,14 +49,29 @@ def untold_payload(
     with_load = parts.carrying(np.arange(len(parts.runs)))
     if not with_load.any() or with_load[parts.observed].all():
         return None
-    gain = parts.judged()
+    of_joints = parts.judged()
+    gain = of_joints.sum(axis=1)
     mean, t = float(gain.mean()), float(gain.mean() / max(gain.std(ddof=1) / np.sqrt(len(gain)), 1e-12))
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, len(gain)))
-    p = float((1 + np.sum(signs @ gain >= gain.sum())) / (1 + _FLIPS))
+    told = gain if 2.0 ** -len(gain) <= limits.alpha else of_joints.ravel()
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, len(told)))
+    p = float((1 + np.sum(signs @ told >= told.sum())) / (1 + _FLIPS))
     if mean < limits.least_gain or p > limits.alpha:
         return None
     runs = tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries)
     return UntoldPayload(Payload(runs=runs), mean, t, p)
+
+
+def beside(robot: Robot, system: System, noise: np.ndarray, payload: Payload) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the twin's coefficients (D,), in units of the prior, and a payload's (10,) in some runs, fitted together.
+
+    None where the twin has no last body, or groups are stretches of runs.
+    """
+    parts = _Parts.of(robot, system, noise, fewest=0)
+    if parts is None:
+        return None
+    fold = _Fold(parts, np.arange(len(parts.runs)))
+    values = fold.values(np.isin(parts.runs, payload.runs or ()))
+    return values[: system.base], values[system.base :] * _spread(robot)
 
 
 @dataclass(frozen=True)
@@ -119,14 +134,14 @@ class _Parts:
         return found
 
     def judged(self) -> np.ndarray:
-        """Return (G,) the mean square gained in each observed group, by runs and joints that had no say in it."""
+        """Return (G, n) the mean square gained in each observed group and joint, which had no say in it."""
         found = []
         for group in dict.fromkeys(self.group[self.observed].tolist()):
             rest = np.flatnonzero(self.group != group)
             own = np.flatnonzero(self.group == group)
             with_load = self.carrying(rest)
             if not with_load[rest].any():
-                found.append(0.0)
+                found.append(np.zeros(self.products.shape[1]))
                 continue
             fold = _Fold(self, rest)
             plain, loaded = fold.values(np.zeros(len(self.runs), dtype=bool)), fold.values(with_load)
@@ -135,7 +150,7 @@ class _Parts:
             gain = np.stack([self._losses(own, plain) - self._losses(own, one) for one in (empty, loaded)])
             others = gain.sum(axis=2, keepdims=True) - gain
             chosen = np.take_along_axis(gain, others.argmax(axis=0)[None], axis=0)
-            found.append(float(chosen.sum() / self.rows[own].sum()))
+            found.append(chosen[0].sum(axis=0) / self.rows[own].sum())
         return np.array(found)
 
     def _losses(self, runs: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -186,7 +201,10 @@ def _payload_columns(robot: Robot, system: System) -> np.ndarray | None:
     bodies = [k for k, (effect, term) in enumerate(system.terms) if effect.bodies and term.joint == last]
     if len(bodies) != 10:
         return None
-    spread = np.array([term.spread for term in Payload().terms(robot)])
     onto = np.zeros((system.base, 10))
-    onto[bodies] = to_body(frame.placement) * spread / system.scale[bodies][:, None]
+    onto[bodies] = to_body(frame.placement) * _spread(robot) / system.scale[bodies][:, None]
     return onto
+
+
+def _spread(robot: Robot) -> np.ndarray:
+    return np.array([term.spread for term in Payload().terms(robot)])

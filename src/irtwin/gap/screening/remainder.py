@@ -6,6 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.effects.load import Payload
+from irtwin.effects.stack import Stack
+from irtwin.gap.data.case import Case
+from irtwin.gap.regression.residuals import as_filtered, torque_residual
+from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
 
@@ -17,3 +22,23 @@ class Remainder:
     residual: np.ndarray
     observed: bool
     label: str  # of the programmed motion: repeats share it
+
+
+def remainders(
+    case: Case, stack: Stack, values: np.ndarray, load: tuple[Payload, np.ndarray] | None = None
+) -> list[Remainder]:
+    """Return what the twin with its coefficients, `values`, leaves of each run; and a `load` (10,) in some, if any."""
+    left = []
+    for motion in case.with_torque:
+        step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
+        residual = torque_residual(stack, motion, values)
+        if load is not None and load[0].acts_in(motion):
+            residual = residual - as_filtered(motion, load[0].columns(case.robot, motion) @ load[1])
+        observed = motion.run in case.observed
+        left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
+    return left
+
+
+def _every(motion: Motion, step: int) -> Motion:
+    cut = slice(None, None, step)
+    return Motion(motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut], run=motion.run)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,26 +16,36 @@ from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
-from irtwin.gap.regression.residuals import torque_residual
 from irtwin.gap.regression.transient import Transient, is_transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
-from irtwin.gap.screening.payloads import UntoldPayload, untold_payload
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.payloads import untold_payload
+from irtwin.gap.screening.remainder import remainders
 from irtwin.gap.screening.ripples import fast_ripples
+from irtwin.gap.screening.together import Both, each_beside_the_other
 from irtwin.identification.two_processes import begun
-from irtwin.signals.filter import decimation
-from irtwin.signals.motion import Motion
 
 
 @dataclass(frozen=True)
 class Screened:
-    """A contact and a payload in some of the runs (None: none stands out); fast ripples, and local effects."""
+    """Fast ripples and local effects, and a contact and a payload in some of the runs (None: none stands out).
 
-    contact: Transient | None = None
-    payload: UntoldPayload | None = None
+    `waited` gives these two: contacts are searched for beside other work.
+    """
+
+    waited: Callable[[], Both] = lambda: (None, None)
     ripples: tuple[TorqueRipple, ...] = ()
     local: tuple[LocalEffect, ...] = ()
+
+    @cached_property
+    def both(self) -> Both:
+        """Contact and payload."""
+        return self.waited()
+
+    @property
+    def contact(self) -> Transient | None:
+        """The contact."""
+        return self.both[0]
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects to try with those found: contact and local ones in their place only, others there too."""
@@ -43,27 +54,24 @@ class Screened:
             for effect in effects
             if not isinstance(effect, LocalEffect) and not (self.contact and effect.id == self.contact.effect.id)
         ]
-        return [*found, *(one.effect for one in (self.contact, self.payload) if one), *self.ripples, *self.local]
+        return [*found, *(one.effect for one in self.both if one), *self.ripples, *self.local]
 
 
 def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
     """Search the runs' torque; system: its equations, with the terms of the twin at least."""
     noise, limits = noise_before(system), case.thresholds
     values = twin_values(system, system.solution((), np.sum(system.moments(noise), axis=0)))
-    left = []
-    for motion in case.with_torque:
-        step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
-        residual = torque_residual(stack, motion, values)
-        observed = motion.run in case.observed
-        left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
+    left = remainders(case, stack, values)
     in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
-    others = (
-        untold_payload(case.robot, system, noise, limits.some_payload, seed),
-        tuple(fast_ripples(case.robot, left, limits.ripples.least_share)),
-        tuple(local_effects(case.robot, known, left, limits.local, seed)),
-    )
-    return Screened(in_contact(), *others)
+    payload = untold_payload(case.robot, system, noise, limits.some_payload, seed)
+    ripples = tuple(fast_ripples(case.robot, left, limits.ripples.least_share))
+    local = tuple(local_effects(case.robot, known, left, limits.local, seed))
+
+    def both() -> Both:
+        return each_beside_the_other(case, stack, system, noise, (in_contact(), payload), seed)
+
+    return Screened(both, ripples, local)
 
 
 def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, float] | None] | None:
@@ -74,8 +82,3 @@ def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, f
     runs = sorted({run for effect in effects for run in effect.runs or ()})
     window = next(((e.shape["start"], e.shape["stop"]) for e in effects if is_transient(e)), None)
     return tuple(runs), window
-
-
-def _every(motion: Motion, step: int) -> Motion:
-    cut = slice(None, None, step)
-    return Motion(motion.time[cut], motion.q[cut], motion.dq[cut], motion.ddq[cut], run=motion.run)

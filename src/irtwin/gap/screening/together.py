@@ -1,0 +1,76 @@
+"""Contacts and payloads in some runs where both may be there: each is found beside the other.
+
+A payload that the twin lacks hides a contact, as what it leaves of its runs looks like contacts all the time; and a
+contact in a run speaks for a payload there. So the two are looked for in turn: contacts in what twin and payload leave,
+payloads in what lies apart from the contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from irtwin.effects.stack import Stack
+from irtwin.gap.data.case import Case
+from irtwin.gap.regression.normal_equations import System, twin_values
+from irtwin.gap.regression.transient import Transient
+from irtwin.gap.screening.contact import contact
+from irtwin.gap.screening.payloads import UntoldPayload, beside, untold_payload
+from irtwin.gap.screening.remainder import Remainder, remainders
+
+_TURNS = 4  # the second mostly says what the first one did
+
+Both = tuple[Transient | None, UntoldPayload | None]
+
+
+def each_beside_the_other(case: Case, stack: Stack, system: System, noise: np.ndarray, found: Both, seed: int) -> Both:
+    """Return contact and payload, each told beside the other; `found`: each by itself.
+
+    system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m.
+    """
+    touch, payload = found
+    for _ in range(_TURNS):
+        apart = _apart_from(system, touch)
+        if touch is not None:
+            payload = untold_payload(case.robot, apart, noise, case.thresholds.some_payload, seed)
+        left = None if payload is None else _beside(case, stack, apart, noise, payload)
+        if left is None:
+            break
+        before, touch = touch, contact(case.robot, left, _rms(left, noise), case.thresholds.contact)
+        if (before and before.effect) == (touch and touch.effect):
+            break
+    return touch, payload
+
+
+def _apart_from(system: System, touch: Transient | None) -> System:
+    """Return the equations without the blocks of time in which a contact acts."""
+    if touch is None:
+        return system
+    effect = touch.effect
+    kept = [
+        k
+        for k, block in enumerate(system.blocks)
+        if not (effect.runs and block.run in effect.runs and block.start <= effect.stop and block.stop >= effect.start)
+    ]
+    blocks = tuple(system.blocks[k] for k in kept)
+    return replace(system, blocks=blocks, group=system.group[kept], observed=system.observed[kept])
+
+
+def _beside(
+    case: Case, stack: Stack, system: System, noise: np.ndarray, payload: UntoldPayload
+) -> list[Remainder] | None:
+    """Return what the twin and the payload leave of the runs."""
+    both = beside(case.robot, system, noise, payload.effect)
+    if both is None:
+        return None
+    values, load = both
+    return remainders(case, stack, twin_values(system, values), (payload.effect, load))
+
+
+def _rms(left: list[Remainder], noise: np.ndarray) -> np.ndarray:
+    """Return the RMS (n,) of what is left of each joint; `noise` where nothing is known, as the joint never moves."""
+    residual = np.concatenate([one.residual for one in left])
+    known = np.isfinite(residual)
+    mean = np.where(known, residual, 0.0) ** 2 / np.maximum(known.sum(axis=0), 1)
+    return np.where(known.any(axis=0), np.sqrt(mean.sum(axis=0)), noise)
