@@ -2,8 +2,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test nightly check fuzz lint wheel ontology lock clean
+.PHONY: demo test suite compiled nightly check fuzz lint wheel ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -12,13 +14,19 @@ demo: $(VENV)/demo
 check: $(VENV)/test lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not slow and not system"
 
+test: lint suite
+
 # Three processes on two cores: many tests wait for a server, a browser or a clock.
-test: $(VENV)/test lint
+suite: $(VENV)/test
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(( $$(nproc) * 3 / 2 )) --dist worksteal -m "not nightly"
 
 # What repeats at length what other tests hold in short.
 nightly: $(VENV)/test
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m nightly
+
+# The tests read once, so that the processes of `suite` find them compiled.
+compiled: $(VENV)/test
+	-$(BIN)/python -m pytest --collect-only -q >/dev/null
 
 # Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test
@@ -51,8 +59,8 @@ $(VENV)/test: requirements-test.lock requirements-owlapi.lock $(VENV)/demo
 	touch $@
 
 lock:
-	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build --extra dl -o requirements.lock
-	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build --extra test -c requirements.lock -o requirements-test.lock
+	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build --extra test -o requirements-test.lock
+	uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header pyproject.toml --group build --extra dl -c requirements-test.lock -o requirements.lock
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache

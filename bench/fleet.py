@@ -21,7 +21,7 @@ from typing import Any
 from irtwin import workflow
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import METER, Base
+from irtwin.storage.schema import METER, Base, relation_to
 
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
 EFFECTS = {  # of a twin: share of the modelled energy, parameter, unit
@@ -79,7 +79,7 @@ def _activity(activity_id: str, robot_id: str, provider: str, subject: str, used
         "started": _text(BEGIN), "ended": _text(BEGIN + timedelta(seconds=2)), "software": SOFTWARE,
     }  # fmt: skip
     for entity in used:
-        yield "activity_use", {"activity_id": activity_id, "entity": entity}
+        yield "activity_use", {"activity_id": activity_id, "entity": entity, "relation": relation_to(entity)}
 
 
 def _twin(draw: random.Random, robot_id: str, twin_id: str, made: str, standby: float, burns: bool) -> Iterator[Row]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import signal
 import statistics
 import subprocess
@@ -31,6 +30,7 @@ from irtwin.knowledge.store.changes import NOT_ASSERTED
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, IRT, OWL, RDFS
 from irtwin.workflow import reason_again
+from memory import most_used
 
 QUESTIONS = [
     "robots", "joints", "current_state", "energy_per_robot", "energy_per_effect", "fleet_ranking", "ledger_of_last_run",
@@ -112,7 +112,7 @@ def measure(name: str, folder: Path, files: dict[str, Path], small: Path) -> Res
             result["questions"][f"{question}{BY_COLUMNS}"] = _answer(engine, f"SELECT {by_columns}")
     result["update"] = _attempt(lambda: _updates(engine, files["all.nt"]))
     result["closure"] = _attempt(lambda: _closure(engine, small))
-    result["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    result["memory_mb"] = most_used() / 2**20
     return result
 
 

@@ -17,17 +17,21 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests import data_sets, small_robots, synthetic
 
+from irtwin import asking
+from irtwin.knowledge.questions.queries import to_csv
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_CHANGED
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import named_files
 from irtwin.storage.series import is_whole
 
+QUESTION = "energy_per_run"
 State = dict[str, object]
 
 
@@ -60,8 +64,8 @@ def prepared(folder: Path) -> dict[str, Command]:
     motions = [synthetic.swing(robot, seed, seconds=8.0) for seed in (1, 2, 3)]
     runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
     third = data_sets.write(folder / "third", robot, runs)
-    assert call(["run", first, "--workspace", base]).returncode == 0
-    assert call(["backup", folder / "kept.zip", "--workspace", base]).returncode == 0
+    assert data_sets.irtwin("run", first, "--workspace", base).status == 0
+    assert data_sets.irtwin("backup", folder / "kept.zip", "--workspace", base).status == 0
     (folder / "none").mkdir()
     lines = (
         {"robot": "First", "time": 1.7e9 + 0.01 * k, "position": [0.1, 0.2 + 1e-4 * k], "effort": [1.0, 2.0]}
@@ -83,7 +87,7 @@ def killed_often(kind: str, command: Command, kills: int, moments: random.Random
     done = call(command.arguments(place), command.fed)
     assert done.returncode == 0, done.stderr.decode()
     length, clean = time.perf_counter() - began, state(place)
-    before = None if kind == "restore" else (copied(command.base, place), state(place))[1]
+    before = None if kind == "restore" else state_of_base(command.base)
     said: list[str] = []
     killed = 0
     for _ in range(kills):
@@ -100,7 +104,7 @@ def killed_often(kind: str, command: Command, kills: int, moments: random.Random
 def faults(command: Command, place: Path, before: State | None, clean: State) -> list[str]:
     found = []
     if before is not None or any(place.glob("*")):
-        asked = call(["query", "energy_per_run", "--workspace", place, "--format", "csv"])
+        asked = call(["query", QUESTION, "--workspace", place, "--format", "csv"])
         answers = [of["answers"] for of in (before, clean) if of is not None]
         if asked.returncode != 0:
             found.append(f"no answer: {asked.stderr.decode()[-300:]}")
@@ -115,8 +119,16 @@ def faults(command: Command, place: Path, before: State | None, clean: State) ->
     return found + [f"{key} is {str(after[key])[:100]}, not {str(clean[key])[:100]}" for key in different]
 
 
+@cache
+def state_of_base(base: Path) -> State:
+    """Return the state that the commands on a base begin with, read from a copy."""
+    with tempfile.TemporaryDirectory() as folder:
+        copied(base, Path(folder) / "copy")
+        return state(Path(folder) / "copy")
+
+
 def state(place: Path) -> State:
-    asked = call(["query", "energy_per_run", "--workspace", place, "--format", "csv"])
+    answers = to_csv(asking.ask(QUESTION, place)).encode()
     with Workspace.existing(place) as workspace, workspace.reading() as session:
         named = named_files(session.connection())
         lost = [file.path for file in named if not is_whole(place, file.path, file.sha256)]
@@ -127,7 +139,7 @@ def state(place: Path) -> State:
     files = {f"{folder}/{file.name}" for folder in ("series", "twins", "diagnoses") for file in glob(place / folder)}
     hidden = [path.name for path in place.glob(".*")]
     return {
-        "answers": asked.stdout, "triples": triples, "lost": lost, "orphans": sorted(files - paths), "hidden": hidden,
+        "answers": answers, "triples": triples, "lost": lost, "orphans": sorted(files - paths), "hidden": hidden,
         "runs": len(paths), "beside": [path.name for path in place.parent.glob(".irtwin-*")],
     }  # fmt: skip
 

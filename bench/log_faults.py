@@ -1,8 +1,8 @@
 """Faults put into measured logs, each joint in turn: `python bench/log_faults.py DATA_FOLDER`.
 
-For each kind of fault: how often `check` names it with its channel; how often it names that channel as one of two which
-the torques cannot tell apart ("or"); and of how many faults the data show anything. DATA_FOLDER holds data sets with
-torque, or with currents that are taken for it.
+One table: for each kind of fault and each column, how often `check` names it with its channel, of how many. Each miss
+is printed with what was said instead, whether the channel was named as one of two which the torques cannot tell apart,
+and whether the data show the fault. DATA_FOLDER holds data sets with torque, or with currents that are taken for it.
 
 The data show a fault if one who knew it would see it: all torques, held out, are predicted better (by 2 standard
 deviations between 20 stretches of time) by the log without the fault than by the log with it, and than by the log whose
@@ -11,11 +11,12 @@ torque is reversed instead of the position. Faults that are found count as shown
 
 from __future__ import annotations
 
-import sys
-from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+import json
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
@@ -38,43 +39,99 @@ ONE = {
 PREFIXES = {"torque": "tau", "dq": "dq", "q": "q"}
 
 
-def main(folder: Path) -> None:
-    tried: Counter[str] = Counter()
-    found: Counter[str] = Counter()
-    rival: Counter[str] = Counter()
-    shown: Counter[str] = Counter()
-    for file in sorted(folder.glob("*/dataset.toml")):
-        data_set = with_torque(read_data_set(file.parent))
-        untouched = {(finding.fault, finding.channel) for finding in check(data_set).findings}
-        print(f"{data_set.robot.name}, as it is: {sorted(untouched) or 'nothing'}", flush=True)
-        for what, fault, channels, faulty in faults(data_set):
-            tried[what] += 1
-            findings = check(faulty).findings
-            named = {(finding.fault, finding.channel) for finding in findings}
-            if {(fault, channel) for channel in channels} & named:
-                found[what] += 1
-                shown[what] += 1
-                continue
-            either = any(finding.fault == fault and f"(or {channels[0]}:" in finding.say for finding in findings)
-            clear = carried(data_set, faulty, channels[0], fault)
-            rival[what] += either
-            shown[what] += clear
-            note = ", as one of two" if either else "" if clear else ", which the data do not show"
-            print(f"  missed: {what}, {channels[0]}{note}; said {sorted(named - untouched)}", flush=True)
-    print(f"{'':24s} named  or  shown  tried")
-    for what, count in sorted(tried.items()):
-        print(f"{what:24s} {found[what]:5d} {rival[what]:3d}  {shown[what]:5d}  {count:5d}")
-    print(f"{'all':24s} {found.total():5d} {rival.total():3d}  {shown.total():5d}  {tried.total():5d}")
+@dataclass(frozen=True)
+class Case:
+    """A fault put into a data set, and what became of it.
+
+    `field`: the log's column, short. `found`: named with its channel. `either`: named as one of two. `shown`: the data
+    show it.
+    """
+
+    robot: str
+    field: str
+    fault: str
+    channel: str
+    found: bool
+    either: bool
+    shown: bool
+    said: tuple[tuple[str, str], ...]
+
+    def missed(self) -> str:
+        """Return why, for a person."""
+        why = "as one of two that the torques cannot tell apart" if self.either else ""
+        why = why or ("though the data show it" if self.shown else "the data do not show it")
+        instead = ", ".join(f"{fault} of {channel}" for fault, channel in self.said) or "nothing"
+        return f"missed: {self.fault} of {self.channel}, {self.robot}: {why}; said {instead}"
 
 
-def carried(data_set: DataSet, faulty: DataSet, channel: str, fault: str) -> bool:
-    """Return whether one who knew the fault would see it in the log."""
-    true, own = left(data_set), left(faulty)
+def main() -> None:
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="*", default=[], metavar="KIND", help='such as "q sign"; all without it')
+    parser.add_argument("--sets", nargs="*", default=[], metavar="NAME", help="folders' names; all without it")
+    parser.add_argument("--json", type=Path, help="where to write each case")
+    asked = parser.parse_args()
+    cases = []
+    for file in sorted(asked.folder.glob("*/dataset.toml")):
+        if asked.sets and file.parent.name not in asked.sets:
+            continue
+        for case in cases_of(with_torque(read_data_set(file.parent)), asked.only):
+            cases.append(case)
+            if not case.found:
+                print(f"  {case.missed()}", flush=True)
+    if asked.json:
+        asked.json.write_text(json.dumps([asdict(case) for case in cases], indent=1))
+    print(table(cases))
+    print(f"{process_time():.0f} s of processor time")
+
+
+def cases_of(data_set: DataSet, only: Collection[str]) -> Iterator[Case]:
+    """Yield what becomes of each fault of the kinds, of all where none is given."""
+    robot = data_set.robot.name
+    untouched = {(finding.fault, finding.channel) for finding in check(data_set).findings}
+    print(f"{robot}, as it is: {sorted(untouched) or 'nothing'}", flush=True)
+    true = left(data_set)
+    for what, fault, channels, faulty in faults(data_set):
+        if only and what not in only:
+            continue
+        findings = check(faulty).findings
+        named = {(finding.fault, finding.channel) for finding in findings}
+        found = bool({(fault, channel) for channel in channels} & named)
+        either = any(finding.fault == fault and f"(or {channels[0]}:" in finding.say for finding in findings)
+        shown = found or carried(true, faulty, channels[0], fault)
+        said = tuple(sorted(named - untouched))
+        yield Case(robot, what.split()[0], fault, channels[0], found, either and not found, shown, said)
+
+
+def table(cases: Sequence[Case]) -> str:
+    """Return kinds by signals: found of tried."""
+    fields = list(dict.fromkeys(case.field for case in cases))
+    lines = [f"{'':14s}" + "".join(f"{field:>12s}" for field in fields) + f"{'all':>14s}"]
+    for fault in sorted({case.fault for case in cases}):
+        of_kind = [case for case in cases if case.fault == fault]
+        parts = [share([case for case in of_kind if case.field == field]) for field in fields]
+        lines.append(f"{fault:14s}" + "".join(f"{part:>12s}" for part in parts) + f"{share(of_kind):>14s}")
+    seen = [case for case in cases if case.shown]
+    lines += [
+        f"all: {share(cases)} found ({sum(case.found for case in cases) / max(len(cases), 1):.1%}), "
+        f"{sum(case.either for case in cases)} more as one of two",
+        f"of those that the data show: {share(seen)} ({sum(case.found for case in seen) / max(len(seen), 1):.1%})",
+    ]
+    return "\n".join(lines)
+
+
+def share(cases: Sequence[Case]) -> str:
+    return f"{sum(case.found for case in cases)} of {len(cases)}" if cases else ""
+
+
+def carried(true: Held, faulty: DataSet, channel: str, fault: str) -> bool:
+    """Return whether one who knew the fault, and what is left of the `true` torques, would see it in the log."""
+    own = left(faulty)
     if fault != "sign" or not channel.startswith("q_"):
-        return own.t(true) > SEEN
-    joint = data_set.robot.index(channel.removeprefix("q_"))
+        return bool(own.t(true) > SEEN)
+    joint = faulty.robot.index(channel.removeprefix("q_"))
     mirrored = left(changed(faulty, field_changed("torque", joint, np.negative)))
-    return min(own.t(true), mirrored.t(true)) > SEEN
+    return bool(min(own.t(true), mirrored.t(true)) > SEEN)
 
 
 def left(data_set: DataSet) -> Held:
@@ -162,4 +219,4 @@ def exchanged(field: str, joint: int) -> Callable[[Signals], Signals]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -164,8 +164,8 @@ class Client:
 def soak(workspace: Path, seconds: float, clients: int) -> Outcome:
     """Soak a server on a workspace's graph; the workspace is written to."""
     outcome = Outcome()
-    began = time.monotonic()
     with serving(workspace) as (url, process):
+        began = time.monotonic()
         first: dict[tuple[str, str], bytes] = {}
         asking = [Client(url, seed, outcome, first).run for seed in range(clients)]
         following = [lambda until: follow(url, workspace / "graph", until, outcome.lags)]

@@ -12,7 +12,6 @@ import argparse
 import time
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
@@ -50,7 +49,7 @@ MATTERS = 1.05  # times the RMS residual that is left at a joint with the effect
 
 @dataclass(frozen=True)
 class Answer:
-    """What a diagnosis says, `document` in the form of its schema, and after how long, s."""
+    """What a diagnosis says, `document` in the form of its schema, and after how long, s of the processor."""
 
     document: dict[str, Any]
     seconds: float
@@ -106,42 +105,41 @@ class Robot:
     shams: dict[str, list[list[str]]] = field(default_factory=dict)  # structure: effects named in each sham
 
 
-def examine(folder: Path, pool: Executor) -> tuple[Robot, Twin]:
+def examine(folder: Path) -> tuple[Robot, Twin]:
     """Diagnose the data set with the whole twin and without each effect; return the twin with its causes too."""
-    data_set = read_data_set(folder)
-    pending = {effect: pool.submit(answer, data_set, (effect,)) for effect in WITHHELD[folder.name]}
-    started = time.perf_counter()
-    diagnosis = diagnose(data_set)
-    plain = Answer(diagnosis.to_json(), time.perf_counter() - started)
-    assert diagnosis.twin is not None
-    full = diagnosis.twin
-    again = pool.submit(answer, data_set, (), to_json(full))
-    robbed = {effect: pool.submit(answer, data_set, (effect,), to_json(full)) for effect in pending}
+    data_set, effects = read_data_set(folder), WITHHELD[folder.name]
+    plain, full = _answered(data_set)
+    assert full is not None
+    given = from_json(to_json(full), Path("twin.json"))  # as `diagnose --save-twin` and `--twin` hand it on
+    withheld = {effect: answer(data_set, (effect,)) for effect in effects}
+    robbed = {effect: answer(data_set, (effect,), given) for effect in effects}
     matters = [
-        {effect: where_it_matters(data_set, effect, effects) for effect in pending}
-        for effects in (BASELINE, full.stack.effects)
+        {effect: where_it_matters(data_set, effect, twin) for effect in effects}
+        for twin in (BASELINE, given.stack.effects)
     ]
-    withheld = {effect: future.result() for effect, future in pending.items()}
-    adopted = Adopted(again.result(), {effect: future.result() for effect, future in robbed.items()}, matters[1])
-    return Robot(folder.name, data_set.robot.joint_names, plain, withheld, matters[0], adopted), full
+    adopted = Adopted(answer(data_set, (), given), robbed, matters[1])
+    return Robot(folder.name, data_set.robot.joint_names, plain, withheld, matters[0], adopted), given
 
 
-def blame(folder: Path, full: Twin, seeds: int, pool: Executor) -> dict[str, list[list[str]]]:
+def blame(folder: Path, full: Twin, seeds: Sequence[int]) -> dict[str, list[list[str]]]:
     """Return the effects named in each sham of the data set, by the twin that the shams obey."""
     data_set = read_data_set(folder)
-    pending = {
-        name: [pool.submit(answer, sham(data_set, truth, full, seed, centred=centred), ()) for seed in range(seeds)]
+    return {
+        name: [answer(sham(data_set, truth, full, seed, centred=centred)).named for seed in seeds]
         for name, (truth, centred) in nulls(data_set, full).items()
     }
-    return {name: [future.result().named for future in futures] for name, futures in pending.items()}
 
 
-def answer(data_set: DataSet, withhold: Sequence[str], twin: str | None = None) -> Answer:
-    """Diagnose, against the twin of JSON text if one is given, and take the time."""
-    started = time.perf_counter()
-    given = None if twin is None else from_json(twin, Path("twin.json"))
-    document = diagnose(data_set, twin=given, withhold=withhold).to_json()
-    return Answer(document, time.perf_counter() - started)
+def answer(data_set: DataSet, withhold: Sequence[str] = (), twin: Twin | None = None) -> Answer:
+    """Diagnose, against a twin if one is given, and take the time."""
+    return _answered(data_set, withhold, twin)[0]
+
+
+def _answered(data_set: DataSet, withhold: Sequence[str] = (), twin: Twin | None = None) -> tuple[Answer, Twin | None]:
+    """Return the answer, and the twin with its causes."""
+    started = time.process_time()
+    diagnosis = diagnose(data_set, twin=twin, withhold=withhold)
+    return Answer(diagnosis.to_json(), time.process_time() - started), diagnosis.twin
 
 
 def nulls(data_set: DataSet, full: Twin) -> dict[str, tuple[Twin, bool]]:
@@ -216,7 +214,7 @@ def page(robots: Sequence[Robot], missing: Sequence[str], command: str) -> str:
         f"by {100 * (MATTERS - 1):.0f} % or more. New are causes that the whole twin's diagnosis does not give.",
         "",
         "| robot | withheld | verdict | place | among new | joints right | missed | besides | confidence "
-        "| not told apart from | gap closed, 95 % interval | s |",
+        "| not told apart from | gap closed, 95 % interval | processor, s |",
         "| --- " * 12 + "|",
         *(line for robot in robots for line in _rows(robot)),
         "",
@@ -448,7 +446,7 @@ def main() -> None:
     parser.add_argument("data", type=Path, metavar="DATA_FOLDER", help=f"holds some of {', '.join(WITHHELD)}")
     parser.add_argument("--out", type=Path, metavar="PAGE.md")
     parser.add_argument("--shams", type=int, default=20, help="of each structure and robot (default 20)")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--first-seed", type=int, default=0, help="of the shams (default 0)")
     arguments = parser.parse_args()
     there = [name for name in WITHHELD if (arguments.data / name / "dataset.toml").is_file()]
     if not there:
@@ -464,14 +462,13 @@ def main() -> None:
             arguments.out.write_text(text, encoding="utf-8")
         print(line, flush=True)
 
-    with ProcessPoolExecutor(arguments.workers) as pool:
-        for name in there:
-            robots[name], twins[name] = examine(arguments.data / name, pool)
-            tell(f"{name}: effects withheld")
-        for name in there if arguments.shams else ():
-            shams = blame(arguments.data / name, twins[name], arguments.shams, pool)
-            robots[name] = replace(robots[name], shams=shams)
-            tell(f"{name}: shams")
+    for name in there:
+        robots[name], twins[name] = examine(arguments.data / name)
+        tell(f"{name}: effects withheld")
+    seeds = range(arguments.first_seed, arguments.first_seed + arguments.shams)
+    for name in there if seeds else ():
+        robots[name] = replace(robots[name], shams=blame(arguments.data / name, twins[name], seeds))
+        tell(f"{name}: shams")
     print(page([*robots.values()], missing, command))
 
 

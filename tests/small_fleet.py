@@ -252,6 +252,8 @@ def _twins() -> Iterator[Base]:
             twin_id=twin, robot_id=robot, created=_moment("2026-03-05 12:01"), file=f"twins/{twin}.json",
             sha256=f"twin of {robot}", cutoff_hz=10.0, condition_number=conditions[robot], base_parameter_count=11,
             split="by run", activity_id=made,
+            torque_scale_uncertainty=0.1 if robot == "Arm_A" else None,
+            torque_scale_why="torque of drives comes from nominal constants" if robot == "Arm_A" else None,
         )  # fmt: skip
         for effect in effects:
             yield schema.TwinEffect(twin_id=twin, effect=effect, activity_id=made)
@@ -264,6 +266,7 @@ def _twins() -> Iterator[Base]:
         yield schema.Parameter(
             parameter_id=f"{robot}.t1.{effect}.{joint or 'robot'}.{name}", twin_id=f"{robot}.t1", robot_id=robot,
             effect=effect, joint=joint, name=name, value=value, unit=unit, lower=lower, upper=upper,
+            scaled_lower=0.9 * lower if unit == "N m" else None, scaled_upper=1.1 * upper if unit == "N m" else None,
             activity_id=f"identification.{robot}",
         )  # fmt: skip
     yield schema.BaseParameter(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from random import Random
 
@@ -55,6 +55,15 @@ _IN_IRIS = ("a", "SERVICE", "load", "?x=1", "(", ")", "'", ",", ";", "*", ":", "
 _IN_NAMES = ("a", "SERVICE", ".SERVICE", ".load", "1", "-b", "_", "%41", "\\-", "\\'", "\\(", "\\?", ":", "é", "a.b")
 _VARIABLES = ("?a", "?b", "$c", "?service", "$LOAD", "?SERVICEa", "?a1")
 _NUMBERS = ("1", "1.5", ".5", "1e3", "2.5E-1", "+1", "-2")
+_AROUND_A_GROUP = (
+    "{group}",
+    "{group}UNION{space}{group}",
+    "OPTIONAL{gap}{group}",
+    "MINUS{group}",
+    "GRAPH{space}?g{gap}{group}",
+    "FILTER NOT EXISTS{group}",
+    "{{SELECT * {group}}}",
+)
 _OPERATORS = ("<", ">", "<=", ">=", "=", "!=", "&&", "||", "+", "-", "*", "/")
 _PREFIXES = ("", "x", "service", "load", "a.service")
 
@@ -99,7 +108,7 @@ class Family:
         if self._url is None:
             return self._group(2)
         # A clause that reads from elsewhere comes first, or after what gives it something to join with.
-        before = self._one(("", *(self._binding() for _ in range(3))))
+        before = "" if self._random.random() < 0.25 else self._binding()
         return f"{{{self._space()}{before}{self._gap()}{self._service()}{self._gap()}{self._elements(1)}}}"
 
     def _service(self) -> str:
@@ -119,67 +128,58 @@ class Family:
     def _element(self, depth: int) -> str:
         if depth == 0:
             return self._triples()
-        inner = self._group(depth - 1)
-        return self._one(
-            (
-                self._triples(),
-                self._binding(),
-                self._binding(),
-                inner,
-                f"{inner}UNION{self._space()}{inner}",
-                f"OPTIONAL{self._gap()}{inner}",
-                f"MINUS{inner}",
-                f"GRAPH{self._space()}?g{self._gap()}{inner}",
-                f"FILTER NOT EXISTS{inner}",
-                f"{{SELECT * {inner}}}",
-            )
-        )
+        form = self._random.choice((self._triples, self._binding, self._binding, *_AROUND_A_GROUP))
+        if not isinstance(form, str):
+            return form()
+        return form.format(group=self._group(depth - 1), space=self._space(), gap=self._gap())
 
     def _triples(self) -> str:
         self._fresh += 1
-        subject = self._one((self._name(), self._iri(), f"_:b{self._fresh}.SERVICE", "?s"))
-        verb = self._one((self._iri(), self._name(), "a", "?p"))
+        subject = self._made(self._name, self._iri, lambda: f"_:b{self._fresh}.SERVICE", lambda: "?s")
+        verb = self._made(self._iri, self._name, lambda: "a", lambda: "?p")
         return f"{subject}{self._space()}{verb} {self._term()}{self._one((' .', ' ;.', '.', ' .'))}{self._space()}"
 
     def _binding(self) -> str:
         """What binds or filters, with an end that a lexer may take for the beginning of something else."""
         self._fresh += 1
-        return self._one(
-            (
-                f"FILTER({self._expression(2)})",
-                f"FILTER({self._one(_VARIABLES)}<{self._one(_VARIABLES)})",
-                f"BIND({self._expression(2)}AS{self._gap()}?new{self._fresh})",
-                f"VALUES ?new{self._fresh}{{{self._value()}{self._space()}{self._value()}}}",
-                f"BIND({self._string()}AS ?new{self._fresh})",
-                f"BIND({self._name()} AS ?new{self._fresh})",
-                f"FILTER({self._one(_NUMBERS)}<={self._string()})",
-            )
+        new = f"?new{self._fresh}"
+        return self._made(
+            lambda: f"FILTER({self._expression(2)})",
+            lambda: f"FILTER({self._one(_VARIABLES)}<{self._one(_VARIABLES)})",
+            lambda: f"BIND({self._expression(2)}AS{self._gap()}{new})",
+            lambda: f"VALUES {new}{{{self._value()}{self._space()}{self._value()}}}",
+            lambda: f"BIND({self._string()}AS {new})",
+            lambda: f"BIND({self._name()} AS {new})",
+            lambda: f"FILTER({self._one(_NUMBERS)}<={self._string()})",
         )
 
     def _expression(self, depth: int) -> str:
         if depth == 0 or self._random.random() < 0.3:
             return f"{self._term()} "
         left, right = self._expression(depth - 1), self._expression(depth - 1)
-        return self._one(
-            (
-                f"({left}{self._one(_OPERATORS)}{self._space()}{right})",
-                f"{self._one(_VARIABLES)}<{self._one(_VARIABLES)}",
-                f"STR({left})",
-                f"IF({left},{right},{left})",
-                f"CONTAINS({self._string()},{self._string()})",
-                f"COALESCE({left},{right})",
-                f"({left}IN({right}))",
-                f"!({left})",
-            )
+        return self._made(
+            lambda: f"({left}{self._one(_OPERATORS)}{self._space()}{right})",
+            lambda: f"{self._one(_VARIABLES)}<{self._one(_VARIABLES)}",
+            lambda: f"STR({left})",
+            lambda: f"IF({left},{right},{left})",
+            lambda: f"CONTAINS({self._string()},{self._string()})",
+            lambda: f"COALESCE({left},{right})",
+            lambda: f"({left}IN({right}))",
+            lambda: f"!({left})",
         )
 
     def _term(self) -> str:
-        return self._one(
-            (self._one(_VARIABLES), self._one(_NUMBERS), self._literal(), self._iri(), self._name(), "true")
+        return self._made(
+            lambda: self._one(_VARIABLES),
+            lambda: self._one(_NUMBERS),
+            self._literal,
+            self._iri,
+            self._name,
+            lambda: "true",
         )
 
     def _value(self) -> str:
-        return self._one((self._one(_NUMBERS), self._literal(), self._iri(), "UNDEF"))
+        return self._made(lambda: self._one(_NUMBERS), self._literal, self._iri, lambda: "UNDEF")
 
     def _literal(self) -> str:
         return self._string() + self._one(("", "", "@en", "@en-service", "^^<http://e/load>"))
@@ -213,6 +213,10 @@ class Family:
 
     def _one(self, choices: tuple[str, ...]) -> str:
         return self._random.choice(choices)
+
+    def _made(self, *choices: Callable[[], str]) -> str:
+        """Make one of several texts, and none of the others."""
+        return self._random.choice(choices)()
 
 
 class Listener:

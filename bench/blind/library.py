@@ -12,7 +12,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.detectability import can_show
-from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
@@ -54,7 +54,8 @@ def torque_library(case: Case) -> tuple[Library, LeftOut]:
     """Return the library of torque, and what its columns are built on: what the twin says without the run."""
     stack = case.stack
     left_out = LeftOut(stack, torque_system(stack, case.with_torque, case.grouping, (), None))
-    system = torque_system(stack, case.with_torque, case.grouping, _shapes(case, "torque"), left_out.below)
+    below = with_load(case.robot, left_out.below)
+    system = torque_system(stack, case.with_torque, case.grouping, _shapes(case, "torque"), below)
     return Library("torque", system, _hypotheses(system, case)), left_out
 
 

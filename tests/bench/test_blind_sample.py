@@ -26,6 +26,7 @@ def scored(tmp_path_factory):
     return score
 
 
+@pytest.mark.nightly
 def test_a_healthy_robot_raises_no_alarm(scored):
     assert scored("healthy", "clean_null")["false alarms, clean nulls"] == 0
 
@@ -41,11 +42,13 @@ def test_a_missing_effect_is_named_first(scored, effect):
     assert scores["right effect first"] == 1
 
 
+@pytest.mark.nightly
 def test_a_changed_effect_is_named_with_its_joints_and_scope(scored):
     scores = scored("changed", "single", ("asymmetric_friction",), 3.0, "changed")
     assert scores["right effect first"] == scores["joint right"] == scores["scope right"] == 1
 
 
+@pytest.mark.nightly
 def test_joints_that_never_move_are_no_obstacle(scored):
     scores = scored("poor", "poor", ("payload",), 3.0)
     assert set(scores) == {"right effect first, gap 3, poor"}

@@ -20,7 +20,7 @@ def test_eight_clients_and_a_writer_meet_no_error_and_leave_nothing_behind(tmp_p
     with KnowledgeGraph(tmp_path / "graph") as graph:
         graph.load_ontology()
         graph.replace(parse(path=str(TWO_ROBOTS), format=RdfFormat.TRIG), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    outcome = soak(tmp_path, seconds=8, clients=8)
+    outcome = soak(tmp_path, seconds=6, clients=8)
     assert outcome.errors == []
     assert outcome.statuses["200"] > 10
     assert outcome.lags

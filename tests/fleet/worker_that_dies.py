@@ -3,8 +3,9 @@
 import os
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
-from irtwin import workflow
+import irtwin
 from irtwin.fleet.batch import Batch
 
 
@@ -13,5 +14,5 @@ def diagnose(data_set: Path, json_file: Path, twin_file: Path) -> None:
         os._exit(9)
 
 
-workflow.diagnose = diagnose  # type: ignore[assignment]
+irtwin.workflow = SimpleNamespace(diagnose=diagnose)  # type: ignore[assignment]  # of which nothing else is asked
 Batch(Path(sys.argv[1])).work()

@@ -33,6 +33,7 @@ def no_java(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_owlrl_concludes_what_the_native_engine_does_and_the_graph_says_which(graph: KnowledgeGraph) -> None:
     reason(graph)
     native = graph.triples(GRAPH_OWL_RL)

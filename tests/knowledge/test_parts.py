@@ -14,6 +14,7 @@ from irtwin import workflow
 from irtwin.knowledge import by_parts, parts, reasoning
 from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Contradiction
+from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
 from irtwin.knowledge.vocabulary import (
@@ -156,6 +157,14 @@ def test_robots_are_parts_of_their_own() -> None:
     ontology = parts.Ontology(graph)
     top = parts.parted(ontology, reasoning.asserted(graph))
     assert len({top(node) for triple in graph.triples(SOURCE) for node in ontology.nodes(triple)}) == len(ROBOTS)
+
+
+def test_a_part_is_no_less_apart_for_being_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "_schema", Schema)  # as in a new process, which has closed no ontology yet
+    graph = holding(of_robot("r"))
+    ontology = parts.Ontology(graph)
+    regions = parts.some(graph, ontology, [NamedNode(individual("robot", "r"))])
+    assert by_parts.conclude(graph, ontology, regions, whole=False).added
 
 
 @pytest.mark.slow

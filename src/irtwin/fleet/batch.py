@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from irtwin import __version__, workflow
+from irtwin import __version__
 from irtwin.errors import InputError
 from irtwin.fleet.data_sets import at_hand, checksum
 from irtwin.storage.files import write
@@ -139,6 +139,8 @@ class Batch:
 
     def _done(self, kind: str, place: str, data_set: Path) -> tuple[str, str]:
         """Return the state that a data set has come to, and what is to be said of it."""
+        from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
+
         trace = self.folder / "records" / f"{key(place)}.traceback.txt"
         trace.unlink(missing_ok=True)
         try:

@@ -15,7 +15,7 @@ from irtwin.knowledge import parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of
 from irtwin.knowledge.owl_rl.beside import Beside, Equality
 from irtwin.knowledge.owl_rl.closure import Contradiction
-from irtwin.knowledge.parts import Ontology, Region
+from irtwin.knowledge.parts import Borders, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, term
@@ -97,20 +97,21 @@ def _conclude_of_one(ontology: Ontology, region: Region) -> Conclusions:
         return Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
     if not region.asserted:
         return Conclusions()
+    borders = ontology.borders  # numbers terms, so it comes before facts take numbers of their own
     try:
         closure = Beside(ontology.schema, region.asserted)
-        _check(ontology, closure)
+        _check(borders, closure)
         found = by_rules(ontology, ontology.triples, ontology.schema.kept, region.asserted, closure.worth_keeping())
         closure.add(found.concluded())
-        _check(ontology, closure)
+        _check(borders, closure)
     except Equality as same:
         raise Joined from same
     found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     return found
 
 
-def _check(ontology: Ontology, closure: Beside) -> None:
-    if ontology.borders.crossed_by(closure):
+def _check(borders: Borders, closure: Beside) -> None:
+    if borders.crossed_by(closure):
         raise Joined
 
 

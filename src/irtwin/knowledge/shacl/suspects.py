@@ -164,6 +164,9 @@ class _Writer:
         inverse = self._shapes.value(path, "inversePath")
         if isinstance(inverse, NamedNode):
             return f"^{inverse}"
+        ways = self._list(self._shapes.value(path, "alternativePath"))
+        if ways:
+            return f"({'|'.join(map(self._path, ways))})"
         raise _Unknown("path")
 
     def _well_formed(self, datatype: Node, node: str) -> str:
@@ -177,11 +180,11 @@ class _Writer:
             raise _Unknown("in")  # numbers are equal to others that are written otherwise
         return f"{node} IN ({', '.join(map(str, items))})"
 
-    def _list(self, cell: Node) -> list[Node]:
+    def _list(self, cell: Node | None) -> list[Node]:
         found = []
         while (first := self._shapes.value(cell, RDF + "first")) is not None:
             found.append(first)
-            cell = cast(Node, self._shapes.value(cell, RDF + "rest"))
+            cell = self._shapes.value(cell, RDF + "rest")
         return found
 
     def _text(self, node: Node, name: str) -> str:

@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from hashlib import sha256
+from typing import cast
 
-from pyoxigraph import BlankNode, CanonicalizationAlgorithm, Dataset, Quad, Triple
+from pyoxigraph import BlankNode, CanonicalizationAlgorithm, Dataset, Literal, NamedNode, Quad, Triple
+
+Object = NamedNode | BlankNode | Literal | Triple
 
 
 def has_blank_node(statements: Iterable[Quad | Triple]) -> bool:
     """Whether a subject or an object is a blank node."""
     return any(isinstance(term, BlankNode) for one in statements for term in (one.subject, one.object))
+
+
+def named_by_content(triples: Iterable[Triple], content: bytes) -> Iterator[Triple]:
+    """Call the blank nodes of a file by its content and their order: read anew it is the same, and others are not.
+
+    What was worked out of an ontology then holds for each graph that has it.
+    """
+    file, names = sha256(content).hexdigest()[:24], dict[BlankNode, BlankNode]()
+
+    def named(term: Object) -> Object:
+        if isinstance(term, Triple):
+            return Triple(*map(named, term))  # type: ignore[arg-type]
+        return names.setdefault(term, BlankNode(f"f{file}n{len(names)}")) if isinstance(term, BlankNode) else term
+
+    return (cast(Triple, named(triple)) for triple in triples)
 
 
 def same(some: set[Triple], others: set[Triple]) -> bool:

@@ -25,7 +25,7 @@ from pyoxigraph import (
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store import changes, store_files
-from irtwin.knowledge.store.blank_nodes import has_blank_node, same
+from irtwin.knowledge.store.blank_nodes import has_blank_node, named_by_content, same
 from irtwin.knowledge.store.column_functions import column_functions
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
@@ -453,8 +453,7 @@ def read_turtle(file: Path) -> Iterator[Triple]:
     """Read a Turtle file; InputError names the file and the line where it is broken."""
     content = read_rdf(file, RdfFormat.TURTLE)
     try:
-        for quad in parse(content, format=RdfFormat.TURTLE, rename_blank_nodes=True):
-            yield quad.triple
+        yield from named_by_content((quad.triple for quad in parse(content, format=RdfFormat.TURTLE)), content)
     except (SyntaxError, MemoryError) as error:
         refuse(file, error)
 
