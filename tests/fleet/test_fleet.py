@@ -24,23 +24,33 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def out(robots: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("out")
+def first(robots: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, data_sets.Said]:
+    """Return the folder of a fleet that was run once, and what the command said."""
+    out = tmp_path_factory.mktemp("out")
+    return out, run(robots, out)
 
 
-def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, out: Path) -> None:
-    command = ("fleet", "run", robots, "--out", out, "--workers", 2, "--base", BASE)
-    first = data_sets.irtwin(*command)
-    assert first.status == 3, first.err
-    assert first.out == "done     2\nrefused  1\n"
-    assert "nam" in first.err and "Traceback" not in first.err
+@pytest.fixture(scope="module")
+def out(first: tuple[Path, data_sets.Said]) -> Path:
+    return first[0]
+
+
+def run(robots: Path, out: Path) -> data_sets.Said:
+    return data_sets.irtwin("fleet", "run", robots, "--out", out, "--workers", 2, "--base", BASE)
+
+
+def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, first: tuple[Path, data_sets.Said]) -> None:
+    out, said = first
+    assert said.status == 3, said.err
+    assert said.out == "done     2\nrefused  1\n"
+    assert "nam" in said.err and "Traceback" not in said.err
     workspaces = [batch.folder / "workspace" for batch in batches_of(out)]
     assert len(workspaces) == 2
     pages = [page for place in workspaces for page in place.glob("reports/*.html")]
     assert len(pages) == 2
     written = {page: page.stat().st_mtime_ns for page in pages}
-    again = data_sets.irtwin(*command)
-    assert again.out == first.out
+    again = run(robots, out)
+    assert again.out == said.out
     assert {page: page.stat().st_mtime_ns for page in pages} == written
 
 
