@@ -22,19 +22,19 @@ def speed(hertz: float) -> np.ndarray:
 
 
 def test_a_stiff_gear_without_play_passes_the_load():
-    passed = transmitted(LOAD, np.ones_like(LOAD), RATE, speed(40), 0.5)
+    (passed,) = transmitted(LOAD, np.ones_like(LOAD), RATE, speed(40), 0.5)
     np.testing.assert_allclose(passed, LOAD, atol=0.02 * np.abs(LOAD).max())
 
 
 def test_a_link_that_grows_light_does_not_run_away():
     light = np.where(TIME[:, None] < 3, 5.0, 1e-4)
-    passed = transmitted(LOAD, light, RATE, 2 * np.pi * 40 * np.sqrt(5 / light), 0.1)
+    (passed,) = transmitted(LOAD, light, RATE, 2 * np.pi * 40 * np.sqrt(5 / light), 0.1)
     assert np.abs(passed).max() < 2 * np.abs(LOAD).max()
 
 
 def test_a_link_swings_at_its_own_frequency_after_a_jerk():
     jerk = np.where(TIME[:, None] < 2, 0.0, 5.0)
-    passed = transmitted(jerk, np.ones_like(jerk), RATE, speed(6), 0.1)[TIME > 2, 0]
+    passed = transmitted(jerk, np.ones_like(jerk), RATE, speed(6), 0.1)[0, TIME > 2, 0]
     crossings = np.flatnonzero(np.diff(np.sign(passed[: int(RATE)] - 5)) != 0)
     assert RATE / np.diff(crossings).mean() / 2 == pytest.approx(6, rel=0.05)
     assert passed[-1] == pytest.approx(5, rel=1e-3)
@@ -43,17 +43,15 @@ def test_a_link_swings_at_its_own_frequency_after_a_jerk():
 @settings(max_examples=20, deadline=None)
 @given(st.floats(3e-4, 3e-3), st.floats(0.2, 5.0))
 def test_play_delays_an_impulse_and_keeps_it(play, inertia):
-    passed = transmitted(LOAD, np.full_like(LOAD, inertia), RATE, speed(30), 0.5, play)
+    (passed,) = transmitted(LOAD, np.full_like(LOAD, inertia), RATE, speed(30), 0.5, (play,))
     lost = np.abs(passed - LOAD).sum() / RATE
     assert lost > 0.02
     assert abs((passed - LOAD).sum() / RATE) < 0.35 * lost
 
 
 def test_more_play_loses_more():
-    lost = [
-        np.abs(transmitted(LOAD, np.ones_like(LOAD), RATE, speed(30), 0.5, b) - LOAD).sum() for b in (3e-4, 1e-3, 3e-3)
-    ]
-    assert lost == sorted(lost)
+    passed = transmitted(LOAD, np.ones_like(LOAD), RATE, speed(30), 0.5, (3e-4, 1e-3, 3e-3))
+    assert (np.diff(np.abs(passed - LOAD).sum(axis=(1, 2))) > 0).all()
 
 
 def test_what_the_rotor_has_of_the_inertia_does_not_pass_the_gap():

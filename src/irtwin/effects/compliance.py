@@ -29,6 +29,7 @@ from irtwin.signals.motion import Motion
 
 _WINDOW, _WARM_UP = 1.0, 0.8  # s: swings are over after the second; windows are computed side by side
 _STEPS = 500.0  # a second, about
+_AT_ONCE = 8192  # numbers: what is computed side by side stays in a processor's own memory
 _INERTIA_EVERY = 0.016  # s
 _LIGHTEST = 1e-6  # kg m^2: a link without inertia is no link
 _CONTACT, _CONTACT_DAMPING = 30.0, 0.5  # Hz: of gears that touch again, well above what moves a robot
@@ -67,64 +68,81 @@ def transmitted(
     rate: float,
     speed: np.ndarray | float,
     damping: float,
-    play: np.ndarray | float = 0.0,
+    plays: Sequence[float] = (0.0,),
     start: int = 0,
 ) -> np.ndarray:
-    """Return (N, n) the torque that passes a spring with `play` (rad) between a motor and a link that swings behind it.
+    """Return (G, N, n) the torque that passes a spring with each of G `plays` (rad) between a motor and its link.
 
     load: (N, n) N m, what a link stiffly joined to the measured motor would take; inertia: (N, n) kg m^2; rate: Hz;
-    speed: (N, n) rad/s, of the link's swing while the motor holds, or one for all; play: (n,), or one for all; `start`:
-    where the first sample lies in its run, so that parts of a run are computed alike. With x the motor's lead over the
-    link, x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the
+    speed: (N, n) rad/s, of the link's swing while the motor holds, or one for all; `start`: where the first sample
+    lies in its run, so that parts of a run are computed alike. With x the motor's lead over the link,
+    x'' = load/inertia - speed^2 dead_band(x) - 2 damping speed x', the last only where the gears touch: the
     two-mass model (Spong 1987), link by link.
     """
     ahead, length = round(_WARM_UP * rate), max(1, round(_WINDOW * rate))
     starts = np.arange(-(start % length), len(load), length)
     substeps = max(1, round(_STEPS / max(rate, 1 / _WINDOW)))
-    step, last = 1 / (rate * substeps), len(load) - 1
-    rows = np.clip(starts + np.arange(-ahead, length + 1)[:, None], 0, last)
+    step, joints = 1 / (rate * substeps), load.shape[1]
     speed = np.minimum(speed, 1 / step)  # what is stiffer swings above any band of motion, and would need finer steps
     # in units of a substep: x' and x'' count as what they add to x in one
-    pushed = (load / inertia)[rows] * step**2
-    pulls, rubs = (speed * step) ** 2, 2 * damping * speed * step
-    if np.ndim(speed):
-        pulls, rubs = pulls[rows], rubs[rows]
-    else:
-        pulls, rubs = (np.broadcast_to(each, pushed.shape) for each in (pulls, rubs))
-    rises = np.diff(pushed, axis=0) / substeps
-    swing = _Swing(pushed[0] / pulls[0] + np.sign(pushed[0]) * play / 2, play)
-    passed = np.empty((length, *pushed.shape[1:]))
-    for row, (push, rise, pull, rub) in enumerate(zip(pushed[:-1], rises, pulls, rubs, strict=False)):
+    pushed, pulls, rubs = load / inertia * step**2, (speed * step) ** 2, 2 * damping * speed * step
+    passed = np.empty((len(plays), len(starts), length, joints))
+    side_by_side = max(1, _AT_ONCE // (len(plays) * joints))
+    for first in range(0, len(starts), side_by_side):
+        some = slice(first, first + side_by_side)
+        rows = np.clip(starts[some] + np.arange(-ahead, length + 1)[:, None], 0, len(load) - 1)
+        push, pull, rub = (
+            each[rows].reshape(len(rows), -1) if np.ndim(each) else each for each in (pushed, pulls, rubs)
+        )
+        moved = _moved(push, pull, rub, np.asarray(plays)[:, None], ahead, substeps)
+        passed[:, some] = moved.reshape(length, len(plays), -1, joints).transpose(1, 2, 0, 3)
+    kept = passed.reshape(len(plays), -1, joints)[:, -starts[0] :][:, : len(load)]
+    return np.asarray(kept * (inertia / step**2))
+
+
+def _moved(
+    pushes: np.ndarray, pulls: np.ndarray, rubs: np.ndarray, plays: np.ndarray, ahead: int, substeps: int
+) -> np.ndarray:
+    """Return (L, G, K) the springs' forces after `ahead` samples, of K links with G plays.
+
+    pushes: (ahead + L + 1, K); pulls, rubs: of each, or one for all; plays: (G, 1).
+    """
+    rises = np.diff(pushes, axis=0) / substeps
+    pulls, rubs = (np.broadcast_to(each, (len(pushes), *np.shape(each)[1:])) for each in (pulls, rubs))
+    swing = _Swing(pushes[0] / pulls[0] + np.sign(pushes[0]) * plays / 2, plays)
+    forces = np.empty((len(rises) - ahead, *swing.shape))
+    for row, (push, rise, pull, rub) in enumerate(zip(pushes[:-1].copy(), rises, pulls, rubs, strict=False)):
         for substep in range(substeps):
-            swing.move(push, pull, rub, passed[row - ahead] if row >= ahead and substep == 0 else None)
+            swing.move(push, pull, rub, forces[row - ahead] if row >= ahead and substep == 0 else None)
             push += rise
-    kept = passed.transpose(1, 0, 2).reshape(-1, load.shape[1])[-starts[0] :][: len(load)]
-    return np.asarray(kept * inertia / step**2)
+    return forces
 
 
 class _Swing:
-    """Links behind springs with `play`: the motor's lead `x` over each, and what it gains in a substep, both as (m, n).
+    """K links behind springs with G `plays`, (G, 1): the motor's lead `x`, and what it gains in a substep, both (G, K).
 
     All arrays are written over: a substep is a few operations on a few numbers.
     """
 
-    def __init__(self, x: np.ndarray, play: np.ndarray | float):
+    def __init__(self, x: np.ndarray, plays: np.ndarray):
         self._x, self._gained = x, np.zeros_like(x)
-        self._high = np.broadcast_to(np.asarray(play) / 2, x.shape).copy()
-        self._low, self._play = -self._high, bool(np.any(play))
+        self._low, self._high, self._play = -plays / 2, plays / 2, bool(plays.any())
         self._given, self._force, self._rubbed = np.empty((3, *x.shape))
+        self._touch = np.empty(x.shape, dtype=bool)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(G, K)."""
+        return self._x.shape
 
     def move(self, push: np.ndarray, pull: np.ndarray, rub: np.ndarray, force: np.ndarray | None) -> None:
         """Go on by a substep; `force` is given that of the spring, before."""
+        give, rubbed = self._x, np.multiply(self._gained, rub, out=self._rubbed)
         if self._play:
-            give, rubbed = self._given, self._rubbed
-            np.maximum(self._x, self._low, out=give)  # np.clip is slower on a few numbers
+            give = np.maximum(self._x, self._low, out=self._given)  # np.clip is slower on a few numbers
             np.minimum(give, self._high, out=give)
             np.subtract(self._x, give, out=give)
-            np.multiply(self._gained, give != 0, out=rubbed)
-            rubbed *= rub
-        else:
-            give, rubbed = self._x, np.multiply(self._gained, rub, out=self._rubbed)
+            rubbed *= np.not_equal(give, 0, out=self._touch)
         total = np.multiply(give, pull, out=self._force)
         total += rubbed
         if force is not None:
@@ -132,14 +150,6 @@ class _Swing:
         self._gained += push
         self._gained -= total
         self._x += self._gained
-
-
-def _passed(load: np.ndarray, inertia: np.ndarray, motion: Motion, gaps: np.ndarray) -> np.ndarray:
-    """Return (N, G, n) what passes each of G gaps: moved side by side, many cost little more than one."""
-    load_of_all, inertia_of_all = (np.tile(each, (1, len(gaps))) for each in (load, inertia))
-    plays, speed = np.repeat(gaps, load.shape[1]), 2 * np.pi * _CONTACT
-    passed = transmitted(load_of_all, inertia_of_all, motion.rate, speed, _CONTACT_DAMPING, plays, motion.start)
-    return passed.reshape(len(load), len(gaps), -1)
 
 
 def _passed_about(
@@ -153,7 +163,12 @@ def _passed_about(
     wanted = {gap: np.round(np.log2(gap * _WITHIN), 9) for gap in gaps}
     logs = np.unique(np.concatenate(list(wanted.values())))
     passed = _passed(load, inertia, motion, 2.0**logs)
-    return {gap: passed[:, np.isin(logs, own)].mean(axis=1) for gap, own in wanted.items()}
+    return {gap: passed[np.isin(logs, own)].mean(axis=0) for gap, own in wanted.items()}
+
+
+def _passed(load: np.ndarray, inertia: np.ndarray, motion: Motion, gaps: Sequence[float]) -> np.ndarray:
+    """Return (G, N, n) what passes each of G gaps of gears that touch hard."""
+    return transmitted(load, inertia, motion.rate, 2 * np.pi * _CONTACT, _CONTACT_DAMPING, gaps, motion.start)
 
 
 def _free(load: np.ndarray, q: np.ndarray, dq: np.ndarray, rate: float, gap: float) -> np.ndarray:
@@ -230,13 +245,14 @@ class Backlash(_Compliance):
         load = load - self.rotor_share * inertia * motion.ddq[:, acting]
         inertia = (1 - self.rotor_share) * inertia
         if not self.about:
-            passed = _passed(load, inertia, motion, np.array([self.b]))[:, 0]
+            passed = _passed(load, inertia, motion, (self.b,))[0]
             return (_at(acting, motion, passed - load),)
         kept = {} if predicted is None else predicted.kept
         key = (self.id, self.rotor_share, tuple(acting), motion.start)
         if self.b not in kept.get(key, {}):
             tried = _SMALL if self.rotor_share else _GAPS
-            gaps = tried if self.b in tried and predicted is not None else (self.b,)
+            alone = predicted is None or self.joints is not None or self.b not in tried  # no other is asked for
+            gaps = (self.b,) if alone else tried
             kept[key] = kept.get(key, {}) | _passed_about(load, inertia, motion, gaps)
         return (_at(acting, motion, kept[key][self.b] - load),)
 
@@ -283,7 +299,7 @@ class JointElasticity(_Compliance):
             return (_at(acting, motion, differentiate(differentiate(load, motion.rate), motion.rate)),)
         inertia = load_inertia(robot, motion, predicted)[:, acting]
         speed = 2 * np.pi * self.frequency * np.sqrt(_middle_inertia(robot)[acting] / inertia)
-        passed = transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start)
+        (passed,) = transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start)
         return (_at(acting, motion, passed - load),)
 
     def parameters(

@@ -53,6 +53,7 @@ class Candidates:
         self._run: Motion | None = None
         self._predicted: Predicted | None = None
         self._held: dict[int, _Held] = {}
+        self._piece_cut: tuple[tuple[int, int], Motion, Predicted | None] | None = None
 
     def part(self, motion: Motion) -> list[np.ndarray]:
         """Return the columns (N, k_e) of each equation over a part of a run."""
@@ -79,11 +80,18 @@ class Candidates:
     def _piece(self, place: int, whole: Motion, start: int, stop: int, around: int) -> _Held:
         """Compute an effect's columns over a piece of a run, with `around` samples before and after."""
         first, last = max(0, start - around), min(stop + around, len(whole.time))
-        parts = self._columns(place, whole.part(first, last), self._predicted and self._predicted.part(first, last))
+        parts = self._columns(place, *self._cut(whole, first, last))
         return _Held(_alone(parts), first, start if first else 0, stop if last < len(whole.time) else last)
 
+    def _cut(self, whole: Motion, first: int, last: int) -> tuple[Motion, Predicted | None]:
+        """Return a piece of the run that is held: the same for effects in turn, which keep there what they share."""
+        if self._piece_cut is None or self._piece_cut[0] != (first, last):
+            predicted = self._predicted and self._predicted.part(first, last)
+            self._piece_cut = (first, last), whole.part(first, last), predicted
+        return self._piece_cut[1:]
+
     def _hold(self, whole: Motion) -> None:
-        self._held = {}  # let go of the run before
+        self._held, self._piece_cut = {}, None  # let go of the run before
         self._run, self._predicted = whole, self._below(whole) if self._effects else None
         for place, effect in enumerate(self._effects):
             if effect.memory and effect.reach is None:
