@@ -9,6 +9,7 @@ import pytest
 from tests.synthetic import arm, swing
 
 from irtwin.effects.catalogue import catalogue
+from irtwin.effects.compliance import Backlash, transmitted
 from irtwin.effects.effect import Predicted
 from irtwin.gap.regression.candidate_columns import Candidates, candidate_pattern
 from irtwin.gap.regression.hypotheses import candidate_columns
@@ -77,3 +78,21 @@ def test_one_run_is_held_at_a_time():
         for piece in motion.pieces(400):
             candidates.part(piece)
     assert asked == [MOTION.run, "other"]
+
+
+def test_gaps_are_moved_once_in_each_piece_of_a_run(monkeypatch):
+    moved = []
+
+    def counted(*given, **named):
+        moved.append(given)
+        return transmitted(*given, **named)
+
+    monkeypatch.setattr("irtwin.gap.regression.candidate_columns._PIECE", 250)
+    monkeypatch.setattr("irtwin.effects.compliance.transmitted", counted)
+    plays = [play for play in Backlash().candidates(ROBOT) if play.about]
+    tried = candidate_pattern(ROBOT, plays, candidate_columns(ROBOT, plays))
+    candidates, moved[:] = Candidates(ROBOT, plays, tried, lambda whole: replace(BELOW, kept={})), []
+    for piece in MOTION.pieces(93):
+        candidates.part(piece)
+    pieces = -(-len(MOTION.time) // 250)
+    assert len(plays) > 2 and len(moved) <= 2 * (pieces + 1)  # with all of the inertia in the link, and with a part
