@@ -162,7 +162,7 @@ def _passed_about(
     """
     wanted = {gap: np.round(np.log2(gap * _WITHIN), 9) for gap in gaps}
     logs = np.unique(np.concatenate(list(wanted.values())))
-    passed = _passed(load, inertia, motion, 2.0**logs)
+    passed = _passed(load, inertia, motion, tuple(2.0**logs))
     return {gap: passed[np.isin(logs, own)].mean(axis=0) for gap, own in wanted.items()}
 
 
