@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import pytest
 from tests.gap_cases import document
+from tests.synthetic import arm
 
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.gap.writing import _members, folded
+from irtwin.gap.writing import _joints, _members, folded
 
 
 def test_what_few_runs_leave_open_is_open_for_rivals_too():
@@ -27,3 +28,12 @@ def test_a_cause_that_no_finding_that_matters_has_is_marked():
     assert not any(one.folded_away for one in folded(said.causes, said.findings))
     little = [replace(one, matters=False) for one in said.findings]
     assert all(one.folded_away for one in folded(said.causes, little))
+
+
+def test_a_guess_beside_a_likely_cause_adds_no_joint_to_what_is_said_of_the_family():
+    cause = document("ambiguous").causes[0]
+    of_both = [
+        replace(cause, joints=(joint,), confidence=sure) for joint, sure in (("joint_1", 0.04), ("joint_2", 0.7))
+    ]
+    assert _joints(arm(3), of_both, likely=0.5) == ("joint_2",)
+    assert _joints(arm(3), of_both, likely=0.9) == ("joint_1", "joint_2")

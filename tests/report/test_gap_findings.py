@@ -73,6 +73,13 @@ def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> 
     )
 
 
+def test_guesses_beside_a_likely_cause_are_counted() -> None:
+    three = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.3), ("backlash", 0.1)), (("lag", 0.04),)))
+    assert said("attributed", three) == (
+        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction (90 %), beside 2 guesses."
+    )
+
+
 def test_guesses_alone_are_said_to_be_guesses() -> None:
     one = {"members": ((("payload", 0.4),),)}
     guesses = [finding("load", confidence=0.4, **one), finding("sensing", confidence=0.2, **one)]

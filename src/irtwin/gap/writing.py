@@ -16,7 +16,7 @@ from irtwin.gap.document import document
 from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
-from irtwin.gap.isolation.branches import Branch, branches
+from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals, where_runs_are_few
 from irtwin.gap.isolation.detectability import Untestable
@@ -112,12 +112,14 @@ def findings(
     """Return the causes as a tree, the branch that closes most first; `named`: every cause with its id."""
     of_all = [(channel, branch) for channel in channels for branch in branches(channel)]
     of_all.sort(key=lambda pair: -pair[1].closing.size)
-    joints = [_joints(robot, branch) for _, branch in of_all]
-    ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
     written = {cause.id: cause for cause in causes}
+    own_of_all = [
+        [written[next(name for _, one, name in named if one is each)] for each in branch.causes] for _, branch in of_all
+    ]
+    joints = [_joints(robot, own, limits.verdict.likely) for own in own_of_all]
+    ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
     found = []
-    for (channel, branch), on, name in zip(of_all, joints, ids, strict=True):
-        own = [written[next(name for _, one, name in named if one is each)] for each in branch.causes]
+    for (channel, branch), own, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
         members = [_members(cause, limits.confidence) for cause in own]
         likely = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
         found.append(
@@ -144,8 +146,10 @@ def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding
     return tuple(one if one.id in told else replace(one, folded_away=True) for one in causes)
 
 
-def _joints(robot: Robot, branch: Branch) -> tuple[str, ...]:
-    touched = {joint for cause in branch.causes for joint in cause.touched(robot)}
+def _joints(robot: Robot, causes: Sequence[document.Cause], likely: float) -> tuple[str, ...]:
+    """Return the joints of the causes that are likely; of all, where none is."""
+    told = [cause for cause in causes if cause.confidence >= likely] or causes
+    touched = {joint for cause in told for joint in cause.joints}
     return tuple(joint for joint in robot.joint_names if joint in touched)
 
 

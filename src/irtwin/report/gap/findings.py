@@ -52,15 +52,18 @@ class Finding:
 
     @property
     def effects(self) -> str:
-        """The causes with their confidences, each with its alternatives."""
-        return " and ".join(" or ".join(_with(*one) for one in some) for some in self.members)
+        """The causes with their confidences, each with its alternatives; beside likely ones, guesses are counted."""
+        told = [some for some in self.members if _together(some) >= _LIKELY] or self.members
+        guesses = len(self.members) - len(told)
+        beside = f", beside {guesses} {'guess' if guesses == 1 else 'guesses'}" if guesses else ""
+        return wording.listed([" or ".join(_with(*one) for one in some) for some in told]) + beside
 
     @property
     def sentence(self) -> str:
         """The whole finding; a guess without its effects, unless one of them is likely."""
         sure = f"({wording.share(self.confidence)} sure)"
         if not self.likely:
-            one_of = any(sum(chance for _, chance in some) >= _LIKELY for some in self.members)
+            one_of = any(_together(some) >= _LIKELY for some in self.members)
             return f"{self.claim} {sure}" + (f": {self.effects}" if one_of else "")
         if [chance for some in self.members for _, chance in some] == [self.confidence]:
             return f"{self.claim}: {self.members[0][0][0]} {sure}"
@@ -157,6 +160,10 @@ def counted(findings: Sequence[Finding]) -> str:
     for one in findings:
         of_channel.setdefault(one.channel, []).append(one.share)
     return wording.listed([folded(len(shares), channel, sum(shares)) for channel, shares in of_channel.items()])
+
+
+def _together(alternatives: Sequence[Alternative]) -> float:
+    return sum(chance for _, chance in alternatives)
 
 
 def _with(name: str, confidence: float) -> str:
