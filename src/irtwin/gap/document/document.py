@@ -147,10 +147,10 @@ class Member:
 class Finding:
     """The answer one level up: causes of one family and scope whose joints overlap, in one channel.
 
-    `joints` none: of the whole robot; `confidence`: that the family is right, at least that of any of its causes;
-    `share` of the channel's gap that they close together on groups left out, `share_of` says of what;
-    `matters`: whether that is worth a word of its own. Members of several causes are all there, those of one cause are
-    alternatives.
+    `joints`: those of the causes that are likely, of all where none is; none: of the whole robot. `confidence`: that
+    the family is right, at least that of any of its causes; `share` of the channel's gap that they close together on
+    groups left out, `share_of` says of what; `matters`: whether that is worth a word of its own. Members of several
+    causes are all there, those of one cause are alternatives.
     """
 
     id: str
