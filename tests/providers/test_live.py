@@ -39,6 +39,9 @@ NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {
     irt:Superseded_States ?superseded ; irt:has_Joint_State ?joint .
   ?joint irt:of_Joint <https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/joint_a1> ; irt:Joint_Position ?q }"""
 
+TOOK_PLACE = """SELECT ?start ?end WHERE {
+  ?run a irt:Live_Run ; prov:startedAtTime ?start OPTIONAL { ?run prov:endedAtTime ?end } }"""
+
 
 @pytest.fixture
 def place(tmp_path: Path) -> Iterator[Workspace]:
@@ -99,6 +102,7 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
         assert (row["state"], row["q"]) == ("moving", pytest.approx(math.sin(0.99)))
         assert row["superseded"] == twin.superseded <= 99
         assert graph.query("ASK { ?run irt:run_of id:robot\\/KUKA_KR6_R700 ; a irt:Live_Run }")[0]["answer"]
+        assert [row["start"].timestamp() for row in graph.query(TOOK_PLACE) if row["end"] is None] == [NOON]
         for number in range(100, 130):
             standing = ((1.0, 0.5), (0.0, 0.0), UNSAID, UNSAID, (math.nan,))
             twin.receive(State(rows.ROBOT, NOON + 0.01 * number, standing))
@@ -123,6 +127,8 @@ def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: Knowledg
     np.testing.assert_array_equal(table["power"].to_numpy(), 400.0 + np.arange(500))
     assert (run.sample_count, run.sample_rate_hz) == (500, pytest.approx(100.0))
     assert quads(graph) == mapped(place)
+    (row,) = graph.query(TOOK_PLACE)
+    assert [row[at].timestamp() for at in ("start", "end")] == pytest.approx([NOON, NOON + 4.99], abs=1e-6)
     assert shown <= quads(graph)  # what was shown last is what the run ended with
     (taken,) = graph.query(
         "SELECT ?e ?from { ?run irt:Energy_Consumption ?e ; irt:Energy_From ?from ; irt:State_Time ?at }"

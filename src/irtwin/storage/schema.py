@@ -153,6 +153,8 @@ class Run(Base):
     cycles: Mapped[int | None]  # how often its programme ran
     start_time: Mapped[datetime | None]  # the log's `started`, else when it was taken in; a plan has none
     start_time_from: Mapped[str | None]  # "log" or "ingest"
+    started: Mapped[datetime | None]  # as an activity: none where nobody knows when it was, and of a plan
+    ended: Mapped[datetime | None]  # none while it lasts, too
     run_time_s: Mapped[float]
     sample_count: Mapped[int]
     sample_rate_hz: Mapped[float | None]  # none of a single sample
