@@ -191,12 +191,11 @@ class Activity(Base):
 
 
 def relation_to(read: str) -> str:
-    """Return the term of PROV that leads from an activity to what it read, by an IRI whole or below the base.
+    """Return the term of PROV that leads from an activity to what it read, by its IRI below the workspace's base.
 
     A run is an activity too, and no entity.
     """
-    is_run = read.startswith("run/") or ("://" in read and "/run/" in read)
-    return "wasInformedBy" if is_run else "used"
+    return "wasInformedBy" if read.startswith("run/") else "used"
 
 
 class ActivityUse(Base):
