@@ -44,8 +44,9 @@ TOOK_PLACE = """SELECT ?start ?end WHERE {
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Iterator[Workspace]:
-    with Workspace(tmp_path) as place:
+def place(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Workspace]:
+    on_server = getattr(request, "param", False)
+    with Workspace(tmp_path, request.getfixturevalue("new_postgresql_database")() if on_server else None) as place:
         place.ingest(*rows.data_set())
         yield place
 
@@ -110,7 +111,11 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
         assert len(graph.query(NOW)) == 1
 
 
-@pytest.mark.parametrize("said", [True, False])
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [(False, True), (False, False), pytest.param(True, True, marks=pytest.mark.system)],
+    indirect=["place"],
+)
 def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: KnowledgeGraph, said: bool) -> None:
     with LiveTwin(place, graph) as twin:
         for number in range(500):
@@ -182,6 +187,7 @@ def test_a_run_of_a_crash_outlasts_its_plan(place: Workspace, graph: KnowledgeGr
     assert (live_run(place).performs, live_run(place).sample_count) == (None, 5)
 
 
+@pytest.mark.parametrize("place", [False, pytest.param(True, marks=pytest.mark.system)], indirect=True)
 def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: KnowledgeGraph) -> None:
     with LiveTwin(place, graph) as twin:
         twin.receive(state(0))
