@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from typing import Any
 
@@ -67,6 +67,8 @@ def run(name: str, **changes: Any) -> Run:
         "repeat_of": None,
         "start_time": NOON,
         "start_time_from": "log",
+        "started": NOON,
+        "ended": NOON + timedelta(seconds=1.0),
         "run_time_s": 1.0,
         "sample_count": 5,
         "sample_rate_hz": 4.0,

@@ -223,7 +223,8 @@ def _runs() -> Iterator[Base]:
             product=product, pieces=pieces, cycles=cycles,
             run_id=run_id, robot_id=robot, name=name, kind="Measured_Run", role="observed", payload_kg=payload,
             payload_com_x_m=0.0, payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id),
-            performs=performs.get(run_id), start_time=_moment(start), start_time_from="log", run_time_s=seconds,
+            performs=performs.get(run_id), start_time=_moment(start), start_time_from="log",
+            started=_moment(start), ended=_moment(start) + timedelta(seconds=seconds), run_time_s=seconds,
             sample_count=int(100 * seconds), sample_rate_hz=100.0, file=f"runs/{name}.csv", sha256=f"log of {run_id}",
         )  # fmt: skip
         yield schema.Series(
@@ -324,6 +325,7 @@ def _live_runs() -> Iterator[Base]:
         yield schema.Run(
             run_id=run_id, robot_id=robot, name=name, kind="Live_Run", payload_kg=payload, payload_com_x_m=0.0,
             payload_com_y_m=0.0, payload_com_z_m=0.0, start_time=_moment(start), start_time_from="log",
+            started=_moment(start), ended=_moment(start) + timedelta(seconds=seconds) if stream == "ended" else None,
             run_time_s=seconds, sample_count=int(100 * seconds), sample_rate_hz=100.0,
             file=f"series/{run_id}.parquet", sha256=f"log of {run_id}",
         )  # fmt: skip

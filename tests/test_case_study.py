@@ -13,6 +13,7 @@ from irtwin import case_study
 from irtwin.asking import ask
 from irtwin.errors import InputError
 from irtwin.planning.plan import Plan
+from irtwin.report.case_study.page import individuals
 from irtwin.report.wording import percent
 from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
@@ -67,6 +68,12 @@ def test_the_page_shows_the_individual_and_both_configurations(text: str) -> Non
         assert property_ in text
     assert "joint_a2 −90.0° −45.0°" in text and "joint_a6 0.0° 90.0°" in text
     assert "The measurement is simulated." in text
+
+
+def test_individuals_are_named_below_the_workspaces_base() -> None:
+    base = "https://plant.example/energy/"
+    rows = [{"individual": f"{base}run/{name}", "class": "run", "property": "x"} for name in ("a", "a", "b")]
+    assert [(name, len(its)) for name, _, its in individuals(rows, base)] == [("run/a", 2), ("run/b", 1)]
 
 
 def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:

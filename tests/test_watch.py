@@ -79,6 +79,15 @@ def test_a_signal_ends_the_watching_and_nothing_is_lost(workspace: Path) -> None
     assert not list((workspace / "live").iterdir())
 
 
+def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(workspace: Path) -> None:
+    template = workspace / "reports" / "energy" / "page.html.jinja"
+    template.parent.mkdir(parents=True)
+    template.write_text("{% if %}", encoding="utf-8")
+    refused = in_this_process("live", "--workspace", workspace)
+    assert refused.status == 2
+    assert f"{template}, line 1: " in refused.err
+
+
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
     for command in (["live"], ["backup", tmp_path / "a.zip"]):
         refused = in_this_process(*command, "--workspace", tmp_path / "none")

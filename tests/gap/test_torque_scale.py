@@ -84,6 +84,17 @@ def test_where_the_uncertainty_comes_from():
     assert (stated.source, stated.uncertainty) == ("stated", 0.05)
 
 
+def test_constants_that_power_told_are_not_nominal_and_power_does_not_count_again():
+    data = logged(1.0, power=True)
+    runs = tuple(replace(run, signals=replace(run.signals, torque=None)) for run in data.runs)
+    motions = [condition(run, ROBOT, 10.0) for run in data.runs]
+    for simulated in (False, True):
+        of_currents = replace(data, runs=runs, simulated=simulated)
+        found = torque_scale(of_currents, motions, lambda motion: motion.torque, LIMITS)
+        assert (found.source, found.uncertainty, found.low, found.high) == ("assumed", 0.1, 1 / 1.1, 1 / 0.9)
+        assert found.why.endswith("10 %: power tells the torque constants, joint by joint")
+
+
 @pytest.mark.parametrize("gain", [0.92, 1.0, GAIN])
 def test_power_on_the_bus_narrows_the_scale(gain):
     data = logged(gain, power=True)

@@ -8,7 +8,8 @@ from pathlib import Path
 from pyoxigraph import BlankNode, NamedNode, Triple
 
 from irtwin.knowledge.store.blank_nodes import has_blank_node, same
-from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.rdf_input import read_turtle
 
 A, P = NamedNode("https://example.org/a"), NamedNode("https://example.org/p")
 

@@ -7,8 +7,9 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Quad
 from tests.individuals import individual
 
 from irtwin.errors import InputError
-from irtwin.knowledge.store import graph as graph_module
-from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.store import table
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, term
 
 A, B = "https://example.org/g/a", "https://example.org/g/b"
@@ -136,7 +137,7 @@ def test_what_is_no_query_is_refused(graph: KnowledgeGraph, text: str) -> None:
 
 
 def test_too_many_answers_are_refused(graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(graph_module, "MOST_ROWS", 10)
+    monkeypatch.setattr(table, "MOST_ROWS", 10)
     with pytest.raises(InputError, match="add a LIMIT"):
         graph.query("SELECT * { ?s ?p ?o }")
     assert len(graph.query("SELECT * { ?s ?p ?o } LIMIT 10")) == 10

@@ -10,7 +10,8 @@ from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
 from irtwin.knowledge.reasoning import asserted, reason
 from irtwin.knowledge.rules.running import infer
-from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,

@@ -24,9 +24,11 @@ RUN = f"id:run\\/{rows.ROBOT}.work"
 
 
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[KnowledgeGraph]:
+def graph(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Iterator[KnowledgeGraph]:
     folder = tmp_path_factory.mktemp("workspace")
-    with Workspace(folder) as place, KnowledgeGraph(place.graph_folder) as graph:
+    on_server = getattr(request, "param", False)
+    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
+    with Workspace(folder, url) as place, KnowledgeGraph(place.graph_folder) as graph:
         robot, joints, runs, series = rows.data_set()
         series[f"{rows.ROBOT}.work"] = pa.table({"time": TIME, "power": POWER})
         place.ingest(robot, joints, runs, series)
@@ -70,6 +72,7 @@ def test_samples_come_as_json(graph: KnowledgeGraph) -> None:
     assert table[0]["kind"].endswith("#JSON")
 
 
+@pytest.mark.parametrize("graph", [False, pytest.param(True, marks=pytest.mark.system)], indirect=True)
 def test_functions_work_within_patterns_sums_and_filters(graph: KnowledgeGraph) -> None:
     found = graph.query("SELECT ?run { ?run a irt:IR_RunProcess FILTER(series:max(?run, 'power', 0, 1e6) > 250) }")
     assert [run["run"].rpartition(".")[2] for run in found] == ["work"]

@@ -7,7 +7,8 @@ from pyoxigraph import Quad, RdfFormat, Store, parse
 
 from irtwin.knowledge.shacl.of_ontology import with_ontology
 from irtwin.knowledge.shacl.suspects import any_suspect, queries
-from irtwin.knowledge.store.graph import KnowledgeGraph, read_turtle
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.rdf_input import read_turtle
 
 PREFIXES = """
 @prefix ex: <https://example.org/> . @prefix sh: <http://www.w3.org/ns/shacl#> .

@@ -39,10 +39,14 @@ NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {
     irt:Superseded_States ?superseded ; irt:has_Joint_State ?joint .
   ?joint irt:of_Joint <https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/joint_a1> ; irt:Joint_Position ?q }"""
 
+TOOK_PLACE = """SELECT ?start ?end WHERE {
+  ?run a irt:Live_Run ; prov:startedAtTime ?start OPTIONAL { ?run prov:endedAtTime ?end } }"""
+
 
 @pytest.fixture
-def place(tmp_path: Path) -> Iterator[Workspace]:
-    with Workspace(tmp_path) as place:
+def place(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Workspace]:
+    on_server = getattr(request, "param", False)
+    with Workspace(tmp_path, request.getfixturevalue("new_postgresql_database")() if on_server else None) as place:
         place.ingest(*rows.data_set())
         yield place
 
@@ -99,6 +103,7 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
         assert (row["state"], row["q"]) == ("moving", pytest.approx(math.sin(0.99)))
         assert row["superseded"] == twin.superseded <= 99
         assert graph.query("ASK { ?run irt:run_of id:robot\\/KUKA_KR6_R700 ; a irt:Live_Run }")[0]["answer"]
+        assert [row["start"].timestamp() for row in graph.query(TOOK_PLACE) if row["end"] is None] == [NOON]
         for number in range(100, 130):
             standing = ((1.0, 0.5), (0.0, 0.0), UNSAID, UNSAID, (math.nan,))
             twin.receive(State(rows.ROBOT, NOON + 0.01 * number, standing))
@@ -106,7 +111,11 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
         assert len(graph.query(NOW)) == 1
 
 
-@pytest.mark.parametrize("said", [True, False])
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [(False, True), (False, False), pytest.param(True, True, marks=pytest.mark.system)],
+    indirect=["place"],
+)
 def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: KnowledgeGraph, said: bool) -> None:
     with LiveTwin(place, graph) as twin:
         for number in range(500):
@@ -123,6 +132,8 @@ def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: Knowledg
     np.testing.assert_array_equal(table["power"].to_numpy(), 400.0 + np.arange(500))
     assert (run.sample_count, run.sample_rate_hz) == (500, pytest.approx(100.0))
     assert quads(graph) == mapped(place)
+    (row,) = graph.query(TOOK_PLACE)
+    assert [row[at].timestamp() for at in ("start", "end")] == pytest.approx([NOON, NOON + 4.99], abs=1e-6)
     assert shown <= quads(graph)  # what was shown last is what the run ended with
     (taken,) = graph.query(
         "SELECT ?e ?from { ?run irt:Energy_Consumption ?e ; irt:Energy_From ?from ; irt:State_Time ?at }"
@@ -176,6 +187,7 @@ def test_a_run_of_a_crash_outlasts_its_plan(place: Workspace, graph: KnowledgeGr
     assert (live_run(place).performs, live_run(place).sample_count) == (None, 5)
 
 
+@pytest.mark.parametrize("place", [False, pytest.param(True, marks=pytest.mark.system)], indirect=True)
 def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: KnowledgeGraph) -> None:
     with LiveTwin(place, graph) as twin:
         twin.receive(state(0))

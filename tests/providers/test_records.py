@@ -3,6 +3,7 @@
 import re
 import unicodedata
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -38,15 +39,23 @@ def data_set(*runs: Run) -> DataSet:
     return DataSet(Path(), robot, runs, ("rigid_body",), 21.0, "mains", True, {"note": "kept"})
 
 
-def test_a_data_set_comes_back_as_it_was(tmp_path):
-    first = run()
+@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
+def test_a_data_set_comes_back_as_it_was(on_server, tmp_path, request):
+    first = run(started=datetime(2026, 3, 1, 13, 0, 0, 250_001, timezone(timedelta(hours=1))))
     second = run("second", repeat_of="first")
-    with Workspace(tmp_path) as workspace:
+    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
+    with Workspace(tmp_path, url) as workspace:
         assert ingest(workspace, data_set(second, first)) == "new"
         assert ingest(workspace, data_set(second, first)) == "unchanged"
         robot = load_robot(workspace, identifier("One arm"))
         assert robot == replace(data_set(first).robot)
         back = load_run(workspace, robot, f"{identifier('One arm')}.second")
+        with workspace.reading() as session:
+            said = session.get_one(Row, f"{identifier('One arm')}.first")
+            unsaid = session.get_one(Row, f"{identifier('One arm')}.second")
+    began = datetime(2026, 3, 1, 12, 0, 0, 250_001, UTC)
+    assert (said.started, said.ended) == (began, began + timedelta(seconds=1))
+    assert (unsaid.started, unsaid.ended, unsaid.start_time_from) == (None, None, "ingest")
     assert (back.name, back.payload_mass, back.payload_com, back.repeat_of) == ("second", 1.5, (0.0, 0.1, 0.2), "first")
     assert np.array_equal(back.signals.q, first.signals.q)
     assert np.array_equal(back.signals.torque, first.signals.torque)

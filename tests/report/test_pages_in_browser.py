@@ -47,6 +47,8 @@ def test_the_energy_page(browser: Any, energy: Path) -> None:
         assert is_dark(page) == (scheme == "dark")
         assert page.evaluate("document.documentElement.scrollWidth") == width
         assert faults(page) == [], (width, scheme)
+        cut = "all => all.filter(it => it.offsetWidth > it.closest('.table').clientWidth).map(it => it.innerText)"
+        assert page.eval_on_selector_all(".table caption", cut) == []
         buttons = page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
         assert set(buttons) == {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
         names = page.locator("#figure-torque .legendtext").all_text_contents()

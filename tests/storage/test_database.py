@@ -125,6 +125,28 @@ def test_a_provider_replaces_what_it_made_of_the_same_subject(workspace: Workspa
         assert set(session.scalars(select(Activity.activity_id))) == {"state.2", "state.3", "twin.1", "energy.1"}
 
 
+def test_a_run_is_dropped_alone(workspace: Workspace) -> None:
+    populate(workspace)
+    again = f"{rows.ROBOT}.again"
+    workspace.replace_activity(rows.activity("state.5", "other", f"run/{again}"), ["series"], [])
+    workspace.drop_run(again, f"run/{again}")
+    with workspace.reading() as session:
+        assert session.scalars(select(Run.run_id)).all() == [WORK]
+        assert set(session.scalars(select(Series.run_id))) == {WORK}
+        assert session.get(Activity, "state.5") is None
+
+
+def test_what_an_activity_read_is_named_below_the_base_and_a_run_informed_it(workspace: Workspace) -> None:
+    populate(workspace)
+    elsewhere = "https://other.example/run/1"
+    read = [f"{workspace.base}run/{WORK}", f"{workspace.base}twin/t", elsewhere]
+    workspace.replace_activity(rows.activity("state.4", "other", "run"), read, [])
+    with workspace.reading() as session:
+        uses = select(ActivityUse.entity, ActivityUse.relation).where(ActivityUse.activity_id == "state.4")
+        found = dict(map(tuple, session.execute(uses)))
+    assert found == {f"run/{WORK}": "wasInformedBy", "twin/t": "used", elsewhere: "used"}
+
+
 def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace) -> None:
     populate(workspace)
     assert workspace.read_series(WORK, "modelled").equals(rows.samples(9))

@@ -8,13 +8,14 @@ import os
 import shutil
 import subprocess
 import sys
+from datetime import timedelta
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 from alembic.migration import MigrationContext
 from alembic.operations import Operations
-from sqlalchemy import create_engine, insert, inspect, text
+from sqlalchemy import create_engine, insert, inspect, select, text
 from tests.rows import activity, data_set
 
 from irtwin.errors import InputError
@@ -30,9 +31,10 @@ from irtwin.storage.revisions.versions import (
     r0005_units_and_relations,
     r0006_notes_of_robots,
     r0007_scale_of_torque,
+    r0008_times_of_runs,
 )
 from irtwin.storage.rows import values
-from irtwin.storage.schema import Activity, Base
+from irtwin.storage.schema import Activity, Base, Run
 
 BEFORE = migration.newest()
 # As a later irtwin would have it: runs have got the column `sample_rate_hz`.
@@ -74,7 +76,7 @@ def digest() -> str:
 
 
 AFTER_0_1 = {  # columns that revisions have added
-    "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles"),
+    "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles", "started", "ended"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
     "gap_diagnosis": ("unexplained_because",),
     "gap_cause": ("p_remembered", "part_that_repeats", "first_half_shows_it", "last_half_shows_it"),
@@ -133,6 +135,7 @@ def test_each_revision_follows_another() -> None:
     assert r0003_made_and_slower.down_revision == r0002_base_of_individuals.revision
     assert r0004_halves_of_the_time.down_revision == r0003_made_and_slower.revision
     assert r0007_scale_of_torque.down_revision == r0006_notes_of_robots.revision
+    assert r0008_times_of_runs.down_revision == r0007_scale_of_torque.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -171,6 +174,8 @@ def test_a_workspace_of_0_1_gets_the_tables_of_now(
         keys = {one["constrained_columns"][0] for one in inspect(connection).get_foreign_keys("run")}
         assert keys == {"robot_id", "repeat_of", "performs", "time_scaling_of"}
         assert connection.execute(text("SELECT count(*) FROM run")).scalar() == len(data_set()[2])
+        of_runs = connection.execute(select(Run.started, Run.ended, Run.start_time, Run.run_time_s)).all()
+        assert [run[:2] for run in of_runs] == [(start, start + timedelta(seconds=s)) for *_, start, s in of_runs]
 
 
 def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ import json
 import shutil
 import subprocess
 import time
+import warnings
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy import ndimage
+from tests.system.ros_facts import facts
 from tests.system.ros_screen import HEIGHT, WIDTH, screen, started
 
 from irtwin import resources
@@ -27,6 +30,7 @@ from irtwin.signals.samples import read_signals
 PEER = Path(__file__).parent / "ros_peer.py"
 PACKAGE = "kuka_kr6_r700_description"
 LAUNCHED = 120.0  # s until RViz shows the robot, at most
+STARTED = 60.0  # s until RViz draws anything, at most: it takes 2 to 7
 GREY = 48  # RViz' background
 ALIKE = 0.95  # of where the robot is drawn and where it is to be, what both have
 FIELD = np.pi / 4  # rad: RViz' field of view, upright
@@ -125,35 +129,66 @@ def view_of(file: Path) -> dict[str, float]:
     return {word[0]: float(word[1]) for word in words if word[0] in names}
 
 
+@dataclass(frozen=True)
+class Shown:
+    """The last picture of RViz while ROS played a bag, what ROS said and wrote meanwhile, and facts for who is lost."""
+
+    picture: np.ndarray
+    said: Path
+    copy: Path
+    facts: str
+
+    @property
+    def by_rviz(self) -> bool:
+        """Whether RViz has drawn at all: else the screen is black, or has a dialog or a splash in its midst."""
+        return has_background(self.picture)
+
+
+def has_background(picture: np.ndarray) -> bool:
+    """Whether most of a picture is RViz' background."""
+    return float((~drawn(picture)).mean()) > 0.5
+
+
+def played(folder: Path, package: Path, bag: Path, awaited: np.ndarray) -> Shown:
+    """Play a bag on a screen of its own until RViz shows what is awaited, or the time is over."""
+    folder.mkdir()
+    said, copy = folder / "said.json", folder / "copy.bag"
+    with screen(folder, package.parent) as peer:
+        launch = ["roslaunch", "-p", str(peer.port), PACKAGE, "display.launch", "sliders:=false"]
+        with started([*launch, "rviz_args:=--fullscreen"], peer.environment, folder / "launch.log"):
+            replay = ["/usr/bin/python3", str(PEER), str(bag), str(copy), str(said), "base_link", "flange"]
+            with started(replay, peer.environment, folder / "replay.log"):
+                began = time.monotonic()
+                picture = peer.picture()
+                while overlap(drawn(picture), awaited) < ALIKE or not said.exists():
+                    if time.monotonic() - began > (LAUNCHED if has_background(picture) else STARTED):
+                        break
+                    time.sleep(0.5)
+                    picture = peer.picture()
+                return Shown(picture, said, copy, facts(peer, picture, folder, package))
+
+
 def test_rviz_shows_the_robot_in_the_runs_last_pose(robot: Robot, run: Signals, tmp_path: Path) -> None:
     package = tmp_path / "packages" / "kr6"
     write_package(robot, package)
-    bag, copy = tmp_path / "run.bag", tmp_path / "copy.bag"
-    told = tmp_path / "said.json"
+    bag = tmp_path / "run.bag"
     write_bag(bag, robot, run, datetime(2026, 3, 2, tzinfo=UTC))
     last = run.q[-1]
-    with screen(tmp_path, package.parent) as peer:
-        launch = ["roslaunch", "-p", str(peer.port), PACKAGE, "display.launch", "sliders:=false"]
-        with started([*launch, "rviz_args:=--fullscreen"], peer.environment, tmp_path / "launch.log"):
-            replay = ["/usr/bin/python3", str(PEER), str(bag), str(copy), str(told), "base_link", "flange"]
-            with started(replay, peer.environment, tmp_path / "replay.log"):
-                view = view_of(package / "rviz" / "KUKA_KR6_R700.rviz")
-                awaited = expected(robot, last, view)
-                ends = time.monotonic() + LAUNCHED
-                while (overlap(shown := drawn(peer.picture()), awaited) < ALIKE or not told.exists()) and (
-                    time.monotonic() < ends
-                ):
-                    time.sleep(0.5)
-    logs = [(tmp_path / name).read_text(errors="replace")[-2000:] for name in ("replay.log", "launch.log")]
-    assert told.exists(), logs
-    said = json.loads(told.read_text())
+    view = view_of(package / "rviz" / "KUKA_KR6_R700.rviz")
+    awaited = expected(robot, last, view)
+    shown = played(tmp_path / "1", package, bag, awaited)
+    if not shown.by_rviz:  # seen once, on a busy machine, though ROS was well; why is not known
+        warnings.warn(f"RViz has drawn nothing and is started again: {shown.facts}", stacklevel=1)
+        shown = played(tmp_path / "2", package, bag, awaited)
+    assert shown.said.exists(), shown.facts
+    said = json.loads(shown.said.read_text())
     assert (said["messages"], said["topics"][:2]) == (8 * len(run.time), ["/joint_states", "/power"])
     assert said["seconds"] == pytest.approx(run.time[-1] - run.time[0], abs=1e-6)
     (flange,) = placements(robot, last[None])
     assert said["translation"] == pytest.approx(flange[:3, 3], abs=1e-9)
     assert pin.Quaternion(np.array(said["rotation"])).matrix() == pytest.approx(flange[:3, :3], abs=1e-9)
-    assert overlap(shown, awaited) >= ALIKE, logs
-    assert overlap(shown, expected(robot, run.q[0], view)) < 0.7  # the measure tells poses apart
-    signals, _ = read_signals(copy, robot)  # as ROS wrote it, compressed
+    assert overlap(drawn(shown.picture), awaited) >= ALIKE, shown.facts
+    assert overlap(drawn(shown.picture), expected(robot, run.q[0], view)) < 0.7  # the measure tells poses apart
+    signals, _ = read_signals(shown.copy, robot)  # as ROS wrote it, compressed
     assert np.array_equal(signals.q, run.q)
     assert run.power is not None and np.array_equal(signals.power, run.power)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -10,14 +11,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests import rows, small_robots
+from tests import rows, small_robots, test_plans
+from tests.data_sets import irtwin as in_this_process
 from tests.memory_s3 import forget
 from tests.s3_server import KEYS, checking_keys, s3_server
 from tests.sparql_servers import Running
 from tests.storage.test_database import WORK, populate, state
 
+from irtwin import workflow
 from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import shorten
+from irtwin.live.joint_stream import State
+from irtwin.live.live_twin import LiveTwin
 from irtwin.storage import object_storage
 from irtwin.storage.database import Workspace
 from irtwin.storage.object_storage import ObjectStorage
@@ -128,6 +134,38 @@ def test_a_run_from_end_to_end(bucket: str, tmp_path: Path) -> None:
     for file in (tmp_path / "wörk shop").rglob("*"):
         if file.is_file():
             assert KEYS["AWS_SECRET_ACCESS_KEY"].encode() not in file.read_bytes()
+
+
+def test_a_run_that_is_watched_goes_there(bucket: str, tmp_path: Path, server: Running) -> None:
+    with Workspace(tmp_path, series_url=bucket) as place, KnowledgeGraph.of_workspace(place) as graph:
+        populate(place)
+        before = ObjectStorage(bucket).paths("series")
+        with LiveTwin(place, graph) as twin:
+            for step in range(20):
+                twin.receive(State(rows.ROBOT, 1e9 + 0.1 * step, ((step, 0), *[(math.nan, math.nan)] * 3, (100.0,))))
+        assert len(ObjectStorage(bucket).paths("series") - before) == 1
+        (mean,) = graph.query("SELECT (series:mean(?run, 'power', 0, 1) AS ?watts) { ?run a irt:Live_Run }")
+        assert mean["watts"] == pytest.approx(100.0)
+    with checking_keys(server):
+        refused = in_this_process("live", "--workspace", tmp_path)
+    assert (refused.status, refused.out) == (2, "")
+    assert "the server refuses these keys" in refused.err
+
+
+@pytest.mark.nightly
+def test_plans_and_better_twins_go_there(bucket: str, tmp_path: Path) -> None:
+    workspace, reach = tmp_path / "w", tmp_path / "reach.parquet"
+    workflow.run(test_plans.write(tmp_path / "logs", test_plans.recorded()), workspace, series_url=bucket)
+    before = ObjectStorage(bucket).paths("series")
+    planned = in_this_process("plan", "arm_2", *test_plans.GOAL, "--workspace", workspace, "--out", reach)
+    assert planned.status == 0, planned.err
+    assert len(ObjectStorage(bucket).paths("series") - before) == 2  # as planned and as modelled
+    done = test_plans.write(tmp_path / "done", [test_plans.carried_out(reach)]) / "runs" / "done.parquet"
+    improved = in_this_process("improve", "arm_2", done, "--workspace", workspace)
+    assert improved.status == 0, improved.err
+    with Workspace.existing(workspace) as place:
+        assert ObjectStorage(bucket).paths("series") == named(place)
+        assert place.read_series("arm_2.done").num_rows > 0
 
 
 def test_keys_that_the_server_does_not_know(bucket: str, tmp_path: Path, server: Running) -> None:

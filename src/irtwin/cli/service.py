@@ -90,6 +90,8 @@ def live(
     the robots at /live.
     """
     from irtwin.live.watch import watch
+    from irtwin.report.extensions import check
+    from irtwin.resources import resources_of
 
     if sum(source is not None for source in (port, replay, rtde)) > 1:
         raise click.UsageError("Give one of --port, --replay and --rtde.")
@@ -99,6 +101,7 @@ def live(
         raise click.UsageError("--speed is for --replay.")
     if performs is not None and robot is None:
         raise click.UsageError("--performs goes with --replay or --rtde; lines of a stream say it by themselves.")
+    check(resources_of(workspace))
     watch(
         workspace,
         database=database,

@@ -23,8 +23,8 @@ from irtwin.knowledge.questions.queries import read_question
 from irtwin.knowledge.rules import swrl
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.rule import SHACL, Rule
-from irtwin.knowledge.store.graph import read_turtle
 from irtwin.knowledge.store.keywords import refuse_service
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL, PREFIXES, shorten
 from irtwin.knowledge.vocabulary import SH as SHACL_TERMS

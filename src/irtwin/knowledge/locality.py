@@ -23,7 +23,7 @@ from rdflib.plugins.sparql.algebra import traverse
 from rdflib.plugins.sparql.parserutils import CompValue
 
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.store.graph import read_turtle
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import PREFIXES, SH
 from irtwin.resources import Files, Resources
 

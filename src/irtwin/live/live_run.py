@@ -87,6 +87,7 @@ def rows(
         **dict(zip(_COM, header.payload_com, strict=True)),
         "start_time": _moment(began),
         "start_time_from": "log",
+        "started": _moment(began),
         "run_time_s": at.time - began,
         "sample_count": count,
         **({} if header.performs is None else {"performs": header.performs}),
@@ -116,7 +117,10 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
     idle = still.all(axis=1)
     tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
     length = at.time - began
-    tables["run"][0] |= {"sample_rate_hz": (len(time) - 1) / length if length else None}
+    tables["run"][0] |= {
+        "ended": _moment(at.time),
+        "sample_rate_hz": (len(time) - 1) / length if length else None,
+    }
     tables["activity"][0] |= {"ended": _moment(at.time)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
     table = columns | {"time": time - began}

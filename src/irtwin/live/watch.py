@@ -20,6 +20,7 @@ from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.providers.records import find_plan, find_robot, load_robot
+from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE
@@ -50,7 +51,8 @@ def watch(
     With `rtde`: what the controller there says of the robot of this name, until a signal comes.
     With `performs`: the first run of that robot carries out the plan of this name.
 
-    Raises InputError for a fault in what extends the workspace, before a sample is read.
+    Raises InputError for a fault in what extends the workspace, or where its series cannot be kept, before a sample is
+    read.
     """
     sys.setswitchinterval(SWITCH)
     refused: Counter[str] = Counter()
@@ -99,9 +101,10 @@ def _alone(place: Workspace, graph_url: str | None) -> AbstractContextManager[No
 
 
 def _checked(place: Workspace) -> Workspace:
-    """Look through what extends the workspace: a fault is said now, not when a run ends."""
+    """Look through what extends the workspace, and for its series' place: a fault is said now, not when a run ends."""
     check(place.resources)
     check_mappings(place.resources, place.engine)
+    series_place.check(place.folder)
     return place
 
 

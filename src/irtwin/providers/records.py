@@ -10,7 +10,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,7 @@ from irtwin.storage.schema import (
     RobotNote,
     Run,
     SourceFile,
+    in_utc,
 )
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
@@ -423,6 +424,7 @@ def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = N
     duration = float(time[-1] - time[0])
     x, y, z = run.payload_com
     planned = run.role == log.PLANNED
+    began = None if planned or run.started is None else in_utc(run.started)
     return Run(
         run_id=f"{robot_id}.{identifier(run.name)}",
         robot_id=robot_id,
@@ -440,8 +442,10 @@ def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = N
         product=run.product,
         pieces=run.pieces,
         cycles=run.cycles,
-        start_time=None if planned else run.started or now,
-        start_time_from=None if planned else "log" if run.started else "ingest",
+        start_time=None if planned else began or now,
+        start_time_from=None if planned else "log" if began else "ingest",
+        started=began,
+        ended=None if began is None else began + timedelta(seconds=duration),
         run_time_s=duration,
         sample_count=len(time),
         sample_rate_hz=(len(time) - 1) / duration,

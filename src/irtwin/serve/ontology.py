@@ -10,7 +10,7 @@ from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
 from starlette.requests import Request
 from starlette.responses import Response
 
-from irtwin.knowledge.store.graph import read_turtle
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF
 from irtwin.resources import Resources, folder
 from irtwin.serve import negotiation

@@ -213,7 +213,7 @@ class Workspace:
             row.activity_id = activity.activity_id  # type: ignore[attr-defined]
             if isinstance(row, RunEnergy) and not row.taken_activity_id:
                 row.taken_activity_id = made[-1][0].activity_id
-        uses = {(one.activity_id, entity) for one, read in made for entity in read}
+        uses = {(one.activity_id, entity.removeprefix(self.base)) for one, read in made for entity in read}
         read_rows = [
             ActivityUse(activity_id=of, entity=entity, relation=relation_to(entity)) for of, entity in sorted(uses)
         ]

@@ -153,6 +153,8 @@ class Run(Base):
     cycles: Mapped[int | None]  # how often its programme ran
     start_time: Mapped[datetime | None]  # the log's `started`, else when it was taken in; a plan has none
     start_time_from: Mapped[str | None]  # "log" or "ingest"
+    started: Mapped[datetime | None]  # as an activity: none where nobody knows when it was, and of a plan
+    ended: Mapped[datetime | None]  # none while it lasts, too
     run_time_s: Mapped[float]
     sample_count: Mapped[int]
     sample_rate_hz: Mapped[float | None]  # none of a single sample
@@ -189,12 +191,11 @@ class Activity(Base):
 
 
 def relation_to(read: str) -> str:
-    """Return the term of PROV that leads from an activity to what it read, by an IRI whole or below the base.
+    """Return the term of PROV that leads from an activity to what it read, by its IRI below the workspace's base.
 
     A run is an activity too, and no entity.
     """
-    is_run = read.startswith("run/") or ("://" in read and "/run/" in read)
-    return "wasInformedBy" if is_run else "used"
+    return "wasInformedBy" if read.startswith("run/") else "used"
 
 
 class ActivityUse(Base):

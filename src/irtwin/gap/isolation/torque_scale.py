@@ -39,11 +39,13 @@ def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque, l
     """Return how sure the scale is by what the data set states, and by power where that tells more.
 
     motions: observed, filtered alike; torque: the real joint torque that explains what was logged. Power counts where
-    it was measured on the DC bus: that of the mains holds the efficiency of a supply.
+    it was measured on the DC bus: that of the mains holds the efficiency of a supply. Nor does it count twice: where
+    the runs say no torque, power told the torque constants.
     """
-    known = _stated(data_set, limits)
+    by_power = bool(data_set.runs) and all(run.signals.torque is None for run in data_set.runs)
+    known = _stated(data_set, by_power, limits)
     with_power = [motion for motion in motions if motion.power is not None]
-    if known.uncertainty == 0 or not with_power or data_set.power_at != "dc_bus":
+    if by_power or known.uncertainty == 0 or not with_power or data_set.power_at != "dc_bus":
         return known
     told = _told_by_power(with_power, torque)
     return known if told is None else _narrowed(known, *told, limits)
@@ -56,10 +58,12 @@ def torque_scale_of(twin: Twin, data_set: DataSet, motions: Sequence[Motion]) ->
     return torque_scale(data_set, motions, twin.joint_torque, DEFAULT.scale_of_torque)
 
 
-def _stated(data_set: DataSet, limits: ScaleOfTorque) -> TorqueScale:
+def _stated(data_set: DataSet, by_power: bool, limits: ScaleOfTorque) -> TorqueScale:
     note = data_set.notes.get("torque")
     if data_set.torque_scale_uncertainty is not None:
         share, source, why = data_set.torque_scale_uncertainty, STATED, "the data set states it"
+    elif by_power:
+        share, source, why = limits.assumed, ASSUMED, "power tells the torque constants, joint by joint"
     elif data_set.simulated:
         share, source, why = 0.0, SIMULATED, "a simulator made it"
     elif isinstance(note, str) and _SENSOR.search(note):

@@ -18,7 +18,8 @@ from irtwin.knowledge.explain.rules import premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph, read_turtle
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_INFERRED,

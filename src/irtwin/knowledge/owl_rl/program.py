@@ -10,7 +10,7 @@ from pyoxigraph import NamedNode
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.rules import Fact, Join, Number, Pattern, Rule, Term, compile_join, read_rules
 from irtwin.knowledge.owl_rl.terms import Terms
-from irtwin.knowledge.store.graph import read_turtle
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import PREFIXES, XSD
 from irtwin.resources import folder
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from irtwin.knowledge.rules import shacl, swrl
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.shacl.shapes import Shapes
-from irtwin.knowledge.store.graph import read_turtle
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.resources import Files, Resources
 
 _SWRL = ".swrl.ttl"

@@ -17,25 +17,23 @@ from pyoxigraph import (
     QueryBoolean,
     QuerySolutions,
     QueryTriples,
-    RdfFormat,
     Store,
     Triple,
-    parse,
 )
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store import changes, store_files
-from irtwin.knowledge.store.blank_nodes import has_blank_node, named_by_content, same
+from irtwin.knowledge.store.blank_nodes import has_blank_node, same
 from irtwin.knowledge.store.column_functions import column_functions
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
-from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.store.reading import KeptAnswers, Reading
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.syntax_error import in_words
-from irtwin.knowledge.store.table import Table, to_python
+from irtwin.knowledge.store.table import Table, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, check, keeping_union
@@ -45,7 +43,6 @@ from irtwin.resources import Resources, resources_of
 if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
-MOST_ROWS = 1_000_000
 _MOST_KEPT = 2_000  # values of an answer that is kept
 _NAMED_AT_ONCE = 5_000  # IRIs in a query
 URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
@@ -288,25 +285,11 @@ class KnowledgeGraph:
         answers = self.answers
         kept = answers.get(text)
         if kept is None:
-            kept = self._table(text)
+            faults: dict[str, None] = {}
+            kept = table_of(self.answer(text, faults=faults), faults)
             if len(kept) * len(kept.columns) <= _MOST_KEPT and not kept.faults:
                 answers.keep(kept, text)
         return Table(kept.columns, tuple(map(dict, kept.rows)), kept.faults)  # rows that may be written to
-
-    def _table(self, text: str) -> Table:
-        faults: dict[str, None] = {}
-        answer = self.answer(text, faults=faults)
-        if isinstance(answer, QueryBoolean):
-            return Table(("answer",), ({"answer": bool(answer)},))
-        if isinstance(answer, QuerySolutions):
-            columns = tuple(variable.value for variable in answer.variables)
-            rows = (
-                {name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in _counted(answer)
-            )
-            return Table(columns, tuple(rows), faults)
-        columns = ("subject", "predicate", "object")
-        found = ((triple.subject, triple.predicate, triple.object) for triple in _counted(answer))
-        return Table(columns, tuple(dict(zip(columns, map(to_python, triple), strict=True)) for triple in found))
 
     @telling
     def construct(self, text: str) -> set[Triple]:
@@ -449,15 +432,6 @@ class KnowledgeGraph:
         return functions | series_functions(self._store, self._workspace, faults)
 
 
-def read_turtle(file: Path) -> Iterator[Triple]:
-    """Read a Turtle file; InputError names the file and the line where it is broken."""
-    content = read_rdf(file, RdfFormat.TURTLE)
-    try:
-        yield from named_by_content((quad.triple for quad in parse(content, format=RdfFormat.TURTLE)), content)
-    except (SyntaxError, MemoryError) as error:
-        refuse(file, error)
-
-
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
     """Say of each triple that it belongs into the named graph, or into the default graph."""
     graph = DefaultGraph() if name is None else NamedNode(name)
@@ -492,10 +466,3 @@ def _graph_name(iri: str) -> NamedNode:
         return NamedNode(iri)
     except ValueError as error:
         raise InputError(f"{iri!r} is not the name of a graph: {error}") from error
-
-
-def _counted(answers: Iterable[Any]) -> Iterator[Any]:
-    for count, answer in enumerate(answers):
-        if count == MOST_ROWS:
-            raise InputError(f"the query has more than {MOST_ROWS:,} answers: add a LIMIT or narrow the query")
-        yield answer

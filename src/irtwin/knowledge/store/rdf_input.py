@@ -7,14 +7,16 @@ square of the depth for nested XML, and overflow the stack on triples that are n
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 from xml.parsers.expat import ErrorString, ExpatError, ParserCreate
 
-from pyoxigraph import RdfFormat
+from pyoxigraph import RdfFormat, Triple, parse
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
+from irtwin.knowledge.store.blank_nodes import named_by_content
 
 _LARGEST = 1_000_000_000  # bytes
 _LONGEST_ENTITY = 200  # characters; Protégé abbreviates IRIs by entities
@@ -30,6 +32,15 @@ def read_rdf(path: Path, form: RdfFormat) -> bytes:
     else:
         _check_triples(path, content)
     return content
+
+
+def read_turtle(file: Path) -> Iterator[Triple]:
+    """Read a Turtle file; InputError names the file and the line where it is broken."""
+    content = read_rdf(file, RdfFormat.TURTLE)
+    try:
+        yield from named_by_content((quad.triple for quad in parse(content, format=RdfFormat.TURTLE)), content)
+    except (SyntaxError, MemoryError) as error:
+        refuse(file, error)
 
 
 def refuse(path: Path, error: SyntaxError | MemoryError) -> NoReturn:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any, overload
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+from pyoxigraph import BlankNode, Literal, NamedNode, QueryBoolean, QuerySolutions, QueryTriples, Triple
 
+from irtwin.errors import InputError
 from irtwin.knowledge.vocabulary import XSD
 
+MOST_ROWS = 1_000_000
 Row = dict[str, Any]  # a variable's Python value, None where it is unbound
 
 _INTEGERS = {XSD + name for name in ("integer", "int", "long", "short", "byte", "nonNegativeInteger", "unsignedInt")}
@@ -43,6 +45,17 @@ class Table(Sequence[Row]):
         return len(self.rows)
 
 
+def table_of(answer: QuerySolutions | QueryBoolean | QueryTriples, faults: Collection[str] = ()) -> Table:
+    """Return an answer as a table; `faults` may be told while its rows are found. InputError where it has too many."""
+    if isinstance(answer, QueryBoolean):
+        return Table(("answer",), ({"answer": bool(answer)},))
+    if isinstance(answer, QuerySolutions):
+        columns = tuple(variable.value for variable in answer.variables)
+        return Table(columns, tuple(_row(columns, solution) for solution in _counted(answer)), faults)
+    columns = ("subject", "predicate", "object")
+    return Table(columns, tuple(_row(columns, triple) for triple in _counted(answer)))
+
+
 def to_python(term: NamedNode | BlankNode | Literal | Triple | None) -> Any:
     """Turn an RDF term into a Python value: an IRI into its text, a literal into number, time, truth or text."""
     if not isinstance(term, Literal):
@@ -62,3 +75,14 @@ def to_python(term: NamedNode | BlankNode | Literal | Triple | None) -> Any:
     except ValueError:  # an ill-typed literal is shown as it is written
         return term.value
     return term.value
+
+
+def _row(columns: Sequence[str], terms: Iterable[Any]) -> Row:
+    return {name: to_python(term) for name, term in zip(columns, terms, strict=True)}
+
+
+def _counted(answers: Iterable[Any]) -> Iterator[Any]:
+    for count, answer in enumerate(answers):
+        if count == MOST_ROWS:
+            raise InputError(f"the query has more than {MOST_ROWS:,} answers: add a LIMIT or narrow the query")
+        yield answer

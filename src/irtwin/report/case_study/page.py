@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
 from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.packing import Fragment, packed_scripts
 from irtwin.report.case_study.figures import figures
 from irtwin.report.energy.page import DrawScene, content_policy, page_data, plotly
 from irtwin.report.explorer import Columns, ReadSeries
-from irtwin.report.questions import Answers, Graph, ask, questions_of
+from irtwin.report.questions import Answers, Row, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import folder, shipped
 from irtwin.storage.files import write
@@ -23,7 +24,7 @@ from irtwin.storage.files import write
 SEED_MODELLED, SEED_MEASURED, SEED_ERROR = 559.59, 598.78, 6.54  # J, J, %
 
 
-def render(graph: Graph, robot_iri: str, read_series: ReadSeries, out: Path, draw_scene: DrawScene) -> None:
+def render(graph: KnowledgeGraph, robot_iri: str, read_series: ReadSeries, out: Path, draw_scene: DrawScene) -> None:
     """Write the page of a robot's plan and the run that carried it out to `out`.
 
     Every number of ours comes from the questions in `reports/case_study`; samples come from the series that they name.
@@ -40,10 +41,11 @@ def render(graph: Graph, robot_iri: str, read_series: ReadSeries, out: Path, dra
         row["of"]: (row["name"], Columns.of(read(row["file"], row["checksum"]))) for row in answers["series"].rows
     }
     scene = draw_scene([series["plan"], series["run"]], 0)
-    write(out, _page(answers, bindings, {name: columns for name, (_, columns) in series.items()}, scene).encode())
+    columns = {name: columns for name, (_, columns) in series.items()}
+    write(out, _page(answers, bindings, columns, scene, graph.base).encode())
 
 
-def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment) -> str:
+def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment, base: str) -> str:
     drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
     scripts = packed_scripts(
         [
@@ -60,7 +62,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
         case=answers["case"].first,
         twin=answers["twin"].first,
         configurations=answers["configurations"].rows,
-        individuals=_individuals(answers),
+        individuals=individuals(answers["individual"].rows, base),
         seed_modelled=SEED_MODELLED,
         seed_measured=SEED_MEASURED,
         seed_error=SEED_ERROR,
@@ -72,7 +74,7 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
     )  # fmt: skip
 
 
-def _individuals(answers: Answers) -> list[tuple[str, str, list[Any]]]:
-    """Return each individual with its class and the rows of its properties."""
-    grouped = groupby(answers["individual"].rows, key=lambda row: (row["individual"], row["class"]))
-    return [(individual, kind, list(rows)) for (individual, kind), rows in grouped]
+def individuals(rows: Sequence[Row], base: str) -> list[tuple[str, str, list[Row]]]:
+    """Return each individual, by its name below the base, with its class and the rows of its properties."""
+    grouped = groupby(rows, key=lambda row: (row["individual"].removeprefix(base), row["class"]))
+    return [(individual, kind, list(its)) for (individual, kind), its in grouped]
