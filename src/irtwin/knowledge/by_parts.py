@@ -7,25 +7,41 @@ over; what was written until then is written anew.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
+from typing import Any
 
-from pyoxigraph import Literal, NamedNode, Quad, Triple
+from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
 
-from irtwin.knowledge import parts
+from irtwin.knowledge import each_part, parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of
 from irtwin.knowledge.owl_rl.beside import Beside, Equality
 from irtwin.knowledge.owl_rl.closure import Contradiction
-from irtwin.knowledge.parts import Borders, Ontology, Region
+from irtwin.knowledge.parts import Borders, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, term
 
-MOST_WAITING = 200_000  # quads that wait to be written
+MOST_WAITING = 50_000  # quads that wait to be written; while they are, workers go on
 _CONTRADICTION = NamedNode(term("Contradiction"))
 
 
-class Joined(Exception):
-    """A part bears on others."""
+@dataclass(frozen=True)
+class Change:
+    """What changes with the conclusions of some parts: quads that go and come, and notes that stood before.
+
+    `minted` are nodes that are not of the parts, which only their conclusions speak of.
+    """
+
+    removed: set[Quad]
+    added: set[Quad]
+    noted: set[Quad]
+    minted: set[Name]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go to another process as N-Quads: to pickle each term takes ten times as long."""
+        quads = (serialize(some, format=RdfFormat.N_QUADS) for some in (self.removed, self.added, self.noted))
+        return _read, (*quads, self.minted)
 
 
 @dataclass
@@ -39,14 +55,14 @@ class Changes:
     names: set[str] = field(default_factory=set)
     noted: set[Quad] = field(default_factory=set)
 
-    def take(self, removed: set[Quad], added: set[Quad], noted: Iterable[Quad]) -> None:
+    def take(self, change: Change) -> None:
         """Let some quads be in the place of others, and know of notes that stood before; write when there are many."""
-        if has_blank_node(removed | added):
+        if has_blank_node(change.removed | change.added):
             raise Joined
-        self.removed |= removed
-        self.added |= added
-        self.names.update(map(graph_of, removed | added))
-        self.noted.update(noted, (quad for quad in added if graph_of(quad) == GRAPH_REASONED))
+        self.removed |= change.removed
+        self.added |= change.added
+        self.names.update(map(graph_of, change.removed | change.added))
+        self.noted.update(change.noted, (quad for quad in change.added if graph_of(quad) == GRAPH_REASONED))
         if len(self.removed) + len(self.added) > MOST_WAITING:
             self.write(self.graph.made_of() if self.whole else ())
 
@@ -56,27 +72,40 @@ class Changes:
         self.removed, self.added = set(), set()
 
 
-def conclude(graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region | None], whole: bool) -> Changes:
-    """Conclude of some parts, or of the `whole` graph part by part; return what is yet to be written.
+def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | None = None) -> Changes:
+    """Conclude of the parts that some nodes belong to, of all parts if none are given; return what is to be written.
 
     Raises Joined where parts bear on each other.
     """
     if ontology.schema.unfit is not None:
         raise Joined
-    changes, minted = Changes(graph, whole), set[parts.Name]()
-    for some in parts.together(regions):
-        if some is None:
-            raise Joined
-        for region, found in _conclude(ontology, some):
-            removed, added = region.concluded, found.quads()
-            removed, added = removed - added, added - removed  # what was concluded before speaks of the region's nodes
-            nodes = {node for quad in added if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
-            nodes -= region.nodes
-            if not minted.isdisjoint(nodes) or any(graph.about(node) for node in nodes):
+    changes, minted = Changes(graph, seeds is None), set[Name]()
+    if seeds is None:
+        found = each_part.of_each(graph, ontology, changes_of)
+    else:
+        found = each_part.of_these(ontology, parts.some(graph, ontology, seeds), changes_of)
+    with closing(found):
+        for change in found:
+            if not minted.isdisjoint(change.minted) or any(graph.about(node) for node in change.minted):
                 raise Joined
-            minted |= nodes
-            changes.take(removed, added, (quad for quad in region.concluded if graph_of(quad) == GRAPH_REASONED))
+            minted |= change.minted
+            changes.take(change)
     return changes
+
+
+def _read(removed: bytes, added: bytes, noted: bytes, minted: set[Name]) -> Change:
+    gone, come, before = (set(parse(some, format=RdfFormat.N_QUADS)) for some in (removed, added, noted))
+    return Change(gone, come, before, minted)
+
+
+def changes_of(ontology: Ontology, regions: list[Region]) -> Iterator[Change]:
+    """Yield what changes with the conclusions of some parts. Raises Joined where they bear on others."""
+    for region, found in _conclude(ontology, regions):
+        removed, added = region.concluded, found.quads()
+        removed, added = removed - added, added - removed  # what was concluded before speaks of the region's nodes
+        nodes = {node for quad in added if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
+        noted = {quad for quad in region.concluded if graph_of(quad) == GRAPH_REASONED}
+        yield Change(removed, added, noted, nodes - region.nodes)
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:

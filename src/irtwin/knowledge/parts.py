@@ -65,6 +65,10 @@ _NAMES = (NamedNode, BlankNode)
 _RECENT: WeakKeyDictionary[KnowledgeGraph, tuple[int, dict[Name, Region]]] = WeakKeyDictionary()
 
 
+class Joined(Exception):
+    """A part bears on others."""
+
+
 class Ontology:
     """What all parts have in common."""
 
@@ -171,30 +175,57 @@ def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
     return found
 
 
-def each(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
-    """Yield what was concluded of the ontology alone, and all parts, robots first; None where the graph is one part.
+class Seen:
+    """What was read of a graph, part by part: counts of the quads, and hashes of the nodes, 8 bytes each."""
 
-    Each is found when it is asked for. Of those before, only the hashes of their nodes are kept: 8 bytes a node.
-    """
-    seen, read = [np.empty(0, np.int64)], Counter[str]()
+    def __init__(self) -> None:
+        self._hashes = [np.empty(0, np.int64)]
+        self._read = Counter[str]()
 
-    def noted(region: Region | None) -> Region | None:
-        if region is not None:
-            seen.append(_hashes(region.nodes))
-            read.update(region.read)
-        return region
+    def note(self, region: Region) -> None:
+        """Note a part that was read."""
+        self._hashes.append(_hashes(region.nodes))
+        self._read.update(region.read)
 
-    yield noted(_of_ontology(graph, ontology))
-    yield from map(noted, some(graph, ontology, graph.subjects(_TYPE, _ROBOT) - ontology.terms))
-    left = set[Name]()
-    for quad in _unread(graph, read):
-        nodes = ontology.nodes(quad.triple)
-        if not nodes and is_asserted(quad):
+    def add(self, other: Seen) -> None:
+        """Note what another has noted, in this process or in another."""
+        self._hashes += other._hashes
+        self._read.update(other._read)
+
+    def all_of(self, kind: str, count: int) -> bool:
+        """Whether that many quads of a kind of graph were read."""
+        return count <= self._read[kind]
+
+    def unseen(self, nodes: Collection[Name]) -> set[Name]:
+        """Return those nodes that were not read."""
+        known = np.isin(_hashes(nodes), np.concatenate(self._hashes))
+        return {node for node, is_known in zip(nodes, known, strict=True) if not is_known}
+
+
+def robots_of(graph: KnowledgeGraph, ontology: Ontology) -> list[Name]:
+    """Return the robots of a graph, by name."""
+    return sorted(graph.subjects(_TYPE, _ROBOT) - ontology.terms, key=str)
+
+
+def left(graph: KnowledgeGraph, ontology: Ontology, held: Counter[str], seen: Seen) -> Iterator[Region | None]:
+    """Yield the parts of a graph that were not seen, where it held that many quads of each kind; None as `around`."""
+    nodes = set[Name]()
+    for quad in _unread(graph, held, seen):
+        some_nodes = ontology.nodes(quad.triple)
+        if not some_nodes and is_asserted(quad):
             yield None
             return
-        left.update(nodes)
-    known = np.isin(_hashes(left), np.concatenate(seen))
-    yield from some(graph, ontology, {node for node, is_known in zip(left, known, strict=True) if not is_known})
+        nodes.update(some_nodes)
+    yield from some(graph, ontology, seen.unseen(nodes))
+
+
+def held(graph: KnowledgeGraph) -> Counter[str]:
+    """Return how many quads of each kind of named graph there are, but for the ontology."""
+    counts = Counter[str]()
+    for name, count in graph.sizes():
+        if (kind := _kind(name)) and kind != GRAPH_ONTOLOGY:
+            counts[kind] += count
+    return counts
 
 
 def together(regions: Iterable[Region | None]) -> Iterator[list[Region] | None]:
@@ -226,7 +257,8 @@ def one(regions: Iterable[Region]) -> Region:
     return whole
 
 
-def _of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
+def of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
+    """Return what was concluded of the ontology alone, as a part without nodes."""
     region = Region()
     if graph.graphs(GRAPH_INFERRED):
         said = graph.said_of(term for term in ontology.terms if isinstance(term, Name))
@@ -235,12 +267,9 @@ def _of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
     return region
 
 
-def _unread(graph: KnowledgeGraph, read: Counter[str]) -> Iterator[Quad]:
+def _unread(graph: KnowledgeGraph, held: Counter[str], seen: Seen) -> Iterator[Quad]:
     """Yield the quads of those graphs that parts left something of."""
-    held = Counter[str]()
-    for name, count in graph.sizes():
-        held[_kind(name)] += count
-    kinds = {kind for kind, count in held.items() if kind and count > read[kind] and kind != GRAPH_ONTOLOGY}
+    kinds = {kind for kind, count in held.items() if not seen.all_of(kind, count)}
     for name in graph.graphs() if kinds else ():
         if _kind(name) in kinds:
             yield from graph.quads_in(name)

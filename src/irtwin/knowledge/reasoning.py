@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge import by_parts, engines, parts
-from irtwin.knowledge.by_parts import Joined
 from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
-from irtwin.knowledge.parts import Ontology
+from irtwin.knowledge.parts import Joined, Ontology
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -113,14 +112,13 @@ def around(graph: KnowledgeGraph, nodes: Iterable[NamedNode]) -> set[Triple]:
 def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> Inferences:
     """Reason over the parts that changed, or over all parts where ontology or rules did. Raises Joined."""
     name = content_name(ontology.triples, ontology.resources)
-    whole = made_of(graph) != name
-    if whole:
+    if made_of(graph) != name:
         notes = set(in_graph(graph.triples(GRAPH_REASONED), GRAPH_REASONED))
-        changes = by_parts.conclude(graph, ontology, parts.each(graph, ontology), whole)
+        changes = by_parts.conclude(graph, ontology)
         base = Conclusions(made_of={_OWL_RL: name}, made_by={_made_by(NATIVE)}).quads()
         changes.write(changed | notes - changes.noted - base, base - notes)
     elif changed:
-        changes = by_parts.conclude(graph, ontology, parts.some(graph, ontology, nodes_of(changed)), whole)
+        changes = by_parts.conclude(graph, ontology, nodes_of(changed))
         changes.write(changed)
     else:
         return _count(graph, ())

@@ -6,18 +6,19 @@ are read as SHACL reads them: by the types that are said, and `rdfs:subClassOf` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import pyshacl
 import rdflib
-from pyoxigraph import BlankNode, NamedNode, RdfFormat, Store, Triple, parse, serialize
+from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Store, Triple, parse, serialize
 from rdflib.namespace import SH
 
-from irtwin.knowledge import parts
+from irtwin.knowledge import each_part, parts
 from irtwin.knowledge.conclusions import content_name
-from irtwin.knowledge.parts import Ontology, Region
+from irtwin.knowledge.parts import Joined, Ontology, Region
 from irtwin.knowledge.reasoning import asserted
 from irtwin.knowledge.reasoning import made_of as reasoned_from
 from irtwin.knowledge.shacl.of_ontology import SUB_CLASS_OF, with_ontology
@@ -65,16 +66,10 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     in_parts = changed is not None and made_of == reasoned_from(graph) and not graph.changed(GRAPH_INFERRED)
     validated = Triple(NamedNode(GRAPH_VALIDATION), DERIVED_FROM, made_of)
     report = None
-    if in_parts and graph.holds(validated):
-        nodes = nodes_of(changed or set())
-        report = _by_parts(
-            graph,
-            ontology,
-            parts.some(graph, ontology, nodes, asserted=True),
-            _as_rdflib(graph.triples(GRAPH_VALIDATION)),
-        )
-    elif in_parts:
-        report = _by_parts(graph, ontology, parts.each(graph, ontology), _empty())
+    if in_parts:
+        with suppress(Joined):
+            changed_since = changed if graph.holds(validated) else None
+            report = _by_parts(graph, ontology, changed_since)
     if report is None:
         report = _report(asserted(graph), ontology, graph.resources.of("shapes"))
     report = _empty() if report is None else report
@@ -87,32 +82,50 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     return tuple(sorted((_violation(report, node, robots) for node in report.objects(None, SH.result)), key=str))
 
 
-def _by_parts(
-    graph: KnowledgeGraph, ontology: Ontology, regions: Iterable[Region | None], report: rdflib.Graph
-) -> rdflib.Graph | None:
-    """Put what is found in some parts in the place of what a report says of them; None where all is to be checked."""
+def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | None) -> rdflib.Graph:
+    """Return the report of before with what is found in parts that changed, or that of all parts if None did.
+
+    Raises Joined where all is to be checked.
+    """
+    if changed is None:
+        report, checked = _empty(), each_part.of_each(graph, ontology, _results)
+    else:
+        report = _as_rdflib(graph.triples(GRAPH_VALIDATION))
+        regions = parts.some(graph, ontology, nodes_of(changed), asserted=True)
+        checked = each_part.of_these(ontology, _taken_out(report, regions), _results)
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
-    for some in parts.together(regions):
-        region = None if some is None else parts.one(some)
-        if region is None or any(isinstance(node, BlankNode) for node in region.nodes):
-            return None
-        nodes = {rdflib.URIRef(node.value) for node in region.nodes or ontology.terms if isinstance(node, NamedNode)}
-        for result in _about(report, nodes):
-            report -= report.cbd(result)
-            report.remove((None, SH.result, result))
-        if region.nodes and not region.asserted:
-            continue
-        found = _report(ontology.triples | region.asserted, ontology, graph.resources.of("shapes"))
-        if found is not None:
-            for result in _about(found, nodes):
-                report += found.cbd(result)
-                report.add((head, SH.result, result))
+    with closing(checked):
+        for result, said in checked:
+            report += said
+            report.add((head, SH.result, result))
     report.set((head, SH.conforms, rdflib.Literal((head, SH.result, None) not in report)))
     return report
 
 
-def _about(report: rdflib.Graph, nodes: set[rdflib.URIRef]) -> list[rdflib.term.Node]:
-    return [result for result in report.objects(None, SH.result) if report.value(result, SH.focusNode) in nodes]
+def _taken_out(report: rdflib.Graph, regions: Iterable[Region | None]) -> Iterator[Region | None]:
+    """Take what a report says of some parts out of it, as they go by."""
+    for region in regions:
+        for result in _about(report, region.nodes) if region else ():
+            report -= report.cbd(result)
+            report.remove((None, SH.result, result))
+        yield region
+
+
+def _results(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[rdflib.term.Node, rdflib.Graph]]:
+    """Yield what is found in some parts, results with what is said of them. Raises Joined for nodes without a name."""
+    region = parts.one(regions)
+    if any(isinstance(node, BlankNode) for node in region.nodes):
+        raise Joined
+    if region.nodes and not region.asserted:
+        return
+    found = _report(ontology.triples | region.asserted, ontology, ontology.resources.of("shapes"))
+    if found is not None:
+        yield from ((one, found.cbd(one)) for one in _about(found, region.nodes or ontology.terms))
+
+
+def _about(report: rdflib.Graph, nodes: Iterable[object]) -> list[rdflib.term.Node]:
+    names = {rdflib.URIRef(node.value) for node in nodes if isinstance(node, NamedNode)}
+    return [result for result in report.objects(None, SH.result) if report.value(result, SH.focusNode) in names]
 
 
 def _empty() -> rdflib.Graph:

@@ -93,7 +93,7 @@ class KnowledgeGraph:
         return cls(url or place.graph_folder, place.folder, place.resources, place.base)
 
     @classmethod
-    def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
+    def as_it_stands(cls, path: Path, workspace: Path | None = None, resources: Resources | None = None) -> Self:
         """Open what is on disk now, to read; takes no lock. Where another process may write meanwhile: see `snapshot`.
 
         Raises OSError or RuntimeError where that process changed the files just now.
@@ -101,7 +101,7 @@ class KnowledgeGraph:
         graph = cls.__new__(cls)
         graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
-        graph._workspace, graph._resources, graph._base = workspace or path.parent, None, None
+        graph._workspace, graph._resources, graph._base = workspace or path.parent, resources, None
         graph._reading = Reading(graph._store)
         graph.asserted_since = 0
         return graph
@@ -213,13 +213,13 @@ class KnowledgeGraph:
             given |= changes.notes(self._store, taken | given)
         if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
-        triples = {quad.triple for quad in taken}
-        remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
-        lost = triples - remaining - {quad.triple for quad in given}
         with self._writing() as store:
             if not taken and isinstance(store, Store):
                 store.extend(with_union(given))
             elif taken or given:
+                triples = {quad.triple for quad in taken}
+                remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
+                lost = triples - remaining - {quad.triple for quad in given}
                 self._write(
                     f"DELETE DATA {{ {triple_data(lost)}\n{quad_data(taken)} }} ;\n"
                     f"INSERT DATA {{ {triple_data({quad.triple for quad in given})}\n{quad_data(given)} }}"

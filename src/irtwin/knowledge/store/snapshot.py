@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Self, TypeVar
 
@@ -32,15 +32,20 @@ T = TypeVar("T")
 
 
 @contextmanager
+def view(folder: Path) -> Iterator[Path | None]:
+    """Give a folder that shows a graph as it is now, for who has it open to write; None where no links can be made."""
+    held, found = _whole(lambda: folder, lambda source, held: _links(source, held, _WRITTEN_ON))
+    with held:
+        yield found
+
+
+@contextmanager
 def kept(folder: Path) -> Iterator[None]:
     """Let readers see a graph as it is now until this ends, however it ends; for who has it open to write.
 
     Where no links can be made they see each transaction.
     """
-    held, view = _whole(lambda: folder, lambda source, held: _links(source, held, _WRITTEN_ON))
-    with held:
-        if view is not None:
-            held.enter_context(published(view))
+    with view(folder) as found, nullcontext() if found is None else published(found):
         yield
 
 
