@@ -76,11 +76,47 @@ def test_a_load_that_switches_is_told_by_its_power_duty_and_period(duty):
     assert said["period"].value == pytest.approx(3.0, rel=0.1)
 
 
-@pytest.mark.parametrize(("duty", "later"), [(0.34, 0.15), (0.8, 0.3)])
-def test_motion_takes_nothing_of_a_load(duty, later):
-    case = repeated(lambda k, t: in_power(60.0 * ((t / 3.0 + later * k) % 1 < duty)))
+@pytest.mark.parametrize(("duty", "later", "period"), [(0.34, 0.15, 3.0), (0.8, 0.3, 3.0), (0.5, 0.5, 1.5)])
+def test_motion_takes_nothing_of_a_load(duty, later, period):
+    case = repeated(lambda k, t: in_power(60.0 * ((t / period + later * k) % 1 < duty)))
     one, said = only(disturbances(case))
     assert one.kind == "switching" and said["P"].value == pytest.approx(60.0, rel=0.1)
+    assert said["period"].value == pytest.approx(period, rel=0.05) and said["duty"].value == pytest.approx(
+        duty, abs=0.05
+    )
+
+
+def warming(size, constant=2.0):
+    """The loss of windings that are cold in the second run, and warm as it goes on."""
+    motion = swing(ROBOT, 0, seconds=10.0)
+    loss = np.sum(measure(ROBOT, motion).torque ** 2, axis=1)
+    return lambda k, t: in_power(size * loss / loss.mean() * (1 - k * np.exp(-t / constant)))
+
+
+@pytest.mark.parametrize("constant", [2.0, 5.0])
+def test_windings_that_warm_drift_and_are_no_load_that_switches(constant):
+    one, said = only(disturbances(repeated(warming(100.0, constant))))
+    time = np.arange(1000) / 100
+    slope = np.polyfit(time, 100.0 * np.exp(-time / constant), 1)[0]
+    assert (one.channel, one.joint, one.kind) == ("power", None, "drift")
+    assert said["drift"].value == pytest.approx(slope, rel=0.2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_course_that_costs_more_than_it_says_is_no_load(seed):
+    rng = np.random.default_rng(seed)
+    assert disturbances(repeated(lambda k, t: in_power(3.0 * wandering(len(t), 8, rng)))) == []
+
+
+@pytest.mark.parametrize("apart", [0.3, 1.0, 3.0])
+def test_phases_of_a_line_are_in_the_interval_of_its_amplitude(apart):
+    _, said = only(disturbances(repeated(lambda k, t: in_joint_2(3.0 * np.sin(2 * np.pi * 2.9 * t + apart * k)))))
+    assert said["A"].lower < 3.0 < said["A"].upper
+
+
+def test_a_slow_line_is_no_drift_that_runs_share():
+    case = repeated(lambda k, t: in_joint_2(9.0 * np.sin(2 * np.pi * 0.32 * t + 0.3 * k)))
+    assert [one.kind for one in disturbances(case)] == ["line"]
 
 
 def test_an_offset_between_runs_is_located():

@@ -15,7 +15,7 @@ from scipy.stats import t as student_t
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.regression.residuals import as_filtered, without_ends
-from irtwin.gap.repeats.series import Series
+from irtwin.gap.repeats.series import Series, waves
 from irtwin.signals.motion import Motion
 
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
@@ -33,13 +33,27 @@ class OwnDrift:
     rest: float
 
 
-def own_drifts(stack: Stack, motions: Sequence[Motion], judged: Sequence[str]) -> list[list[OwnDrift]]:
-    """Return for each joint the drifts of the `judged` runs beside the twin's columns; none of it in long runs."""
-    if sum(len(motion.time) for motion in motions) > _MOST:
-        return [[] for _ in stack.robot.joints]
-    columns = [as_filtered(motion, stack.torque_columns(motion)) for motion in motions]
-    values = [_known(stack, motion, own) for motion, own in zip(motions, columns, strict=True)]
-    return [_of_joint(motions, columns, values, joint, judged) for joint in range(len(stack.robot.joints))]
+@dataclass(frozen=True)
+class Alike:
+    """What each run says by itself: the `motions` of all, the twin's `columns` and `values` in them; the `judged`."""
+
+    motions: Sequence[Motion]
+    columns: Sequence[np.ndarray]
+    values: Sequence[np.ndarray]
+    judged: Sequence[str]
+
+    @classmethod
+    def of(cls, stack: Stack, motions: Sequence[Motion], judged: Sequence[str]) -> Alike | None:
+        """Return it of the runs that are `judged`, beside the twin; None in long runs."""
+        if sum(len(motion.time) for motion in motions) > _MOST:
+            return None
+        columns = [as_filtered(motion, stack.torque_columns(motion)) for motion in motions]
+        values = [_known(stack, motion, own) for motion, own in zip(motions, columns, strict=True)]
+        return cls(motions, columns, values, judged)
+
+    def drifts(self, joint: int, frequencies: Sequence[float] = ()) -> list[OwnDrift]:
+        """Return the drifts of the judged runs in a joint, beside lines of some `frequencies`, Hz."""
+        return _of_joint(self.motions, self.columns, self.values, joint, self.judged, frequencies)
 
 
 def _known(stack: Stack, motion: Motion, columns: np.ndarray) -> np.ndarray:
@@ -56,6 +70,7 @@ def _of_joint(
     values: Sequence[np.ndarray],
     joint: int,
     judged: Sequence[str],
+    frequencies: Sequence[float],
 ) -> list[OwnDrift]:
     """Return the drifts of the judged runs in one joint."""
     known = [np.isfinite(each[:, joint]) for each in values]
@@ -67,7 +82,8 @@ def _of_joint(
     began = np.array([each.mean() if len(each) else 0.0 for each in parts])
     beside = np.concatenate([own[kept, joint] for own, kept in zip(columns, known, strict=True)])
     measured = np.concatenate([each[kept, joint] for each, kept in zip(values, known, strict=True)])
-    basis = Series(time, measured, np.column_stack([beside, ones])).basis()
+    swings = [wave[:, None] * ones for one in frequencies for wave in waves(time, one)]
+    basis = Series(time, measured, np.column_stack([beside, ones, *swings])).basis()
     drifts = ones * (time - began[run])[:, None]
     free = drifts - basis @ (basis.T @ drifts)
     weights = np.linalg.pinv(free, rcond=1e-3)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,8 @@ from irtwin.effects.effect import Quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.data.noise_floor import sensor_noise
-from irtwin.gap.repeats.alike import OwnDrift, own_drifts
+from irtwin.gap.repeats.alike import Alike, OwnDrift
+from irtwin.gap.repeats.creep import creep
 from irtwin.gap.repeats.lines import Line, lines
 from irtwin.gap.repeats.series import Series
 from irtwin.gap.repeats.slow import slow
@@ -30,6 +31,8 @@ _NORMAL = 1.96
 
 Located = tuple[str, tuple[Quantity, ...], float, float, Any]
 """Kind, quantities, size, p and shape of a disturbance."""
+Drifts = Callable[[Sequence[Line]], list[OwnDrift]]
+"""What each run drifts by, beside lines."""
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,11 @@ def disturbances(case: Case) -> list[Disturbance]:
             series = [_of_joint(pair, raw, joint) for pair in by_torque]
             noise = 0.0 if torque_noise is None else float(torque_noise[joint])
             unit = "N" if case.robot.joints[joint].kind == "prismatic" else "N m"
-            found += _of("torque", name, unit, series, by_torque, noise, tests, limits, None, own[joint])
+            found += _of("torque", name, unit, series, by_torque, noise, tests, limits, None, _drifts(own, joint))
     if by_power:
         series, load = _of_power(case, by_power, runs)
         noise = 0.0 if power_noise is None else float(power_noise[0])
-        found += _of("power", None, "W", series, by_power, noise, tests, limits, load, [])
+        found += _of("power", None, "W", series, by_power, noise, tests, limits, load, _drifts(None, 0))
     return sorted(found, key=lambda one: -one.share)
 
 
@@ -79,13 +82,17 @@ def _names(pair: Pair) -> tuple[str, str]:
     return pair.first.run, pair.second.run
 
 
-def _own(case: Case, pairs: Sequence[Pair]) -> list[list[OwnDrift]]:
-    """Return each joint's drifts of the runs of all pairs, where these are too few for the search to find them."""
+def _own(case: Case, pairs: Sequence[Pair]) -> Alike | None:
+    """Return what the runs of all pairs say by themselves, where motions are too few for the search to find a drift."""
     measured = {run.name for run in case.runs if run.role != "simulated"}
     motions = [motion for motion in case.with_torque if motion.run in measured]
     if not case.grouping.few(motion.run for motion in motions):
-        return [[] for _ in case.robot.joints]
-    return own_drifts(case.stack, motions, sorted({name for pair in pairs for name in _names(pair)}))
+        return None
+    return Alike.of(case.stack, motions, sorted({name for pair in pairs for name in _names(pair)}))
+
+
+def _drifts(own: Alike | None, joint: int) -> Drifts:
+    return lambda found: [] if own is None else own.drifts(joint, [one.frequency for one in found])
 
 
 def _torque(case: Case, run: Run, motion: Motion) -> np.ndarray:
@@ -111,25 +118,30 @@ def _of_joint(pair: Pair, raw: Mapping[str, np.ndarray], joint: int) -> Series:
 
 
 def _of_power(case: Case, pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Series], Switching | None]:
-    """Return what two runs differ by in power, beside what the motion may, and the load that switches in it."""
-    limits = case.thresholds.not_repeating
+    """Return what two runs differ by in power, beside what the motion may and a drift, and the load that switches."""
     own = {motion.run: _of_run(runs[motion.run], motion) for pair in pairs for motion in (pair.first, pair.second)}
-    found = []
-    for pair in pairs:
-        first, second = (own[name].values for name in _names(pair))
-        time, dq = pair.time, pair.first.dq[pair.inside]
-        beside = [np.ones_like(time), time - time.mean(), *np.abs(dq).T, *(dq**2).T]
-        found.append(Series(time, pair.of(first, second), np.column_stack(beside)))
-    watched = [Watched(_names(pair), pair.shift, one) for pair, one in zip(pairs, found, strict=True)]
-    load = switching(watched, own, limits)
-    if load is None:
-        return [one.tamed() for one in found], None
-    states = {name: load.states[name] for name in own}
-    with_load = [
-        one.with_columns(pair.of(*(states[name] for name in _names(pair))))
-        for one, pair in zip(found, pairs, strict=True)
-    ]
-    return [one.tamed() for one in with_load], load
+    watched = [_watched(pair, own) for pair in pairs]
+    load = switching(watched, own, case.thresholds.not_repeating)
+    found = [one.difference for one in watched]
+    if load is not None:
+        apart = [pair.of(*(load.states[name] for name in _names(pair))) for pair in pairs]
+        found = [one.with_columns(column) for one, column in zip(found, apart, strict=True)]
+    return [creep(one, each.squares).tamed() for one, each in zip(found, watched, strict=True)], load
+
+
+def _watched(pair: Pair, runs: Mapping[str, Series]) -> Watched:
+    """Return the power of two runs, beside what their motion may take of their difference, and of their sum."""
+    first, second = (runs[name].values for name in _names(pair))
+    time, inside, torque = pair.time, pair.inside, pair.first.torque
+    dq, squares = pair.first.dq[inside], None if torque is None else torque[inside] ** 2
+    slow = [np.ones_like(time), time - time.mean()]
+    beside = [*slow, *np.abs(dq).T, *(dq**2).T, *([] if squares is None else squares.T)]
+    taken = [*slow, runs[pair.first.run].beside[inside]]
+    apart, total = pair.of(first, second), pair.of(first, -second)
+    return Watched(
+        _names(pair), pair.shift, Series(time, apart, np.column_stack(beside)),
+        Series(time, total, np.column_stack(taken)), squares,
+    )  # fmt: skip
 
 
 def _of_run(run: Run, motion: Motion) -> Series:
@@ -154,7 +166,7 @@ def _of(
     tests: int,
     limits: NotRepeating,
     load: Switching | None,
-    own: Sequence[OwnDrift],
+    own: Drifts,
 ) -> list[Disturbance]:
     """Return the disturbances of one channel; noise: its sensor's, in the band; own: what each run drifts by."""
     found, left = lines(series, tests, limits)
@@ -169,7 +181,7 @@ def _of(
         if line.size >= limits.least_size * least:
             kind = LINE if line.purity >= limits.pure else BAND
             located.append((kind, _wave(line, joint, unit), line.size, line.p, line))
-    located += _slow(left, joint, unit, (rest_size, noise**2), tests, limits, own)
+    located += _slow(left, joint, unit, (rest_size, noise**2), tests, limits, own(found))
     whole = max(float(np.mean(spread)), rest_size + sum(each[2] for each in located))
     return [
         Disturbance(channel, joint, kind, quantities, size, float(min(size / whole, 1.0)), p, shape)
@@ -191,15 +203,14 @@ def _load(load: Switching) -> tuple[Quantity, ...]:
     if not periods:
         return level, duty
     ends = (min(periods), max(periods)) if len(periods) > 1 else (None, None)
-    return level, duty, Quantity("period", None, float(np.mean(periods)), "s", *ends)
+    return level, duty, Quantity("period", None, float(np.median(periods)), "s", *ends)
 
 
 def _wave(line: Line, joint: str | None, unit: str) -> tuple[Quantity, ...]:
-    ends = [(at - _NORMAL * by, at + _NORMAL * by) for at, by in
-            ((line.frequency, line.error), (line.amplitude, line.deviation))]  # fmt: skip
+    half = _NORMAL * line.error
     return (
-        Quantity("f", joint, line.frequency, "Hz", *ends[0]),
-        Quantity("A", joint, line.amplitude, unit, max(ends[1][0], 0.0), ends[1][1]),
+        Quantity("f", joint, line.frequency, "Hz", line.frequency - half, line.frequency + half),
+        Quantity("A", joint, line.amplitude, unit, *line.interval),
     )
 
 

@@ -27,12 +27,14 @@ _MEDIAN = float(np.log(np.log(2)))  # of the logarithm of what is exponential, w
 _FREE = 0.1  # of a wave must be left by the columns beside it, for it to be looked for
 _FREE_STILL = 0.01  # or to be placed: its best frequency may lie closer to theirs
 _MOST = 8  # lines of one channel
+_NORMAL = 1.96
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line: `frequency` Hz with its standard `error`; `amplitude` of one run, its `deviation`; p, for all tests.
+    """A line: `frequency` Hz with its standard `error`; `amplitude` of one run, its 95 % `interval`; p, of all tests.
 
+    Two runs differ by twice the amplitude times the sine of half of what their phases differ by, which may be anything.
     `purity`: the part of what stands out around the line that one steady wave explains. `size`: its mean square in one
     run, were its phases random.
     """
@@ -40,7 +42,7 @@ class Line:
     frequency: float
     error: float
     amplitude: float
-    deviation: float
+    interval: tuple[float, float]
     purity: float
     p: float
 
@@ -155,10 +157,18 @@ def _line(
     rest = np.sum([_explained(one, near) for one in more], axis=0).max(initial=0.0)
     samples = np.array([len(one.values) for one in series])
     whole = at(frequency)
-    squares = [float(np.sum(one.coefficients()[-2:] ** 2)) for one in more]
-    amplitude = float(np.sqrt(np.mean(squares) / 2))  # of one run: a difference has two, of any phases
-    deviation = float(np.sqrt(np.sum(2 * noise / samples)) / len(series) / np.sqrt(2))
+    heights = np.array([float(np.linalg.norm(one.coefficients()[-2:])) for one in more])
+    amplitude = float(np.sqrt(np.mean(heights**2) / 2))  # of one run: a difference has two, of any phases
+    interval = _ends(heights, np.sqrt(4 * noise / samples))
     seconds = float(np.mean([one.seconds for one in series]))
     signal = float(np.sum(whole / noise))
     error = float(np.sqrt(1.5 / max(signal, 1.0)) / (np.pi * seconds))
-    return Line(frequency, error, amplitude, deviation, float(whole.sum() / (whole.sum() + rest)), p), more
+    return Line(frequency, error, amplitude, interval, float(whole.sum() / (whole.sum() + rest)), p), more
+
+
+def _ends(heights: np.ndarray, deviations: np.ndarray) -> tuple[float, float]:
+    """Return the ends of a run's amplitude, by the highest of the differences (P,), whose phases may be any."""
+    best = int(np.argmax(heights))
+    sines = [float(np.sin(np.pi / 2 * share ** (1 / len(heights)))) for share in (0.975, 0.025)]
+    lower, upper = (float(heights[best] + side * _NORMAL * deviations[best]) for side in (-1, 1))
+    return max(lower / 2, 0.0) / sines[0], upper / 2 / sines[1]

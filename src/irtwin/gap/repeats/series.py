@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 _WILD = 6.0  # spreads: what lies beyond is a joint that turned back at another instant, and is cut there
-_SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
+SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Series:
     def tamed(self) -> Series:
         """Return the series with wild samples cut: what is far beyond the spread of what is left."""
         left = self.left()
-        most = _WILD * _SPREAD * float(np.median(np.abs(left)))
+        most = _WILD * SPREAD * float(np.median(np.abs(left)))
         return replace(self, values=self.values - left + np.clip(left, -most, most)) if most > 0 else self
 
 

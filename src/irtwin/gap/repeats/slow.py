@@ -10,14 +10,14 @@ from scipy.stats import t as student_t
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.repeats.series import Series
 
-_SLOW = 2  # columns of a series: a constant, and time, stand first beside it
+_SLOW = 2  # columns of a series: a constant, and how it drifts, stand first beside it
 
 
 @dataclass(frozen=True)
 class Slow:
     """The `offset` of a difference at mid-time, and its `drift` a second, each with its deviation and p.
 
-    `sizes`: the mean squares of both in one run.
+    `sizes`: the mean squares of both in one run; `start`, s: what the drift is multiplied by where it begins.
     """
 
     offset: float
@@ -26,17 +26,17 @@ class Slow:
     drift_deviation: float
     p: tuple[float, float]
     sizes: tuple[float, float]
-    seconds: float
+    start: float
 
     def from_start(self) -> tuple[float, float]:
         """Return the offset where the difference begins, before anything has drifted, with its deviation."""
-        half = self.seconds / 2
-        return self.offset - half * self.drift, float(np.hypot(self.offset_deviation, half * self.drift_deviation))
+        by = float(np.hypot(self.offset_deviation, self.start * self.drift_deviation))
+        return self.offset + self.start * self.drift, by
 
 
 def slow(series: Series) -> Slow:
     """Return the offset and the drift of a difference; what is left remembers, so its samples count for fewer."""
-    beside = np.column_stack([np.ones(len(series.time)), series.time - series.time.mean(), series.beside[:, _SLOW:]])
+    beside = series.beside
     scale = np.maximum(np.linalg.norm(beside, axis=0), 1e-300)
     inverse = np.linalg.pinv(beside / scale, rcond=1e-8)
     values = inverse @ series.values / scale
@@ -46,8 +46,8 @@ def slow(series: Series) -> Slow:
     variance = float(left @ left) / len(left) * memory * (1 + beside.shape[1] / free)
     deviations = np.sqrt(np.sum(inverse[:_SLOW] ** 2, axis=1) * variance) / scale[:_SLOW]
     p = 2 * student_t.sf(np.abs(values[:_SLOW]) / np.maximum(deviations, 1e-300), free)
-    sizes = values[0] ** 2 / 2, values[1] ** 2 / 2 * float(np.var(series.time))
+    sizes = values[0] ** 2 / 2, values[1] ** 2 / 2 * float(np.var(beside[:, 1]))
     return Slow(
         float(values[0]), float(deviations[0]), float(values[1]), float(deviations[1]),
-        (float(p[0]), float(p[1])), (float(sizes[0]), float(sizes[1])), series.seconds,
+        (float(p[0]), float(p[1])), (float(sizes[0]), float(sizes[1])), float(beside[0, 1]),
     )  # fmt: skip

@@ -6,23 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from irtwin.gap.regression.correlation import correlation_samples
-from irtwin.gap.repeats.series import Series
+from irtwin.gap.repeats.creep import creep
+from irtwin.gap.repeats.description_length import saved
+from irtwin.gap.repeats.series import SPREAD, Series
+from irtwin.gap.repeats.telegraph import two_levels
 from irtwin.gap.thresholds import NotRepeating
 
-_WIDTHS = (0.1, 0.25, 0.6)  # s on either side of a step, over which power is averaged
-_FEWEST = 4  # samples of that
-_LOUD = 0.8  # quantile of the steps that is one of the load, and not of what joints do between
-_HIGHER = (1.0, 1.4)  # times the steps' height: a first guess is low where steps are short
-_SIDES = (-1, 1)  # steps alone do not say which run had the load before the first: the second, the first
-_ENOUGH = 10  # samples for each column that the motion may take
+_TRUST = (1.0, 0.1)  # in all of the power beside its changes: motion may hardly change, or the load may be large
 _ROUNDS = 10  # of fitting what the motion takes and what is on, in turn
-_SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
 _BIN = 0.02  # s, over which power is averaged before it is said when a load is on,
 _MOST_BINS = 20_000  # or longer, in long runs
-_SWITCH = 8.0  # what a switch costs in the logarithm of the likelihood: one in a few thousand bins
 _LEAST = 0.05  # of the load: bins are known no better
 _BOTH = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])  # whether it is on in either run
 
@@ -32,30 +27,42 @@ Edges = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class Watched:
-    """The difference of the power of two runs, `names`, on the first's clock, which is `shift` s ahead."""
+    """The power of two runs, `names`, on the first's clock, `shift` s ahead: its `difference`, and its `total`.
+
+    `squares` (N, n): of each joint's torque, as the loss in its winding; None: unknown.
+    """
 
     names: tuple[str, str]
     shift: float
     difference: Series
+    total: Series
+    squares: np.ndarray | None
 
 
 @dataclass(frozen=True)
 class Switching:
     """A load of `level` W with its `deviation`, on where `states` (N,) of each run say one, zero elsewhere.
 
-    `edges`: the times of each run, s, at which it goes on (+) or off (-); `explained`: its part of what differs.
+    `edges`: the times of each run, s, at which it goes on (+) or off (-), told to one of its `bins`; `explained`: its
+    part of what differs.
     """
 
     level: float
     deviation: float
     states: Mapping[str, np.ndarray]
     edges: Mapping[str, Edges]
+    bins: Mapping[str, int]
     explained: float
 
     @property
     def duty(self) -> float:
         """The share of time that it is on."""
         return float(np.mean(np.concatenate(list(self.states.values()))))
+
+    @property
+    def cost(self) -> float:
+        """What it costs to say when it switches, in nats: which of a run's bins, for each time."""
+        return sum(len(self.edges[name]) * float(np.log(self.bins[name])) for name in self.edges)
 
     @property
     def periods(self) -> list[float]:
@@ -65,87 +72,50 @@ class Switching:
 
 
 def switching(pairs: Sequence[Watched], runs: Mapping[str, Series], limits: NotRepeating) -> Switching | None:
-    """Return the load that switches; None where steps do not explain what differs.
+    """Return the load that switches; None where none explains enough of what differs, or a drift says as much.
 
     `runs`: each run's power by name, with columns beside it that the motion may take.
     """
-    differences, found = [pair.difference for pair in pairs], []
-    for width in _WIDTHS:
-        steps = [_steps(one, width, limits) for one in differences]
-        level = _height(steps, limits)
-        if level is not None:
-            plain = [_beside(one, []) for one in differences]
-            found += [_followed(pairs, runs, level * more, plain, limits) for more in _HIGHER]
-            for side in _SIDES:
-                begun = [_beside_steps(*each, level, side) for each in zip(differences, steps, strict=True)]
-                found.append(_followed(pairs, runs, level, begun, limits, by_steps=True))
-    return max((one for one in found if one is not None), key=lambda one: one.explained, default=None)
+    names = dict.fromkeys(name for pair in pairs for name in pair.names)
+    watched = {name: runs[name] for name in names}
+    followed = (_followed(pairs, watched, two_levels(watched, trust)) for trust in _TRUST)
+    found = [one for one in followed if one is not None and one.explained >= limits.switching]
+    worth = [_worth(one, pairs, watched) for one in found]
+    return found[int(np.argmax(worth))] if max(worth, default=0.0) > 0 else None
 
 
-def _height(each: Sequence[Edges], limits: NotRepeating) -> float | None:
-    """Return how high most steps are that stand out, W; None where they are of any height."""
-    heights = np.abs([step for steps in each for _, step in steps])
-    heights = heights[heights > np.quantile(heights, _LOUD) / 2] if len(heights) else heights  # not the robot's own
-    if len(heights) < 2:
-        return None
-    level = float(np.median(heights))
-    off = np.minimum(
-        np.abs(heights - level), np.abs(heights - 2 * level)
-    )  # twice: on in one as it goes off in the other
-    return level if np.mean(off <= limits.alike * level) >= limits.fewest_alike else None
+def _worth(load: Switching, pairs: Sequence[Watched], runs: Mapping[str, Series]) -> float:
+    """Return what a load saves in the description of the runs, beside how they drift, less what its course costs."""
+    none = {name: np.zeros(len(one.time)) for name, one in runs.items()}
+    before, after = ([one for pair in pairs for one in _left_of(pair, states, runs)] for states in (none, load.states))
+    return saved(before, after) - load.cost
 
 
-def _followed(
-    pairs: Sequence[Watched],
-    runs: Mapping[str, Series],
-    level: float,
-    differ: Sequence[np.ndarray],
-    limits: NotRepeating,
-    by_steps: bool = False,
-) -> Switching | None:
-    """Return the load found from a first guess of its level, W: when it is on, and how high it is, in turn.
+def _left_of(pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> list[np.ndarray]:
+    """Return what a load and a drift leave of the difference of two runs, and of their sum."""
+    first, second = _on_first_clock(pair, states, runs)
+    both = ((pair.difference, first - second), (pair.total, first + second))
+    return [creep(series.with_columns(column), pair.squares).left() for series, column in both]
 
-    `differ`: a first guess of what each pair of runs differs by without what follows the motion. `by_steps`: it is a
-    good one, and the first course goes by it alone; what each run's motion takes is then told from where the runs
-    differ, as there one has the load and the other not.
-    """
-    states = {name: np.zeros(len(runs[name].time)) for pair in pairs for name in pair.names}
-    deviation, first, known = 0.0, by_steps, None
+
+def _followed(pairs: Sequence[Watched], runs: Mapping[str, Series], states: dict[str, np.ndarray]) -> Switching | None:
+    """Return the load found from a first guess of its course: when it is on, and how high it is, in turn."""
+    level, deviation = _level(pairs, states, runs)
     for _ in range(_ROUNDS):
-        left, before = None if first else _left(runs, states, level, known), level
-        for pair, values in zip(reversed(pairs), reversed(differ), strict=True):
-            states |= _on(pair, runs, left, values, level)
-        known, first = _where_apart(pairs, states, runs) if first else None, False
-        level, deviation = _level(pairs, states, runs)
         if level <= 0:
             return None
-        if known is None and abs(level - before) < _LEAST / 10 * level:
-            break
+        left, before = _left(runs, states), level
         differ = [_beside(pair.difference, [_apart(pair, states, runs)]) for pair in pairs]
-    explained = _explained(pairs, states, runs)
+        for pair, values in zip(reversed(pairs), reversed(differ), strict=True):
+            states |= _on(pair, runs, left, values, level)
+        level, deviation = _level(pairs, states, runs)
+        if abs(level - before) < _LEAST / 10 * level:
+            break
     edges = {name: _edges(runs[name].time, state) for name, state in states.items()}
-    if explained < limits.switching or sum(map(len, edges.values())) < 2:
+    if level <= 0 or sum(map(len, edges.values())) < 2:
         return None
-    return Switching(level, deviation, states, edges, explained)
-
-
-def _steps(series: Series, width: float, limits: NotRepeating) -> Edges:
-    """Return the steps of a difference that stand out; what it follows is fitted between them, anew."""
-    size = max(_FEWEST, round(width * series.rate))
-    if len(series.values) < 4 * size:
-        return []
-    spread = _white(series) * np.sqrt(2 / size)
-    found: Edges = []
-    for _ in range(_ROUNDS):
-        step = _step(_beside(series, _stairs(series, found)), size)
-        places, _ = find_peaks(np.abs(step), height=max(limits.step * spread, 1e-12), distance=size)
-        found = [(float(series.time[k + size]), float(step[k])) for k in places]
-    return found
-
-
-def _stairs(series: Series, edges: Edges) -> list[np.ndarray]:
-    """Return a column (N,) of each step: zero before it, one from it on."""
-    return [(series.time >= time).astype(float) for time, _ in edges]
+    bins = {name: len(one.time) // _bin(one) for name, one in runs.items()}
+    return Switching(level, deviation, states, edges, bins, _explained(pairs, states, runs))
 
 
 def _beside(series: Series, load: Sequence[np.ndarray]) -> np.ndarray:
@@ -154,27 +124,10 @@ def _beside(series: Series, load: Sequence[np.ndarray]) -> np.ndarray:
     return np.asarray(series.values - series.beside @ motion)
 
 
-def _beside_steps(series: Series, edges: Edges, level: float, side: int) -> np.ndarray:
-    """Return what differs (N,) beside steps, which take none of the load for the motion.
-
-    It is shifted to lie within one load either way; where there is room, to one `side`.
-    """
-    way = np.cumsum([0.0, *(step for _, step in edges)]) / level
-    start = round(float(1 - way.max() if side > 0 else -1 - way.min()))
-    return _beside(series, _stairs(series, edges)) + level * start
-
-
-def _step(values: np.ndarray, size: int) -> np.ndarray:
-    """Return the mean of `size` samples from each on, less that of those before, (N - 2 size + 1,)."""
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    means = (sums[size:] - sums[:-size]) / size
-    return np.asarray(means[size:] - means[:-size])
-
-
 def _on(
     pair: Watched,
     runs: Mapping[str, Series],
-    left: Mapping[str, np.ndarray] | None,
+    left: Mapping[str, np.ndarray],
     differ: np.ndarray,
     level: float,
 ) -> dict[str, np.ndarray]:
@@ -184,12 +137,10 @@ def _on(
     """
     first, second = pair.names
     one, two = runs[first], runs[second]
-    said = [(differ, _BOTH[:, 0] - _BOTH[:, 1])]
-    if left is not None:
-        own = np.interp(pair.difference.time, one.time, left[first])
-        other = np.interp(pair.difference.time - pair.shift, two.time, left[second])
-        said.append((own + other, _BOTH.sum(axis=1)))
-    size = max(1, round(_BIN * one.rate), -(-len(differ) // _MOST_BINS))
+    own = np.interp(pair.difference.time, one.time, left[first])
+    other = np.interp(pair.difference.time - pair.shift, two.time, left[second])
+    said = [(differ, _BOTH[:, 0] - _BOTH[:, 1]), (own + other, _BOTH.sum(axis=1))]
+    size = _bin(one)
     count = len(differ) // size
     if count < 2:
         return {}
@@ -200,7 +151,7 @@ def _on(
         best = np.sqrt(off.min(axis=1))
         variance = float(np.mean(best**2)) * correlation_samples(values - level * expected[off.argmin(axis=1)])
         pays -= off / (2 * max(variance, (_LEAST * level) ** 2))
-    course = _likeliest(pays)
+    course = _likeliest(pays, np.log(count))
     time = pair.difference.time[: count * size : size]
     found = {}
     for k, (name, at) in enumerate(((first, one.time), (second, two.time + pair.shift))):
@@ -209,9 +160,14 @@ def _on(
     return found
 
 
-def _likeliest(pays: np.ndarray) -> np.ndarray:
-    """Return the likeliest course (T,) through states of log-likelihood (T, S); each switch costs."""
-    costs = _SWITCH * np.abs(_BOTH[:, None] - _BOTH[None]).sum(axis=2)
+def _bin(one: Series) -> int:
+    """Return the samples of a bin."""
+    return max(1, round(_BIN * one.rate), -(-len(one.time) // _MOST_BINS))
+
+
+def _likeliest(pays: np.ndarray, cost: float) -> np.ndarray:
+    """Return the likeliest course (T,) through states of log-likelihood (T, S), each switch of some cost."""
+    costs = cost * np.abs(_BOTH[:, None] - _BOTH[None]).sum(axis=2)
     best, came = pays[0], np.zeros(pays.shape, dtype=int)
     for k in range(1, len(pays)):
         ways = best[:, None] - costs
@@ -233,41 +189,28 @@ def _stacked(runs: Mapping[str, Series], states: Mapping[str, np.ndarray]) -> Se
     return Series(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "values", "beside")))
 
 
-def _where_apart(
-    pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, Series]
-) -> np.ndarray | None:
-    """Return where each run's load is known, as its partner's is another, one run after the other; None: too little."""
-    known = {name: np.zeros(len(state), dtype=bool) for name, state in states.items()}
-    for pair in pairs:
-        differ = np.abs(_apart(pair, states, runs))
-        for name, shift in zip(pair.names, (0.0, pair.shift), strict=True):
-            known[name] |= np.interp(runs[name].time, pair.difference.time - shift, differ) > 0.5
-    stacked = np.concatenate(list(known.values()))
-    columns = next(iter(runs.values())).beside.shape[1]
-    return stacked if stacked.sum() > _ENOUGH * columns else None
-
-
-def _left(
-    runs: Mapping[str, Series], states: Mapping[str, np.ndarray], level: float, known: np.ndarray | None = None
-) -> dict[str, np.ndarray]:
-    """Return what the motion does not take of each run's power, fitted to all, or the `known`, beside what is on."""
-    stacked = _stacked(runs, states)
-    if known is not None:
-        stacked = Series(stacked.time[known], stacked.values[known], stacked.beside[known])
-    motion = stacked.coefficients()[:-1]
-    if not any(state.any() for state in states.values()):  # nothing is known to be on: the median is neither
-        return {name: runs[name].values - runs[name].beside @ motion + level / 2 for name in states}
+def _left(runs: Mapping[str, Series], states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return what the motion does not take of each run's power, fitted to all beside what is on."""
+    motion = _stacked(runs, states).coefficients()[:-1]
     return {name: runs[name].values - runs[name].beside @ motion for name in states}
 
 
 def _apart(pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> np.ndarray:
     """Return where the first run of a pair has the load and the second not (1), or the other way (-1)."""
+    first, second = _on_first_clock(pair, states, runs)
+    return np.asarray(first - second)
+
+
+def _on_first_clock(
+    pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, Series]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return when either run of a pair has the load, (N,) each, at the times of their difference."""
     time = pair.difference.time
     first, second = (
         np.interp(at, runs[name].time, states[name])
         for name, at in zip(pair.names, (time, time - pair.shift), strict=True)
     )
-    return np.asarray(first - second)
+    return np.asarray(first), np.asarray(second)
 
 
 def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> float:
@@ -282,7 +225,7 @@ def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs:
 
 def _white(series: Series) -> float:
     """Return the RMS of the white noise: of the second differences, it is six times the mean square."""
-    return _SPREAD * float(np.median(np.abs(np.diff(series.values, 2)))) / float(np.sqrt(6))
+    return SPREAD * float(np.median(np.abs(np.diff(series.values, 2)))) / float(np.sqrt(6))
 
 
 def _level(
