@@ -62,6 +62,9 @@ class Reach:
         )
 
 
+KNOWN: dict[str, Reach] = {}  # by the query's text
+
+
 def of_all_rules(resources: Resources) -> Reach:
     """Return how far the rules and the constraints look."""
     return _of_rules(resources.of("rules")) | _of_shapes(resources.of("shapes"))
@@ -85,6 +88,12 @@ def _of_shapes(files: Files) -> Reach:
 
 def of_query(text: str) -> Reach:
     """Return how far a query looks from `$this`."""
+    if text not in KNOWN:
+        KNOWN[text] = _of_query(text)
+    return KNOWN[text]
+
+
+def _of_query(text: str) -> Reach:
     patterns: list[Pattern] = []
     named: set[Any] = {_THIS}
     terms: set[str] = set()

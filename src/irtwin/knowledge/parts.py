@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from pyoxigraph import BlankNode, NamedNode, Quad, Triple
 
-from irtwin.knowledge import locality
+from irtwin.knowledge import kept_reach, locality
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Closure
@@ -76,7 +76,8 @@ class Ontology:
         self.resources = graph.resources
         self.triples = graph.triples(GRAPH_ONTOLOGY)
         self.terms: set[object] = {term for triple in self.triples for term in triple}
-        self.terms.update(map(NamedNode, locality.of_all_rules(graph.resources).terms))
+        with kept_reach.kept(graph.folder):
+            self.terms.update(map(NamedNode, locality.of_all_rules(graph.resources).terms))
 
     @cached_property
     def schema(self) -> Schema:
