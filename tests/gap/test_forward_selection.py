@@ -14,7 +14,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.gap.isolation.cause import between_groups
 from irtwin.gap.isolation.forward_selection import attribute
-from irtwin.gap.regression.cross_validation import attempt, canonical_correlation
+from irtwin.gap.regression.cross_validation import canonical_correlation
 from irtwin.gap.regression.hypotheses import MISSING, Column, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import DEFAULT
@@ -104,30 +104,6 @@ def test_what_sticks_at_one_joint_does_not_hide_what_is_rare_at_another():
     assert [cause.effect for cause in attribute(system, candidates[:2], seed=0, limits=DEFAULT).causes] == ["backlash"]
     candidates[1] = replace(candidates[1], joint="joint_0")
     assert [cause.effect for cause in attribute(system, candidates[:2], seed=0, limits=DEFAULT).causes] == []
-
-
-def test_no_loud_run_alone_decides_which_shape_is_taken():
-    """Two shapes: one that all runs but the loudest have, one that fits the loudest by chance."""
-    generator = np.random.default_rng(3)
-    blocks = []
-    for run in range(RUNS):
-        columns = generator.standard_normal((ROWS, 2))
-        loud = run == 0
-        measured = (
-            0.5 * columns[:, 0]
-            + (8 * columns[:, 1] if loud else 0)
-            + (6 if loud else 1) * generator.standard_normal(ROWS)
-        )
-        blocks.append(
-            Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (triangle(np.column_stack([columns, measured])),))
-        )
-    columns = tuple(Column(EFFECT, k, Term(f"k{k}", "1")) for k in range(2))
-    system = System((), columns, np.ones((1, 2), dtype=bool), tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
-    shapes = [Variant(EFFECT, (k,), (column.term,)) for k, column in enumerate(columns)]
-    trial = attempt(system, system.moments(np.ones(1)), (), [shapes])
-    assert trial.best[0] == 0
-    gain = (trial.start - trial.loss[0]) / ROWS
-    assert np.all(gain[1:] > 0.1)
 
 
 def test_what_friction_of_another_form_imitates_has_to_explain_a_part_of_the_floor():

@@ -98,9 +98,6 @@ class NotRepeating:
     pure: float = _threshold(
         0.6, "one steady wave explains so much of what stands out, or it is a band", "share", _JUDGEMENT
     )
-    step: float = _threshold(6.0, "least step of power", "spreads of the steps of noise", _JUDGEMENT)
-    alike: float = _threshold(0.25, "steps of one load differ by no more", "share of the load", _JUDGEMENT)
-    fewest_alike: float = _threshold(0.6, "so many of the steps are alike, or no load is tried", "share", _JUDGEMENT)
     switching: float = _threshold(0.5, "switching explains so much of what differs", "share", _JUDGEMENT)
 
 

@@ -14,9 +14,6 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
 
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
-_LEAST_LEFT = 1e-3  # of what was left: a variant that leaves less fits no better
-_WORTH = 0.02  # of what is left: less no shape of a hypothesis explains that would ever be named
-_FEWEST = 4  # groups: of fewer, two left out leave too little to fit to
 
 
 @dataclass(frozen=True)
@@ -52,52 +49,33 @@ def attempt(
 ) -> Trial:
     """Try hypotheses, each a list of variants, beside the twin's terms and the `chosen` columns.
 
-    Everything is refitted without each group in turn; the shape (variant) is chosen inside the training groups, by how
-    well each of these is told by the others where there is something to tell. What is brief has its coefficients from
-    all groups: other runs cannot tell them, and joints have told that they agree.
+    Everything is refitted without each group in turn; the shape (variant) is chosen inside the training groups. What is
+    brief has its coefficients from all groups: other runs cannot tell them, and joints have told that they agree.
     """
     variants = [variant for group in candidates for variant in group]
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
     batches = _batches(system, variants)
     total = reduce(np.add, moments)
-    inside, weights = _weights(system, total, chosen)
-    whole = _fitted(total, inside, weights)
-    noise = _noise(system, moments, inside, weights)
-    weighted, scaled = np.zeros_like(total), np.empty_like(total)
-    for part, level in zip(moments, noise, strict=True):
-        weighted += np.divide(part, level, out=scaled)
-    inside, weights = _weights(system, weighted, chosen)
-    every = _fitted(weighted, inside, weights)
-    objective, _, _, values = _fit(every, every, batches, len(variants))
-    told = (every.squares - objective) / np.maximum(system.rows.max(axis=1), 1.0).sum()
-    unlikely = _unlikely(system, moments, noise, (inside, weights), _worth_a_choice(batches, owner, told))
+    whole, _ = _project(system, total, total, chosen)
+    objective, _, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss, said = np.empty((2, len(candidates), len(moments)))
     for group, part in enumerate(moments):
-        rest = np.subtract(weighted, np.divide(part, noise[group], out=scaled), out=scaled)
-        train, test = _project(system, rest, part, chosen)
+        train, test = _project(system, total - part, part, chosen)
         start[group] = test.squares
         inner, left_out, added, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
             if is_transient(variant.effect):
                 left_out[place] = _left(test, variant.columns, values[place])
-        best = _best(_with(inner, unlikely, group), owner, len(candidates))
+        best = _best(inner, owner, len(candidates))
         loss[:, group], said[:, group] = left_out[best], added[best]
-    best = _best(_with(objective, unlikely, len(moments)), owner, len(candidates))
+    best = _best(objective, owner, len(candidates))
     diagonal = whole.diagonal
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
     visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
     before = np.diag(total)
     share = np.array([_ratio(diagonal[list(variants[k].columns)], before[list(variants[k].columns)]) for k in best])
     return Trial(start, loss, said, best, tuple(values[k] for k in best), visible, share)
-
-
-def _noise(system: System, moments: Sequence[np.ndarray], inside: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return (G,) the mean square that a fit to all groups leaves of each; `inside`, `weights`: of the fit."""
-    rest = np.append(-weights[:, -1], 1.0)
-    places = np.append(inside, weights.shape[1] - 1)
-    left = [rest @ part[np.ix_(places, places)] @ rest for part in moments]
-    return np.asarray(np.maximum(left / np.maximum(system.rows.sum(axis=1), 1.0), _QUIET**2))
 
 
 def scores(
@@ -203,21 +181,13 @@ class _Products:
 def _project(system: System, train: np.ndarray, test: np.ndarray, chosen: Sequence[int]) -> tuple[_Products, _Products]:
     """Return the products of what a fit on `train` leaves of each column: on train, and on test."""
     inside, weights = _weights(system, train, chosen)
-    return _fitted(train, inside, weights), _projected(test, inside, weights)
-
-
-def _fitted(train: np.ndarray, inside: np.ndarray, weights: np.ndarray) -> _Products:
-    """Return the products of what a fit by `weights` of the columns `inside` leaves of each column, on its own data."""
-    return _Products(train, ((np.ascontiguousarray(train[inside].T), np.ascontiguousarray(weights.T)),))
-
-
-def _projected(
-    test: np.ndarray, inside: np.ndarray, weights: np.ndarray, asked: np.ndarray | slice = slice(None)
-) -> _Products:
-    """Return the products of what a fit by `weights` of the columns `inside` leaves of those `asked`, on test."""
-    own = np.ascontiguousarray(weights.T[asked])
-    seen = np.ascontiguousarray(test[inside].T[asked])
-    return _Products(test[asked][:, asked], ((own, seen - own @ test[np.ix_(inside, inside)]), (seen, own)))
+    own = np.ascontiguousarray(weights.T)
+    seen = np.ascontiguousarray(test[inside].T)
+    fitted = seen - own @ test[np.ix_(inside, inside)]
+    return (
+        _Products(train, ((np.ascontiguousarray(train[inside].T), own),)),
+        _Products(test, ((own, fitted), (seen, own))),
+    )
 
 
 def _fit(
@@ -238,66 +208,6 @@ def _fit(
         for place, value in zip(batch.place, solved, strict=True):
             values[place] = value
     return objective, left_out, added, values
-
-
-def _worth_a_choice(batches: Sequence[_Batch], owner: np.ndarray, told: np.ndarray) -> list[_Batch]:
-    """Return the variants of hypotheses that have several, of which one tells enough; `told` (V,), a row."""
-    several = np.bincount(owner) > 1
-    most = np.full(len(several), -np.inf)
-    np.maximum.at(most, owner, told)
-    kept = (several & (most >= _WORTH))[owner]
-    found = [(batch, kept[batch.place]) for batch in batches]
-    return [_Batch(b.place[some], b.columns[some], b.lowest[some]) for b, some in found if some.any()]
-
-
-def _with(objective: np.ndarray, unlikely: tuple[np.ndarray, np.ndarray], group: int) -> np.ndarray:
-    """Return the objective (V,) of the choice of shapes without a group, `unlikely` in place of it where that is known.
-
-    Both kinds are never those of one hypothesis.
-    """
-    place, values = unlikely
-    found = objective.copy()
-    found[place] = values[group]
-    return found
-
-
-def _unlikely(
-    system: System,
-    moments: Sequence[np.ndarray],
-    noise: np.ndarray,
-    twin: tuple[np.ndarray, np.ndarray],
-    batches: Sequence[_Batch],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return which variants (U,) are judged, and how unlikely each is without each group and (last) with all.
-
-    (G + 1, U): -2 log likelihood of groups by coefficients that the others tell, with Gaussian noise as large in each
-    as what is left there: the profile likelihood where noise differs from group to group. So no group with far more
-    left than the others decides alone. The twin's part is fitted to all groups, which favours no variant;
-    `twin`: its columns and weights.
-    """
-    count = len(moments)
-    if not batches or count < _FEWEST:
-        return np.zeros(0, dtype=int), np.zeros((count + 1, 0))
-    inside, weights = twin
-    asked = np.unique([*np.concatenate([batch.columns.ravel() for batch in batches]), len(moments[0]) - 1])
-    parts = [_projected(part, inside, weights, asked) for part in moments]
-    rows = np.maximum(system.rows.sum(axis=1), 1.0)
-    found = []
-    for batch in batches:
-        target = np.full((len(batch.columns), 1), len(asked) - 1)
-        both = np.concatenate([np.searchsorted(asked, batch.columns), target], axis=1)
-        own = np.stack([part.of(both) for part in parts]) / noise[:, None, None, None]
-        every = own.sum(axis=0)
-        unlikely = np.zeros((count + 1, len(both)))
-        for one in range(count):
-            for other in range(one, count):  # the same one: it alone is left out
-                train = every - own[one] - (own[other] if other != one else 0.0)
-                values = _bounded(train[:, :-1, :-1] + np.eye(both.shape[1] - 1), train[:, :-1, -1], batch.lowest)
-                for judged, without in {(one, other), (other, one)}:
-                    left = np.maximum(_squares(own[judged], values) / rows[judged], _LEAST_LEFT)
-                    unlikely[count if one == other else without] += rows[judged] * np.log(left)
-        found.append(unlikely)
-    return np.concatenate([batch.place for batch in batches]), np.concatenate(found, axis=1)
 
 
 def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.ndarray:

@@ -119,7 +119,9 @@ def _of_joint(pair: Pair, raw: Mapping[str, np.ndarray], joint: int) -> Series:
 
 def _of_power(case: Case, pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Series], Switching | None]:
     """Return what two runs differ by in power, beside what the motion may and a drift, and the load that switches."""
-    own = {motion.run: _of_run(runs[motion.run], motion) for pair in pairs for motion in (pair.first, pair.second)}
+    motions = {motion.run: motion for pair in pairs for motion in (pair.first, pair.second)}
+    by_torque = all(motion.torque is not None for motion in motions.values())  # the same columns in all of them
+    own = {name: _of_run(runs[name], motion, by_torque) for name, motion in motions.items()}
     watched = [_watched(pair, own) for pair in pairs]
     load = switching(watched, own, case.thresholds.not_repeating)
     found = [one.difference for one in watched]
@@ -144,12 +146,12 @@ def _watched(pair: Pair, runs: Mapping[str, Series]) -> Watched:
     )  # fmt: skip
 
 
-def _of_run(run: Run, motion: Motion) -> Series:
-    """Return a run's power as logged, at the motion's times, beside what its motion and torque may take."""
+def _of_run(run: Run, motion: Motion, by_torque: bool) -> Series:
+    """Return a run's power as logged, at its motion's times, beside what that may take, and its torque if it counts."""
     assert run.signals.power is not None
     values = np.asarray(make_interp_spline(run.signals.time, run.signals.power, k=1)(motion.time))
     beside = [np.ones(len(motion.time)), *np.abs(motion.dq).T, *(motion.dq**2).T]
-    if motion.torque is not None:
+    if by_torque and motion.torque is not None:
         beside += [*(motion.torque * motion.dq).T, *(motion.torque**2).T]
     else:
         beside += [*(motion.dq * motion.ddq).T, *(motion.ddq**2).T, *(motion.dq * np.cos(motion.q)).T]
