@@ -62,7 +62,8 @@ def together(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
 def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
     try:
         schema = Schema(ontology)
-        assert schema.unfit is None
+        if schema.unfit is not None:  # it makes terms of its own the same
+            raise Equality
         return (Beside(schema, facts).worth_keeping() | schema.kept) - facts
     except Contradiction:
         return None
