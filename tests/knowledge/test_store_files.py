@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import subprocess
 import sys
@@ -40,6 +41,32 @@ def test_a_table_that_differs_is_named(folder: Path) -> None:
         assert store_files.fault(folder) == f"{file.name} {fault}"
     file.unlink()
     assert store_files.fault(folder) == f"{file.name} is missing"
+
+
+def test_a_table_is_read_again_only_where_its_time_is_another(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = list[Path]()
+    crc = store_files._crc
+    monkeypatch.setattr(store_files, "_crc", lambda file: read.append(file) or crc(file))
+    assert store_files.fault(folder) is None
+    assert not read
+    file = max(folder.glob("*.sst"))
+    os.utime(file, ns=(0, 0))  # as where it was put back from a copy
+    assert store_files.fault(folder) is None
+    assert read == [file]
+    with KnowledgeGraph(folder):
+        pass  # notes the time that it has now
+    read.clear()
+    assert store_files.fault(folder) is None
+    assert not read
+
+
+def test_a_table_altered_while_the_graph_is_open_is_named_when_it_is_opened_next(folder: Path) -> None:
+    file = max(folder.glob("*.sst"), key=lambda file: file.stat().st_size)
+    with KnowledgeGraph(folder):
+        content = file.read_bytes()
+        file.write_bytes(content[:100] + b"!" + content[101:])
+    if file.exists():
+        assert store_files.fault(folder) == f"{file.name} was altered"
 
 
 def test_a_manifest_cut_anywhere_is_told(folder: Path) -> None:

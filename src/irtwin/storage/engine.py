@@ -17,6 +17,7 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
+_MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
 _DAMAGE = ("malformed", "not a database", "could not decode to UTF-8", "Could not decode to UTF-8")
 _SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
 _FULL = ("is full", "disk I/O error")
@@ -145,12 +146,18 @@ def use_write_ahead_log(engine: Engine) -> None:
 
 
 def check(engine: Engine) -> None:
-    """Look through an SQLite database. Raises InputError where its file is damaged."""
-    if engine.dialect.name == "sqlite":
-        with engine.connect() as connection:
-            found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
-        if found != "ok":
-            raise InputError(_damaged(engine.url, " ".join(str(found).split())))
+    """Look through an SQLite database that is not large. Raises InputError where its file is damaged."""
+    if engine.dialect.name != "sqlite":
+        return
+    with engine.connect() as connection:
+        size = connection.exec_driver_sql(
+            "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
+        ).scalar_one()
+        if size > _MOST_LOOKED_THROUGH:
+            return
+        found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
+    if found != "ok":
+        raise InputError(_damaged(engine.url, " ".join(str(found).split())))
 
 
 def _tell(url: URL, error: BaseException) -> None:

@@ -28,6 +28,7 @@ CREATE TABLE IF NOT EXISTS version (name TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS entries (number INTEGER PRIMARY KEY, content BLOB NOT NULL, crc INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS kept_row (id INTEGER PRIMARY KEY, content TEXT NOT NULL, crc INTEGER NOT NULL);
 """
+_KEPT_ROW = "SELECT CAST(content AS BLOB), crc FROM kept_row WHERE id = ?"  # damaged, it may be no text
 _PLAIN = (type(None), bool, int, float, str)
 _RESTORED: dict[str, Callable[[str], Any]] = {
     "bytes": bytes.fromhex,
@@ -103,10 +104,10 @@ class RememberedRows:
     def rows(self, entries: Entries) -> Iterator[list[Any]]:
         """Yield the kept rows of these entries."""
         for number in entries["id"].tolist():
-            found = self._connection.execute("SELECT content, crc FROM kept_row WHERE id = ?", (number,)).fetchone()
+            found = self._connection.execute(_KEPT_ROW, (number,)).fetchone()
             if found is None:
                 raise DamagedRows
-            content = json.loads(_checked(found[0].encode(), found[1]))
+            content = json.loads(_checked(*found))
             yield [_restored(value) if isinstance(value, dict) else value for value in content]
 
     def drop(self, entries: Entries) -> None:

@@ -4,7 +4,7 @@ RocksDB opens sixteen of its tables at once and the others when they are read. A
 missing or altered never ends, and takes all memory; one that opens a manifest cut between two records shows an older
 state, or an empty store. So what was noted when the store was closed is compared: the CRC-32 of the tables that the
 manifest names, which never change once they are written, and that of the manifest, which only grows. A store that is
-opened to write begins a new manifest.
+opened to write begins a new manifest. Tables are read again only where their time is not the one noted.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-_SUMS = "irtwin-sums.json"  # {"tables": {name: CRC-32}, "manifest": [name, size, CRC-32]}
+_SUMS = "irtwin-sums.json"  # {"tables": {name: [CRC-32, time in ns]}, "manifest": [name, size, CRC-32]}
 _BLOCK, _HEADER = 32768, 7
 _PIECE = 1 << 20
 _TRIES = 20
@@ -24,6 +24,7 @@ _NUMBERS = {2: 1, 3: 1, 4: 1, 6: 2, 9: 1, 10: 1, 200: 1, 202: 0, 203: 1, 300: 1}
 _TEXT, _CURSOR, _DELETED, _NEW, _IGNORABLE = (1, 201), 5, 6, 103, 8192
 
 Tables = dict[str, int]  # name -> size
+Sums = dict[str, list[int]]  # name -> CRC-32, time of the last change in ns
 
 
 def fault(folder: Path) -> str | None:
@@ -40,15 +41,16 @@ def fault(folder: Path) -> str | None:
 def note_sums(folder: Path) -> None:
     """Note the CRC-32 of the tables and of the manifest, so that a later change of them is found."""
     before = _noted(folder)
-    known, sums = _sums(before), {}
+    known, sums = _sums(before), Sums()
     for name in _tables(folder) or {}:
         with suppress(FileNotFoundError):  # the store has merged it into another meanwhile
-            sums[name] = known[name] if name in known else _crc(folder / name)
+            found, noted = _sum(folder / name, known.get(name)), known.get(name)
+            sums[name] = noted if noted and noted[0] != found[0] else found  # altered: told when it is opened next
     manifest = _manifest(folder)
-    noted = {"tables": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
-    if noted != before:
+    now = {"tables": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
+    if now != before:
         temporary = folder / f".{_SUMS}"
-        temporary.write_text(json.dumps(noted))
+        temporary.write_text(json.dumps(now))
         temporary.replace(folder / _SUMS)
 
 
@@ -63,7 +65,7 @@ def _fault(folder: Path) -> str | None:
         try:
             if (folder / name).stat().st_size != size:
                 return f"{name} has another size"
-            if name in sums and _crc(folder / name) != sums[name]:
+            if name in sums and _sum(folder / name, sums[name])[0] != sums[name][0]:
                 return f"{name} was altered"
         except FileNotFoundError:
             return f"{name} is missing"
@@ -78,9 +80,17 @@ def _noted(folder: Path) -> dict[str, Any]:
     return said if isinstance(said, dict) else {}
 
 
-def _sums(noted: dict[str, Any]) -> dict[str, int]:
+def _sums(noted: dict[str, Any]) -> Sums:
     tables = noted.get("tables")
-    return tables if isinstance(tables, dict) else {}
+    if not isinstance(tables, dict):
+        return {}
+    return {name: said for name, said in tables.items() if isinstance(said, list) and len(said) == 2}
+
+
+def _sum(table: Path, known: list[int] | None) -> list[int]:
+    """Return a table's CRC-32 and time; what is known of it where its time is that."""
+    time = table.stat().st_mtime_ns
+    return known if known and known[1] == time else [_crc(table), time]
 
 
 def _is_altered(folder: Path, noted: dict[str, Any]) -> bool:
