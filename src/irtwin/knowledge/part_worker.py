@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 from irtwin.knowledge import parts
+from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.parts import Joined, Name, Ontology, Region, Seen
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.resources import Resources
@@ -77,6 +78,7 @@ class Worker(Generic[Made]):
         self._process.stdin.flush()
 
 
+@seldom_collected()
 def main() -> None:
     """Answer until standard input ends."""
     source, out = sys.stdin.buffer, sys.stdout.buffer

@@ -17,6 +17,7 @@ from pyoxigraph import Literal, NamedNode, Quad, Triple
 from irtwin.knowledge import by_parts, engines, parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of
 from irtwin.knowledge.engines import NATIVE
+from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.parts import Joined, Ontology
 from irtwin.knowledge.store.blank_nodes import has_blank_node
@@ -69,6 +70,7 @@ class Inferences:
     set_aside: tuple[tuple[str, str], ...] = ()
 
 
+@seldom_collected()
 def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 

@@ -22,6 +22,7 @@ from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import Connection, Engine
 
 from irtwin.errors import InputError
+from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.remembered import ENTRY, DamagedRows, Entries, RememberedRows
@@ -36,6 +37,7 @@ _VERSION_GRAPH = f"{GRAPH_SOURCE}version"
 _ASK_VERSION = f"SELECT ?version {{ GRAPH <{_VERSION_GRAPH}> {{ ?graphs owl:versionInfo ?version }} }}"
 
 
+@seldom_collected()
 def refresh(
     graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], file: Path, seconds: float = math.inf
 ) -> None:

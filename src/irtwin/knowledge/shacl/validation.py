@@ -18,6 +18,7 @@ from rdflib.namespace import SH
 
 from irtwin.knowledge import each_part, parts
 from irtwin.knowledge.conclusions import content_name
+from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.parts import Joined, Ontology, Region
 from irtwin.knowledge.reasoning import asserted
 from irtwin.knowledge.reasoning import made_of as reasoned_from
@@ -55,6 +56,7 @@ class Violation:
         return f"{of}{shorten(self.node)}: {self.message}{found}"
 
 
+@seldom_collected()
 def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
     """Check the graph; return what breaks a constraint, and keep SHACL's report as a named graph.
 

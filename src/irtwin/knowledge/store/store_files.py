@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-_SUMS = "irtwin-sums.json"  # {"tables": {name: [CRC-32, time in ns]}, "manifest": [name, size, CRC-32]}
+_SUMS = "irtwin-sums.json"  # {"read": {name: [CRC-32, time in ns]}, "manifest": [name, size, CRC-32]}
 _BLOCK, _HEADER = 32768, 7
 _PIECE = 1 << 20
 _TRIES = 20
@@ -47,7 +47,7 @@ def note_sums(folder: Path) -> None:
             found, noted = _sum(folder / name, known.get(name)), known.get(name)
             sums[name] = noted if noted and noted[0] != found[0] else found  # altered: told when it is opened next
     manifest = _manifest(folder)
-    now = {"tables": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
+    now = {"read": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
     if now != before:
         temporary = folder / f".{_SUMS}"
         temporary.write_text(json.dumps(now))
@@ -81,10 +81,10 @@ def _noted(folder: Path) -> dict[str, Any]:
 
 
 def _sums(noted: dict[str, Any]) -> Sums:
-    tables = noted.get("tables")
-    if not isinstance(tables, dict):
+    read = noted.get("read")
+    if not isinstance(read, dict):
         return {}
-    return {name: said for name, said in tables.items() if isinstance(said, list) and len(said) == 2}
+    return {name: said for name, said in read.items() if isinstance(said, list) and len(said) == 2}
 
 
 def _sum(table: Path, known: list[int] | None) -> list[int]:
