@@ -39,8 +39,15 @@ def test_replace_drops_graphs_below_that_have_nothing_left(two_robots: list[Quad
     kept = [quad for quad in two_robots if "Arm_B" not in quad.graph_name.value]
     changed = graph.replace(kept, GRAPH_SOURCE, GRAPH_ACTIVITY)
     assert all("Arm_B" in name for name in changed)
-    assert graph.graphs(GRAPH_ACTIVITY + "energy") == [GRAPH_ACTIVITY + "energy.Arm_A"]
-    assert graph.graphs(GRAPH_ONTOLOGY) == [GRAPH_ONTOLOGY]
+    assert not any("Arm_B" in name for name in graph.graphs(GRAPH_ACTIVITY, GRAPH_SOURCE))
+    assert GRAPH_ACTIVITY + "energy.Arm_A" in graph.graphs(GRAPH_ACTIVITY)
+
+
+def test_a_name_in_a_slash_stands_for_the_graphs_below_it_and_any_other_for_itself(graph: KnowledgeGraph) -> None:
+    assert graph.graphs(GRAPH_ACTIVITY + "energy", GRAPH_ACTIVITY) == graph.graphs(GRAPH_ACTIVITY)
+    assert graph.graphs(GRAPH_ACTIVITY + "energy", GRAPH_ONTOLOGY) == [GRAPH_ONTOLOGY]
+    assert graph.triples(GRAPH_ACTIVITY + "energy") == set()
+    assert graph.triples(GRAPH_ACTIVITY + "energy.Arm_A")
 
 
 def test_same_quads_change_nothing(two_robots: list[Quad], graph: KnowledgeGraph) -> None:

@@ -145,9 +145,8 @@ def as_one_part(graph: KnowledgeGraph) -> dict[str, set]:
         patch.setattr(parts, "join", lambda *_: "for comparison")
         patch.setattr(by_parts, "conclude", refused)
         copy = KnowledgeGraph()
-        copy.replace(
-            (it for it in graph.quads() if not it.graph_name.value.startswith((GRAPH_INFERRED, GRAPH_REASONED))), ""
-        )
+        names = [name for name in graph.graphs() if not name.startswith((GRAPH_INFERRED, GRAPH_REASONED))]
+        copy.replace((it for name in names for it in graph.quads_in(name)), *names)
         assert reason(copy).joined_by == "for comparison"
         return conclusions(copy)
 

@@ -85,7 +85,7 @@ class Writing(RuleBasedStateMachine):
     @invariant()
     def answers_are_of_now(self) -> None:
         anew = KnowledgeGraph()
-        anew.replace(self.graph.quads(), "")
+        anew.replace(self.graph.quads(), *self.graph.graphs())
         for text in (ASK, SUM):
             assert self.graph.query(text).rows == anew.query(text).rows
 

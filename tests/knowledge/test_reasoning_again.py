@@ -14,6 +14,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_REASONED,
     GRAPH_SHACL,
     GRAPH_SOURCE,
+    GRAPH_SWRL,
     RDF,
     RDFS,
     term,
@@ -79,6 +80,9 @@ def test_any_change_gives_what_a_full_run_gives(states: list[list[Quad]]) -> Non
         assert after == anew(quads)
         differing = {name for name in {*before, *after} - {GRAPH_REASONED} if before.get(name) != after.get(name)}
         assert set(outcome.changed) == differing
+        assert outcome.owl_rl == len(after.get(GRAPH_OWL_RL, ()))
+        of_rules = {name: found for name, found in after.items() if name.startswith((GRAPH_SHACL, GRAPH_SWRL))}
+        assert outcome.by_rules == sum(map(len, of_rules.values()))
 
 
 def test_graphs_of_rules_whose_premises_stay_are_not_rewritten() -> None:
@@ -86,8 +90,8 @@ def test_graphs_of_rules_whose_premises_stay_are_not_rewritten() -> None:
     graph.replace(FACTS, GRAPH_SOURCE)
     reason(graph)
     graph.replace([one for one in FACTS if one.predicate.value != term("Idle_Share")], GRAPH_SOURCE)
-    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}/idle_heavy_run")
-    assert graph.triples(f"{GRAPH_SHACL}/dominant_joint")
+    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}idle_heavy_run")
+    assert graph.triples(f"{GRAPH_SHACL}dominant_joint")
 
 
 def test_only_what_differs_is_written(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,7 +50,7 @@ def rule(*body: str, head: str = MARKED, label: str = 'rdfs:label "odd" ;') -> R
 
 def marked(*body: str) -> str:
     found = conclusions(triples(FACTS), [rule(*body)])
-    return "".join(sorted(triple.subject.value.removeprefix(EX) for triple in found[f"{GRAPH_SWRL}/odd"]))
+    return "".join(sorted(triple.subject.value.removeprefix(EX) for triple in found[f"{GRAPH_SWRL}odd"]))
 
 
 MORE_THAN_FIVE = "[ a rdfs:Datatype ; owl:onDatatype xsd:double ; owl:withRestrictions ( [ xsd:minExclusive 5.0e0 ] ) ]"

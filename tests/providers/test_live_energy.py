@@ -156,9 +156,9 @@ def test_a_gap_that_lasts_raises_one_alarm_and_clears_it(
     assert {"irt:Excursion_Lasted", "irt:Peak_Residual", "irt:Gap_Alarm_Time"} <= {
         one.what.split()[1] for one in why.because
     }
-    found = graph.triples(f"{GRAPH_SHACL}/gap_alarm")
+    found = graph.triples(f"{GRAPH_SHACL}gap_alarm")
     reason(graph)
-    assert graph.triples(f"{GRAPH_SHACL}/gap_alarm") == found  # raised live as the rules conclude it of the graph
+    assert graph.triples(f"{GRAPH_SHACL}gap_alarm") == found  # raised live as the rules conclude it of the graph
     assert validate(graph) == ()
 
 
@@ -170,9 +170,9 @@ def test_a_run_that_the_twin_misses_raises_an_alarm_when_it_ends(place: Workspac
     (alarm,) = (row for row in ask(graph, "alarms") if row["rule"] == "twin_alarm")
     assert (alarm["state"], alarm["since"].timestamp()) == ("active", NOON)
     assert alarm["reason"].startswith("the twin misses the energy of this run by ")
-    found = graph.triples(f"{GRAPH_SHACL}/twin_alarm")
+    found = graph.triples(f"{GRAPH_SHACL}twin_alarm")
     reason(graph)
-    assert graph.triples(f"{GRAPH_SHACL}/twin_alarm") == found
+    assert graph.triples(f"{GRAPH_SHACL}twin_alarm") == found
     assert validate(graph) == ()
 
 

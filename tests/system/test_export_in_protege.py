@@ -55,6 +55,6 @@ def test_a_dl_reasoner_draws_the_same_conclusions(graph: KnowledgeGraph, found: 
     ours = {
         (one.subject.value, one.predicate.value, one.object.value)
         for name in RULES.values()
-        for one in graph.triples(f"{GRAPH_SHACL}/{name}")
+        for one in graph.triples(f"{GRAPH_SHACL}{name}")
     }
     assert {tuple(triple) for triple in found[reasoner]} == ours != set()

@@ -63,6 +63,7 @@ _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 _ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
 _NAMES = (NamedNode, BlankNode)
 _RECENT: WeakKeyDictionary[KnowledgeGraph, tuple[int, dict[Name, Region]]] = WeakKeyDictionary()
+_ONTOLOGIES: WeakKeyDictionary[KnowledgeGraph, tuple[int, Ontology]] = WeakKeyDictionary()
 
 
 class Joined(Exception):
@@ -78,6 +79,14 @@ class Ontology:
         self.terms: set[object] = {term for triple in self.triples for term in triple}
         with kept_reach.kept(graph.folder):
             self.terms.update(map(NamedNode, locality.of_all_rules(graph.resources).terms))
+
+    @classmethod
+    def of(cls, graph: KnowledgeGraph) -> Ontology:
+        """Return a graph's ontology: that of before while nothing is asserted, as far as others cannot do so."""
+        count, kept = _ONTOLOGIES.get(graph, (-1, None))
+        if kept is None or count != graph.asserted_since or graph.folder is None:
+            _ONTOLOGIES[graph] = graph.asserted_since, (kept := cls(graph))
+        return kept
 
     @cached_property
     def schema(self) -> Schema:

@@ -8,6 +8,7 @@ everything where the graph is one part.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge import by_parts, engines, parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of
+from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, counted, graph_of, notes_of, sizes
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
@@ -34,8 +35,6 @@ from irtwin.knowledge.vocabulary import (
     PROV,
     term,
 )
-
-_COUNT = f"SELECT (COUNT(*) AS ?count) {{ GRAPH <{GRAPH_OWL_RL}> {{ ?s ?p ?o }} }}"
 
 _SET_ASIDE = f"""
 SELECT ?robot ?why WHERE {{ GRAPH <{GRAPH_REASONED}> {{ ?robot <{term("Contradiction")}> ?why }} }} ORDER BY ?robot"""
@@ -79,7 +78,7 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     contradiction that is no robot's, and what was inferred before is dropped. Engines other than the native one close
     the graph as one part, take no contradiction, and leave what was inferred before as it is where they fail.
     """
-    ontology = Ontology(graph)
+    ontology = Ontology.of(graph)
     changed = graph.changed(GRAPH_INFERRED)
     if engine != NATIVE:
         return _reason_over_all(graph, ontology, changed, engine)
@@ -119,12 +118,21 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> 
         changes = by_parts.conclude(graph, ontology)
         base = Conclusions(made_of={_OWL_RL: name}, made_by={_made_by(NATIVE)}).quads()
         changes.write(changed | notes - changes.noted - base, base - notes)
+        graph.change((), notes_of(counted(graph)))
     elif changed:
         changes = by_parts.conclude(graph, ontology, nodes_of(changed))
-        changes.write(changed)
+        before = sizes(graph)
+        changes.write(changed | notes_of(before), notes_of(_grown(before, changes.grown)))
     else:
         return _count(graph, ())
     return _count(graph, changes.names)
+
+
+def _grown(before: Counter[str], by: Counter[str]) -> Counter[str]:
+    """Return the sizes of the inferred graphs after a change."""
+    after = before.copy()
+    after.update({name: count for name, count in by.items() if name.startswith(GRAPH_INFERRED)})
+    return after
 
 
 def _reason_over_all(
@@ -146,6 +154,7 @@ def _reason_over_all(
     found.made_of[_OWL_RL] = content_name(ontology.triples, ontology.resources) if in_parts else everything
     found.made_by.add(_made_by(engine))
     new = found.quads()
+    new |= notes_of(Counter(name for name in map(graph_of, new) if name.startswith(GRAPH_INFERRED)))
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
         graph.change(changed or (), ())
@@ -225,9 +234,10 @@ def engine_of(graph: KnowledgeGraph) -> str:
 def _count(graph: KnowledgeGraph, changed: Iterable[str], joined_by: str | None = None) -> Inferences:
     names = set(changed) - {GRAPH_REASONED, GRAPH_CHANGED}
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
+    held = sizes(graph)
     return Inferences(
-        graph.query(_COUNT).rows[0]["count"],
-        len(graph.triples(GRAPH_SHACL, GRAPH_SWRL)),
+        held[GRAPH_OWL_RL],
+        sum(count for name, count in held.items() if name.startswith((GRAPH_SHACL, GRAPH_SWRL))),
         tuple(sorted(names)),
         joined_by,
         tuple(aside),

@@ -62,7 +62,7 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
 
     Only parts of the graph that changed since are checked again, if it was reasoned over in parts: see `parts`.
     """
-    ontology = Ontology(graph)
+    ontology = Ontology.of(graph)
     made_of = content_name(ontology.triples, graph.resources)
     changed = graph.changed(GRAPH_VALIDATION)
     in_parts = changed is not None and made_of == reasoned_from(graph) and not graph.changed(GRAPH_INFERRED)

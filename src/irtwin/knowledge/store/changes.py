@@ -19,9 +19,11 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_VALIDATION,
     PROV,
     RDF,
+    VOID,
 )
 
 DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
+TRIPLES = NamedNode(VOID + "triples")  # how many a named graph of conclusions holds
 NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
 
 _CHANGED = NamedNode(GRAPH_CHANGED)
@@ -51,12 +53,13 @@ def nodes_of(noted: Iterable[Quad]) -> set[NamedNode | BlankNode]:
 
 
 def made_of(store: Store) -> set[Quad]:
-    """Return the quads that say of what the inferred graphs and the report of validation were made."""
-    return {
+    """Return the quads that say of what the inferred graphs and the report of validation were made, and how large."""
+    made = (
         quad
         for name in (GRAPH_OWL_RL, GRAPH_VALIDATION)
         for quad in store.quads_for_pattern(NamedNode(name), DERIVED_FROM, None, _REASONED)
-    }
+    )
+    return {*made, *store.quads_for_pattern(None, TRIPLES, None, _REASONED)}
 
 
 def is_asserted(quad: Quad) -> bool:

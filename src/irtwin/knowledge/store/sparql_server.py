@@ -105,6 +105,10 @@ class SparqlServer:
         rows = cast(QuerySolutions, self.query("SELECT DISTINCT ?graph { GRAPH ?graph { ?s ?p ?o } }"))
         return (cast(NamedNode, row["graph"]) for row in rows)
 
+    def contains_named_graph(self, name: NamedNode) -> bool:
+        """Whether a graph holds something."""
+        return bool(self.query(f"ASK {{ GRAPH {name} {{ ?s ?p ?o }} }}"))
+
     def quads_for_pattern(
         self, subject: None, predicate: None, object: None, graph: NamedNode | DefaultGraph
     ) -> Iterator[Quad]:
