@@ -48,6 +48,7 @@ def test_a_name_in_a_slash_stands_for_the_graphs_below_it_and_any_other_for_itse
     assert graph.graphs(GRAPH_ACTIVITY + "energy", GRAPH_ONTOLOGY) == [GRAPH_ONTOLOGY]
     assert graph.triples(GRAPH_ACTIVITY + "energy") == set()
     assert graph.triples(GRAPH_ACTIVITY + "energy.Arm_A")
+    assert graph.graphs("") == graph.graphs()
 
 
 def test_same_quads_change_nothing(two_robots: list[Quad], graph: KnowledgeGraph) -> None:

@@ -260,8 +260,8 @@ class KnowledgeGraph:
 
     @telling
     def graphs(self, *below: str) -> list[str]:
-        """Return the IRIs of the named graphs, of all or of those in `below`: a name in / is of all that begin so."""
-        if below and not any(name.endswith("/") for name in below):  # a fleet has too many to look through
+        """Return the IRIs of the named graphs: all, or those `below`, where one in / or "" is of all that begin so."""
+        if below and not any(map(_is_of_many, below)):  # a fleet has too many to look through
             return sorted(name for name in set(below) if self._store.contains_named_graph(NamedNode(name)))
         return sorted(name for name in _names(self._store) if not below or _is_below(name, below))
 
@@ -455,8 +455,12 @@ def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
         yield quad
 
 
+def _is_of_many(name: str) -> bool:
+    return not name or name.endswith("/")
+
+
 def _is_below(name: str, below: tuple[str, ...]) -> bool:
-    return any(name.startswith(one) if one.endswith("/") else name == one for one in below)
+    return any(name.startswith(one) if _is_of_many(one) else name == one for one in below)
 
 
 def _names(store: Store | SparqlServer) -> list[str]:
