@@ -80,7 +80,8 @@ def read_mesh(content: bytes, suffix: str, where: str) -> Mesh:
             points, faces = np.asarray(read.vertices, float) * metres, np.asarray(read.faces, np.int64)
     except _DAMAGED as error:
         raise InputError(f"{where}: is no mesh that can be read ({_first_line(error)}); export it again") from error
-    if not len(faces) or not np.isfinite(points).all() or np.abs(points).max() > 1e6:
+    in_space = points.shape[1:] == (3,)  # a damaged OBJ file may hold pairs
+    if not len(faces) or not in_space or not np.isfinite(points).all() or np.abs(points).max() > 1e6:
         raise InputError(f"{where}: holds no triangles of finite size; export it again")
     return Mesh(points, faces)
 
