@@ -1,5 +1,7 @@
 """What is inferred after any change is what would be inferred from nothing, and nothing else is touched."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -7,7 +9,7 @@ from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
 
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_OWL_RL,
@@ -83,6 +85,22 @@ def test_any_change_gives_what_a_full_run_gives(states: list[list[Quad]]) -> Non
         assert outcome.owl_rl == len(after.get(GRAPH_OWL_RL, ()))
         of_rules = {name: found for name, found in after.items() if name.startswith((GRAPH_SHACL, GRAPH_SWRL))}
         assert outcome.by_rules == sum(map(len, of_rules.values()))
+
+
+def test_what_is_written_beside_the_reasoner_is_counted_too(tmp_path: Path) -> None:
+    """As live runs write what their rules conclude."""
+    with KnowledgeGraph(tmp_path / "graph") as graph:
+        graph.replace(FACTS, GRAPH_SOURCE)
+        first = reason(graph)
+        said = quad(RUNS[0], term("Alarm_State"), Literal("active"))
+        (alarm,) = in_graph([said.triple], f"{GRAPH_SHACL}gap_alarm")
+        graph.change((), {alarm})
+        assert reason(graph).by_rules == first.by_rules + 1
+        graph.change({alarm}, ())
+        graph.change({FACTS[0]}, ())
+        done = reason(graph)
+        assert done.owl_rl == len(graph.triples(GRAPH_OWL_RL))
+        assert done.by_rules == sum(len(graph.triples(name)) for name in graph.graphs(GRAPH_SHACL, GRAPH_SWRL))
 
 
 def test_graphs_of_rules_whose_premises_stay_are_not_rewritten() -> None:

@@ -55,7 +55,6 @@ class Changes:
     added: set[Quad] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
     noted: set[Quad] = field(default_factory=set)
-    written: Counter[str] = field(default_factory=Counter)  # by how many quads graphs have grown already
 
     def take(self, change: Change) -> None:
         """Let some quads be in the place of others, and know of notes that stood before; write when there are many."""
@@ -71,14 +70,12 @@ class Changes:
     def write(self, removed: Iterable[Quad] = (), added: Iterable[Quad] = ()) -> None:
         """Write what waits, and more; a name of what conclusions are made of goes before they change."""
         self.graph.change(self.removed.union(removed), self.added.union(added))
-        self.written = self.grown
         self.removed, self.added = set(), set()
 
     @property
     def grown(self) -> Counter[str]:
-        """By how many quads the named graphs grow, of parts that speak of different nodes."""
-        grown = self.written.copy()
-        grown.update(map(graph_of, self.added - self.removed))
+        """By how many quads the named graphs will grow when what waits is written."""
+        grown = Counter(map(graph_of, self.added - self.removed))
         grown.subtract(map(graph_of, self.removed - self.added))
         return grown
 

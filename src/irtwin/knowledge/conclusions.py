@@ -68,16 +68,11 @@ def _rules(files: Files) -> bytes:
 
 
 def sizes(graph: KnowledgeGraph) -> Counter[str]:
-    """Return how many quads each named graph of conclusions holds: as is noted beside them, else counted."""
+    """Return how many quads each named graph of conclusions holds: as noted beside them, else counted."""
     noted = {it.subject: it.object for it in graph.triples(GRAPH_REASONED) if it.predicate == TRIPLES}
     if noted:
         return Counter({name.value: int(count.value) for name, count in noted.items()})  # type: ignore[union-attr]
-    return counted(graph)
-
-
-def counted(graph: KnowledgeGraph) -> Counter[str]:
-    """Return the same, counted."""
-    return Counter({name: sum(1 for _ in graph.quads_in(name)) for name in graph.graphs(GRAPH_INFERRED)})
+    return Counter({name: graph.size(name) for name in graph.graphs(GRAPH_INFERRED)})
 
 
 def notes_of(sizes: Counter[str]) -> set[Quad]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge import by_parts, engines, parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, counted, graph_of, notes_of, sizes
+from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of, notes_of, sizes
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
@@ -118,7 +118,7 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> 
         changes = by_parts.conclude(graph, ontology)
         base = Conclusions(made_of={_OWL_RL: name}, made_by={_made_by(NATIVE)}).quads()
         changes.write(changed | notes - changes.noted - base, base - notes)
-        graph.change((), notes_of(counted(graph)))
+        graph.change((), notes_of(sizes(graph)))
     elif changed:
         changes = by_parts.conclude(graph, ontology, nodes_of(changed))
         before = sizes(graph)
@@ -154,12 +154,13 @@ def _reason_over_all(
     found.made_of[_OWL_RL] = content_name(ontology.triples, ontology.resources) if in_parts else everything
     found.made_by.add(_made_by(engine))
     new = found.quads()
-    new |= notes_of(Counter(name for name in map(graph_of, new) if name.startswith(GRAPH_INFERRED)))
+    noted = notes_of(Counter(name for name in map(graph_of, new) if name.startswith(GRAPH_INFERRED)))
+    new |= noted
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
         graph.change(changed or (), ())
     else:
-        graph.change((old - new) | (changed or set()), new - old)
+        graph.change((old - new) | (changed or set()), (new - old) | noted)
     return _count(graph, map(graph_of, new ^ old), found.joined_by)
 
 

@@ -210,6 +210,7 @@ class KnowledgeGraph:
         taken -= given
         self.asserted_since += any(map(changes.is_asserted, chain(taken, given)))
         if isinstance(self._store, Store):
+            taken |= changes.outdated_sizes(self._store, taken | given) - given
             given |= changes.notes(self._store, taken | given)
         if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
@@ -260,7 +261,10 @@ class KnowledgeGraph:
 
     @telling
     def graphs(self, *below: str) -> list[str]:
-        """Return the IRIs of the named graphs: all, or those `below`, where one in / or "" is of all that begin so."""
+        """Return the IRIs of the named graphs: of all, or of those that are `below`.
+
+        below: whole IRIs; one that ends in / stands for all graphs whose IRIs begin with it, and "" for all.
+        """
         if below and not any(map(_is_of_many, below)):  # a fleet has too many to look through
             return sorted(name for name in set(below) if self._store.contains_named_graph(NamedNode(name)))
         return sorted(name for name in _names(self._store) if not below or _is_below(name, below))
@@ -400,6 +404,11 @@ class KnowledgeGraph:
         assert isinstance(self._store, Store)
         quads = self._store.quads_for_pattern(None, predicate, object, DefaultGraph())
         return {quad.subject for quad in quads}  # type: ignore[misc]
+
+    def size(self, name: str) -> int:
+        """Return how many triples a named graph holds."""
+        (row,) = self._store.query(f"SELECT (COUNT(*) AS ?n) {{ GRAPH <{name}> {{ ?s ?p ?o }} }}")  # type: ignore[misc]
+        return int(row["n"].value)
 
     def sizes(self) -> Iterator[tuple[str, int]]:
         """Yield the IRIs of the named graphs and how many triples each holds."""
