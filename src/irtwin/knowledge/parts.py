@@ -82,7 +82,7 @@ class Ontology:
 
     @classmethod
     def of(cls, graph: KnowledgeGraph) -> Ontology:
-        """Return a graph's ontology: that of before while nothing is asserted, as far as others cannot do so."""
+        """Return a graph's ontology; of a graph in a folder the same one until something is asserted."""
         count, kept = _ONTOLOGIES.get(graph, (-1, None))
         if kept is None or count != graph.asserted_since or graph.folder is None:
             _ONTOLOGIES[graph] = graph.asserted_since, (kept := cls(graph))

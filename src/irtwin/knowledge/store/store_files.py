@@ -4,7 +4,7 @@ RocksDB opens sixteen of its tables at once and the others when they are read. A
 missing or altered never ends, and takes all memory; one that opens a manifest cut between two records shows an older
 state, or an empty store. So what was noted when the store was closed is compared: the CRC-32 of the tables that the
 manifest names, which never change once they are written, and that of the manifest, which only grows. A store that is
-opened to write begins a new manifest. Tables are read again only where their time is not the one noted.
+opened to write begins a new manifest. A table is read again only where its modification time is not the one noted.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-_SUMS = "irtwin-sums.json"  # {"read": {name: [CRC-32, time in ns]}, "manifest": [name, size, CRC-32]}
+_SUMS = "irtwin-sums.json"  # {"read": {name: [CRC-32, mtime in ns]}, "manifest": [name, size, CRC-32]}
 _BLOCK, _HEADER = 32768, 7
 _PIECE = 1 << 20
 _TRIES = 20
@@ -24,7 +24,7 @@ _NUMBERS = {2: 1, 3: 1, 4: 1, 6: 2, 9: 1, 10: 1, 200: 1, 202: 0, 203: 1, 300: 1}
 _TEXT, _CURSOR, _DELETED, _NEW, _IGNORABLE = (1, 201), 5, 6, 103, 8192
 
 Tables = dict[str, int]  # name -> size
-Sums = dict[str, list[int]]  # name -> CRC-32, time of the last change in ns
+Sums = dict[str, list[int]]  # name -> CRC-32, modification time in ns
 
 
 def fault(folder: Path) -> str | None:
@@ -45,7 +45,7 @@ def note_sums(folder: Path) -> None:
     for name in _tables(folder) or {}:
         with suppress(FileNotFoundError):  # the store has merged it into another meanwhile
             found, noted = _sum(folder / name, known.get(name)), known.get(name)
-            sums[name] = noted if noted and noted[0] != found[0] else found  # altered: told when it is opened next
+            sums[name] = noted if noted and noted[0] != found[0] else found  # altered: told at the next opening
     manifest = _manifest(folder)
     now = {"read": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
     if now != before:
@@ -88,9 +88,9 @@ def _sums(noted: dict[str, Any]) -> Sums:
 
 
 def _sum(table: Path, known: list[int] | None) -> list[int]:
-    """Return a table's CRC-32 and time; what is known of it where its time is that."""
-    time = table.stat().st_mtime_ns
-    return known if known and known[1] == time else [_crc(table), time]
+    """Return a table's CRC-32 and modification time: those known, where that time is the same."""
+    modified = table.stat().st_mtime_ns
+    return known if known and known[1] == modified else [_crc(table), modified]
 
 
 def _is_altered(folder: Path, noted: dict[str, Any]) -> bool:
