@@ -20,6 +20,7 @@ from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.files import inside
 from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
+from irtwin.storage.row_changes import keep_notes
 from irtwin.storage.rows import (
     base_of,
     drop_activities,
@@ -141,6 +142,10 @@ class Workspace:
     def mapped_rows(self) -> Path:
         """Where the mapping remembers the rows that the graph was made of."""
         return self.folder / "mapped_rows.db"
+
+    def note_changes(self) -> None:
+        """Have each change of a row noted from now on, so that a mapping need not read them all again."""
+        keep_notes(self.engine, Base.metadata.tables.keys())
 
     def report_path(self, robot_id: str) -> Path:
         """Where a robot's report lies."""
