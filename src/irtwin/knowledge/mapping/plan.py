@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from pyoxigraph import DefaultGraph, NamedNode, Quad
@@ -19,8 +19,11 @@ from irtwin.knowledge.mapping.document import (
     TriplesMap,
 )
 from irtwin.knowledge.mapping.identifiers import Identifier, quoted
+from irtwin.knowledge.mapping.noted_rows import KeyedTable
 from irtwin.knowledge.mapping.source import Source, describe
-from irtwin.knowledge.mapping.terms import Column, Row, TermMaker, term_maker
+from irtwin.knowledge.mapping.tables_read import table_of, tables_read
+from irtwin.knowledge.mapping.terms import Column, Row, TermMaker, absolute, term_maker
+from irtwin.storage.row_changes import Key
 
 GraphName = NamedNode | DefaultGraph
 GraphMaker = Callable[[Row], Sequence[GraphName]]
@@ -43,7 +46,10 @@ class Statement:
     """A query, and the makers of the terms that each of its rows becomes.
 
     table: the name of the one table that it reads, empty for a query of the document's or a join;
-    columns: what its rows hold of that table, in order.
+    columns: what its rows hold of that table, in order;
+    reads: the tables that its rows follow from, None where changes of them may not be noted, or it cannot be told;
+    keyed: the table whose rows it reads one by one, if its columns hold that table's key;
+    predicates: those that its quads can have, None where rows say them; begins: how its subjects' IRIs begin.
     """
 
     where: str
@@ -53,6 +59,10 @@ class Statement:
     subject: TermMaker
     graphs: GraphMaker
     properties: tuple[Property, ...]
+    reads: frozenset[str] | None
+    keyed: KeyedTable | None
+    predicates: frozenset[NamedNode] | None
+    begins: str
 
     def quads(self, row: Row) -> list[Quad]:
         """Return what a row becomes (W3C R2RML, section 11.1). Raises InputError where it does not fit."""
@@ -77,8 +87,13 @@ class Statement:
         return found
 
 
-def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[Statement]:
-    """Yield a document's statements. Raises InputError where its tables or columns are not there."""
+def plan(
+    connection: Connection, document: Document, base_iri: str, noted: Mapping[str, Key] | None = None
+) -> Iterator[Statement]:
+    """Yield a document's statements. Raises InputError where its tables or columns are not there.
+
+    noted: the tables whose changes are noted, with their keys.
+    """
     sources: dict[LogicalTable, Source] = {}
 
     def source(table: LogicalTable) -> Source:
@@ -87,7 +102,7 @@ def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[
         return sources[table]
 
     def select(**sides: LogicalTable) -> _Select:
-        return _Select(connection, {side: source(table) for side, table in sides.items()}, base_iri)
+        return _Select(connection, sides, {side: source(table) for side, table in sides.items()}, base_iri, noted or {})
 
     maps = document.triples_maps
     for triples_map in maps.values():
@@ -102,8 +117,18 @@ def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[
 class _Select:
     """A query under construction: it gathers the columns that term maps need, each once."""
 
-    def __init__(self, connection: Connection, sources: dict[str, Source], base_iri: str) -> None:
+    def __init__(
+        self,
+        connection: Connection,
+        tables: Mapping[str, LogicalTable],
+        sources: Mapping[str, Source],
+        base_iri: str,
+        noted: Mapping[str, Key],
+    ) -> None:
+        self.connection = connection
+        self.tables = tables
         self.sources = sources
+        self.noted = noted
         self.base_iri = base_iri
         self.preparer = connection.dialect.identifier_preparer
         self.chosen: dict[tuple[str, str], int] = {}  # side and column
@@ -152,6 +177,19 @@ class _Select:
         return f"CAST({column} AS VARCHAR)" if name in self.sources[side].cast else column
 
     @property
+    def reads(self) -> frozenset[str] | None:
+        """The noted tables that it reads, None where it may read others."""
+        return tables_read(self.connection, self.sql, self.tables.values(), self.noted.keys()) if self.noted else None
+
+    @property
+    def keyed(self) -> KeyedTable | None:
+        """The one noted table that it reads row by row, where it has chosen its whole key."""
+        table = table_of(self.tables["child"], self.noted) if len(self.tables) == 1 else None
+        key = () if table is None else self.noted[table]
+        places = tuple(self.chosen.get(("child", part.name), -1) for part in key)
+        return None if table is None or not key or -1 in places else KeyedTable(table, key, places)
+
+    @property
     def sql(self) -> str:
         tables = ", ".join(f"{source.sql} {side}" for side, source in self.sources.items())
         condition = f" WHERE {' AND '.join(self.conditions)}" if self.conditions else ""
@@ -162,6 +200,7 @@ class _Select:
 def _plain(select: _Select, triples_map: TriplesMap, document: Document) -> Statement:
     """The statement of a logical table alone: classes, and all objects that need no join."""
     rdf_type = select.maker(_constant(_RDF_TYPE))
+    predicates = [_constant(_RDF_TYPE)] if triples_map.classes else []
     properties = [Property((rdf_type,), (select.maker(_constant(name)),), None) for name in triples_map.classes]
     for item in triples_map.properties:
         objects = [
@@ -171,7 +210,8 @@ def _plain(select: _Select, triples_map: TriplesMap, document: Document) -> Stat
         ]
         if objects:
             properties.append(_property(select, triples_map, item, select.makers(objects)))
-    return _statement(select, triples_map, properties)
+            predicates += item.predicates
+    return _statement(select, triples_map, properties, predicates)
 
 
 def _joined(
@@ -180,7 +220,7 @@ def _joined(
     """The statement of one join: the parent's subjects as objects."""
     select.join(join)
     found = _property(select, triples_map, item, (select.maker(parent, "parent"),))
-    return _statement(select, triples_map, [found])
+    return _statement(select, triples_map, [found], item.predicates)
 
 
 def _property(
@@ -190,8 +230,11 @@ def _property(
     return Property(select.makers(item.predicates), objects, graphs)
 
 
-def _statement(select: _Select, triples_map: TriplesMap, properties: Sequence[Property]) -> Statement:
+def _statement(
+    select: _Select, triples_map: TriplesMap, properties: Sequence[Property], predicates: Iterable[TermMap]
+) -> Statement:
     subject, graphs = select.maker(triples_map.subject), select.graphs(triples_map.graphs)
+    said = {term_map.constant for term_map in predicates}
     return Statement(
         where=triples_map.where,
         sql=select.sql,
@@ -200,7 +243,17 @@ def _statement(select: _Select, triples_map: TriplesMap, properties: Sequence[Pr
         subject=subject,
         graphs=graphs,
         properties=tuple(properties),
+        reads=select.reads,
+        keyed=select.keyed,
+        predicates=frozenset(name for name in said if isinstance(name, NamedNode)) if None not in said else None,
+        begins=_beginning(triples_map.subject, select.base_iri),
     )
+
+
+def _beginning(subject: TermMap, base_iri: str) -> str:
+    """Return how all IRIs that a subject map makes begin, as far as it says."""
+    first, *_ = absolute(subject.template, base_iri) or ("",)
+    return first if isinstance(first, str) and subject.term_type is TermType.IRI else ""
 
 
 def _constant(name: NamedNode) -> TermMap:
