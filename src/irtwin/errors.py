@@ -1,4 +1,4 @@
-"""The one exception that means a user's mistake."""
+"""The exceptions that are no bugs: a user's mistake, and a place that cannot be used just now."""
 
 from __future__ import annotations
 
@@ -8,4 +8,12 @@ class InputError(Exception):
 
     The command line prints it on standard error and exits with status 2. Everything else that is
     raised is a bug and keeps its traceback.
+    """
+
+
+class WorkspaceFault(InputError):
+    """The workspace, or what it is kept in, cannot be used just now, whatever was given.
+
+    Its disk is full, its server or storage is away, another process writes, or it is damaged. Once that is mended, the
+    same input may do.
     """

@@ -273,7 +273,8 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
             populate_apart(apart, announce)
             check_plans(apart, robot_id, data_set.plans)
         except InputError as error:
-            raise InputError(f"{data_set.folder}: {error}; nothing of this data set was stored") from error
+            error.args = (f"{data_set.folder}: {error}; nothing of this data set was stored",)
+            raise
     return robot_id
 
 

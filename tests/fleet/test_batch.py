@@ -7,15 +7,19 @@ from typing import Any
 import pytest
 
 from irtwin import workflow
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.batch import Batch, Record, key
 
 
-def _refuse(said: str) -> Any:
-    raise InputError(said)
+def _raise(error: Exception) -> Any:
+    raise error
 
 
-WAYS: dict[str, Callable[[], Any]] = {"bad": lambda: _refuse("runs/a.csv, line 3: not a number"), "odd": lambda: 1 / 0}
+WAYS: dict[str, Callable[[], Any]] = {
+    "bad": lambda: _raise(InputError("runs/a.csv, line 3: not a number")),
+    "full": lambda: _raise(WorkspaceFault("workspace: the disk is full")),
+    "odd": lambda: 1 / 0,
+}
 
 
 @pytest.fixture
@@ -65,6 +69,16 @@ def test_only_what_changed_or_failed_is_taken_again(tmp_path: Path, asked: list[
     asked.clear()
     batch.work()
     assert asked == ["odd", "good"]
+
+
+def test_what_a_full_disk_hindered_is_taken_again(tmp_path: Path, asked: list[str]) -> None:
+    batch = _batch(tmp_path, "full", "good")
+    batch.work()
+    assert _states(batch) == ["failed", "done"]
+    assert next(it.said for it in batch.records() if it) == "workspace: the disk is full"
+    asked.clear()
+    batch.work()
+    assert asked == ["full"]
 
 
 def test_a_data_set_of_which_processes_die_is_set_aside(tmp_path: Path, asked: list[str]) -> None:

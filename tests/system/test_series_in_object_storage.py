@@ -20,6 +20,7 @@ from tests.storage.test_database import WORK, populate, state
 
 from irtwin import workflow
 from irtwin.errors import InputError
+from irtwin.fleet.fleet import batches_of
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import shorten
 from irtwin.live.joint_stream import State
@@ -197,3 +198,21 @@ def test_a_server_that_dies_in_the_middle_changes_nothing(bucket: str, tmp_path:
                     populate(apart)
                     dying.stop()
             assert state(place) == before
+
+
+def test_a_fleet_keeps_its_series_there(bucket: str, tmp_path: Path) -> None:
+    robots, out = tmp_path / "robots", tmp_path / "out"
+    asked = ("fleet", "run", robots, "--out", out, "--workers", "1")
+    for seed, (name, said_once) in enumerate({"A": ("--series", bucket), "B": ()}.items()):
+        small_robots.data_set(robots / name, f"Arm {name}", seed=10 * seed)
+        done = in_this_process(*asked, *said_once)
+        assert done.out == f"done     {seed + 1}\n", done.err
+    batches = batches_of(out)
+    assert len({batch.series_url for batch in batches}) == 2
+    for batch in batches:
+        assert str(batch.series_url).startswith(f"{bucket}/batch_")
+        with Workspace.existing(batch.folder / "workspace") as place:
+            assert ObjectStorage(str(batch.series_url)).paths("series") == named(place) != set()
+            assert not list((place.folder / "series").glob("*.parquet"))
+    other = in_this_process(*asked, "--series", f"{bucket}/other")
+    assert other.status == 2 and f"the series of this fleet are in {bucket}; leave --series away" in other.err

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import announce, base_option, say
+from irtwin.cli.options import announce, base_option, say, series_option
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,9 +48,18 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
 @_options
 @click.option("--batch", type=click.IntRange(1, 1000), default=100, show_default=True, help="Robots in one workspace.")
 @base_option
-def run(source: str, out: Path, workers: int | None, scheduler: str | None, batch: int, base: str | None) -> None:
+@series_option
+def run(
+    source: str,
+    out: Path,
+    workers: int | None,
+    scheduler: str | None,
+    batch: int,
+    base: str | None,
+    series_url: str | None,
+) -> None:
     """Build twins, graphs and reports: one workspace for each batch of robots."""
-    _work(source, out, "run", workers, scheduler, batch, base)
+    _work(source, out, "run", workers, scheduler, batch, base, series_url)
 
 
 @fleet.command()
@@ -80,11 +89,22 @@ def _work(
     scheduler: str | None,
     batch: int,
     base: str | None = None,
+    series_url: str | None = None,
 ) -> None:
     from irtwin.fleet.fleet import work
 
     workers = workers or os.cpu_count() or 1
-    found = work(source, out, kind, batch=batch, workers=workers, scheduler=scheduler, base=base, announce=announce)
+    found = work(
+        source,
+        out,
+        kind,
+        batch=batch,
+        workers=workers,
+        scheduler=scheduler,
+        base=base,
+        series_url=series_url,
+        announce=announce,
+    )
     _show(found)
     if found.set_aside:
         sys.exit(3)

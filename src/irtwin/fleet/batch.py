@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from irtwin import __version__
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.data_sets import at_hand, checksum
 from irtwin.storage.files import write
 
@@ -51,9 +51,11 @@ class Batch:
     folder: Path
 
     @classmethod
-    def create(cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None) -> Batch:
-        """Write down which data sets a new batch has, and what the IRIs of its workspace begin with."""
-        said = {"kind": kind, "base": base, "data_sets": list(places)}
+    def create(
+        cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None, series_url: str | None = None
+    ) -> Batch:
+        """Write down which data sets a new batch has, what its IRIs begin with, and where its series go."""
+        said = {"kind": kind, "base": base, "series": series_url, "data_sets": list(places)}
         write(folder / _SETS, json.dumps(said, indent=1).encode())
         return cls(folder)
 
@@ -65,8 +67,12 @@ class Batch:
     @property
     def base(self) -> str | None:
         """What the IRIs of its workspace begin with, where that was said."""
-        found = self._sets().get("base")
-        return None if found is None else str(found)
+        return self._said("base")
+
+    @property
+    def series_url(self) -> str | None:
+        """Where in object storage the series of its workspace go, where that was said."""
+        return self._said("series")
 
     @property
     def places(self) -> list[str]:
@@ -74,6 +80,10 @@ class Batch:
         found = self._sets()["data_sets"]
         assert isinstance(found, list)
         return found
+
+    def _said(self, what: str) -> str | None:
+        found = self._sets().get(what)
+        return None if found is None else str(found)
 
     def _sets(self) -> dict[str, object]:
         file = self.folder / _SETS
@@ -145,10 +155,12 @@ class Batch:
         trace.unlink(missing_ok=True)
         try:
             if kind == RUN:
-                workflow.run(data_set, self.folder / "workspace", base=self.base)
+                workflow.run(data_set, self.folder / "workspace", base=self.base, series_url=self.series_url)
             else:
                 results = self.folder / "diagnoses" / key(place)
                 workflow.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
+        except WorkspaceFault as error:  # no fault of the data set: the next call tries again
+            return FAILED, str(error)
         except InputError as error:
             return REFUSED, str(error)
         except Exception as error:  # a bug in one costs no other; its traceback is kept

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from irtwin.fleet.batch import DONE, FAILED, REFUSED, Batch, Record
 from irtwin.fleet.data_sets import find_data_sets
 from irtwin.fleet.schedule import work_here, work_on_cluster
 from irtwin.storage import base_iri
+from irtwin.storage.object_storage import checked_url
+from irtwin.storage.series_place import look
 
 _NAME = "batch_{:04d}"
 
@@ -34,16 +37,19 @@ def work(
     workers: int,
     scheduler: str | None = None,
     base: str | None = None,
+    series_url: str | None = None,
     announce: Callable[[str], None] = lambda line: None,
 ) -> Status:
     """Take every data set of a source through `run` or `diagnose`, results below `folder`.
 
     What was done before and has not changed is not done again. `batch`: at most so many data sets share a workspace;
-    `base`: what the IRIs of its individuals begin with, one for the whole fleet.
-    Raises InputError where the source holds none, or the folder is of another kind or base.
+    `base`: what the IRIs of its individuals begin with, one for the whole fleet; `series_url`: object storage
+    (`s3://bucket/prefix`) that is to hold the series, below it a prefix for each batch. It is remembered.
+    Raises InputError where the source holds none, or the folder is of another kind or base or has its series elsewhere.
     """
     base = None if base is None else base_iri.checked(base, "--base")
-    _plan(find_data_sets(source), folder, kind, batch, workers, base)
+    series_url = _place_of_series(folder, series_url)
+    _plan(find_data_sets(source), folder, kind, batch, workers, base, series_url)
     batches = [one for one in batches_of(folder) if one.kind == kind]
     ended = count(1)
 
@@ -57,7 +63,31 @@ def work(
     return status_of(batches)
 
 
-def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: int, base: str | None) -> None:
+def _place_of_series(folder: Path, series_url: str | None) -> str | None:
+    """Return where in object storage a fleet's series go: what is asked for, or what was said before."""
+    there = batches_of(folder)
+    before = there[0].series_url.rpartition("/")[0] if there and there[0].series_url else None
+    if series_url is None:
+        return before
+    series_url = checked_url(series_url)
+    if there and series_url != before:
+        raise InputError(
+            f"{folder}: the series of this fleet are in {before or 'the folders of its batches'}; leave --series away, "
+            "or give another --out"
+        )
+    look(series_url)
+    return series_url
+
+
+def _plan(
+    places: Sequence[str],
+    folder: Path,
+    kind: str,
+    size: int,
+    workers: int,
+    base: str | None,
+    series_url: str | None,
+) -> None:
     """Put data sets that no batch has into new ones, enough for each worker to have one."""
     there = batches_of(folder)
     if there and {one.kind for one in there} != {kind}:
@@ -73,7 +103,9 @@ def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: in
     new = [place for place in places if place not in known]
     share = max(1, min(size, -(-len(new) // max(workers, 1))))
     for number, start in enumerate(range(0, len(new), share), start=len(there) + 1):
-        Batch.create(folder / _NAME.format(number), kind, new[start : start + share], base)
+        name = _NAME.format(number)
+        series = None if series_url is None else f"{series_url}/{name}-{uuid.uuid4().hex[:8]}"
+        Batch.create(folder / name, kind, new[start : start + share], base, series)
 
 
 def batches_of(folder: Path) -> list[Batch]:

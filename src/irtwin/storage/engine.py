@@ -14,7 +14,7 @@ from sqlalchemy.engine import URL, ExceptionContext
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 _MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
@@ -57,7 +57,7 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
             if engine.dialect.name == "sqlite":
                 connection.exec_driver_sql("PRAGMA schema_version")  # SQLite reads the file only now
     except DBAPIError as error:
-        raise InputError(f"{shown(address)}: cannot open the database: {_reason(error)}") from None
+        raise WorkspaceFault(f"{shown(address)}: cannot open the database: {_reason(error)}") from None
     return engine
 
 
@@ -72,7 +72,7 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
     """Give a session that is the only writer, in one transaction, committed at the end.
 
     `restructuring`: SQLite changes a table by making another in its place; what refers to it is looked at afterwards.
-    Raises InputError where another writer holds the database for longer than BUSY_TIMEOUT.
+    Raises WorkspaceFault where another writer holds the database for longer than BUSY_TIMEOUT.
     """
     with (
         engine.connect().execution_options(writes=True) as connection,
@@ -90,7 +90,7 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
 
 @contextmanager
 def _turn(connection: Connection) -> Iterator[None]:
-    """Begin a transaction once nobody else writes, and commit it. InputError where that takes too long."""
+    """Begin a transaction once nobody else writes, and commit it. WorkspaceFault where that takes too long."""
     with ExitStack() as held:
         try:
             held.enter_context(connection.begin())
@@ -101,7 +101,7 @@ def _turn(connection: Connection) -> Iterator[None]:
         except OperationalError as error:
             if not _locked(error):
                 raise
-            raise InputError(
+            raise WorkspaceFault(
                 f"{shown(connection.engine.url)}: another process has been writing for {BUSY_TIMEOUT:g} s; "
                 "try again later"
             ) from None
@@ -146,7 +146,7 @@ def use_write_ahead_log(engine: Engine) -> None:
 
 
 def check(engine: Engine) -> None:
-    """Look through an SQLite database that is not large. Raises InputError where its file is damaged."""
+    """Look through an SQLite database that is not large. Raises WorkspaceFault where its file is damaged."""
     if engine.dialect.name != "sqlite":
         return
     with engine.connect() as connection:
@@ -157,29 +157,29 @@ def check(engine: Engine) -> None:
             return
         found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
     if found != "ok":
-        raise InputError(_damaged(engine.url, " ".join(str(found).split())))
+        raise WorkspaceFault(_damaged(engine.url, " ".join(str(found).split())))
 
 
 def _tell(url: URL, error: BaseException) -> None:
-    """Raise InputError for what SQLite says of a damaged file or a full disk."""
+    """Raise WorkspaceFault for what SQLite says of a damaged file or a full disk."""
     reason = " ".join(str(error).split())
     if any(text in reason for text in _DAMAGE):
-        raise InputError(_damaged(url, reason)) from error
+        raise WorkspaceFault(_damaged(url, reason)) from error
     if any(text in reason for text in _FULL):
-        raise InputError(
+        raise WorkspaceFault(
             f"{url.database}: cannot be written ({reason}); free some space; nothing was changed"
         ) from error
 
 
 def _tell_of_server(url: URL, context: ExceptionContext) -> None:
-    """Raise InputError for what those who run a PostgreSQL server can mend."""
+    """Raise WorkspaceFault for what those who run a PostgreSQL server can mend."""
     error = context.original_exception
     state = str(getattr(error, "sqlstate", None) or "")
     what = next((f"{said}; nothing was changed" for code, said in _OF_SERVER.items() if state.startswith(code)), None)
     if context.is_disconnect and context.connection is not None:
         what = "the connection to the database was lost; do it again"
     if what is not None:
-        raise InputError(f"{shown(url)}: {what} ({' '.join(str(error).split())[:160]})") from error
+        raise WorkspaceFault(f"{shown(url)}: {what} ({' '.join(str(error).split())[:160]})") from error
 
 
 def _damaged(url: URL, reason: str) -> str:

@@ -12,20 +12,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 
 @contextmanager
 def told_when_full(place: Path) -> Iterator[None]:
-    """Raise InputError where the disk takes no more; other errors pass."""
+    """Raise WorkspaceFault where the disk takes no more; other errors pass."""
     try:
         yield
     except OSError as error:
         if error.errno not in _FULL:
             raise
-        raise InputError(f"{place}: cannot be written ({error.strerror}); free some space and try again") from error
+        raise WorkspaceFault(f"{place}: cannot be written ({error.strerror}); free some space and try again") from error
 
 
 @contextmanager

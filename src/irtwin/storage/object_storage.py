@@ -14,14 +14,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 
 _OWNER = "irtwin-workspace"  # the object that says whose files these are
 _BLOCK = 1 << 20  # bytes read at once: what a row group has of one channel
 _URL = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[^\x00-\x1f\x7f/*?\[\]]+)*/?")
 
 
-class StorageFault(InputError):
+class StorageFault(WorkspaceFault):
     """Object storage that cannot be used just now, or not by this user."""
 
 

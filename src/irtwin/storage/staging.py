@@ -45,7 +45,8 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
         try:
             yield apart
         except InputError as error:
-            raise InputError(str(error).replace(str(folder), str(place.folder))) from error
+            error.args = (str(error).replace(str(folder), str(place.folder)),)
+            raise
         after = _rows(apart, robot_id)
         if after != before or whole != set(files_of(before)):
             _put(apart, after, place, robot_id, whole)

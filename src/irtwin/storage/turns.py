@@ -14,7 +14,7 @@ from pathlib import Path
 
 from sqlalchemy import Engine, text
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 from irtwin.storage import engine as engines
 
 _KEY = 0x6972746772  # "irtgr": the advisory lock on PostgreSQL, beside that of writers of rows
@@ -26,14 +26,14 @@ _AGAIN = 0.05  # s between two tries
 def rewriting_alone(engine: Engine, folder: Path) -> Iterator[None]:
     """Be the only process that rewrites the graph of the workspace in `folder` with this database.
 
-    Raises InputError where another one does so for longer than `engine.BUSY_TIMEOUT`.
+    Raises WorkspaceFault where another one does so for longer than `engine.BUSY_TIMEOUT`.
     """
     with ExitStack() as held:
         taken = _on_server(engine, held) if engine.dialect.name == "postgresql" else _in_folder(folder, held)
         give_up = time.monotonic() + engines.BUSY_TIMEOUT
         while not taken():
             if time.monotonic() > give_up:
-                raise InputError(
+                raise WorkspaceFault(
                     f"{folder}: another process has been rewriting the graph for {engines.BUSY_TIMEOUT:g} s; "
                     "try again later, or stop `irtwin live`"
                 )

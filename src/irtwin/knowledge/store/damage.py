@@ -10,7 +10,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from irtwin.errors import InputError
+from irtwin.errors import WorkspaceFault
 from irtwin.knowledge.store import store_files
 
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -20,7 +20,7 @@ _FULL = [os.strerror(number) for number in (errno.ENOSPC, errno.EFBIG, errno.EDQ
 
 @contextmanager
 def told(folder: Path | None) -> Iterator[None]:
-    """Raise InputError where the store of a folder is damaged, or its disk is full; other errors pass."""
+    """Raise WorkspaceFault where the store of a folder is damaged, or its disk is full; other errors pass."""
     try:
         yield
     except (RuntimeError, OSError) as error:
@@ -30,9 +30,9 @@ def told(folder: Path | None) -> Iterator[None]:
         if any(text in reason for text in _FULL):
             raise full(folder, reason) from error
         if "lock" in reason.lower() and "LOCK" in reason:
-            raise InputError(f"{folder}: the graph cannot be opened, as it is open already ({reason})") from error
+            raise WorkspaceFault(f"{folder}: the graph cannot be opened, as it is open already ({reason})") from error
         if "Corruption" in reason or "IO error" in reason:
-            raise InputError(damaged(folder, reason)) from error
+            raise WorkspaceFault(damaged(folder, reason)) from error
         raise
 
 
@@ -48,12 +48,12 @@ def telling(method: Method) -> Method:
 
 
 def check_files(folder: Path) -> None:
-    """Raise InputError where files of a store are missing or altered. Without the first one it would begin anew."""
+    """Raise WorkspaceFault where files of a store are missing or altered. Without the first one it would begin anew."""
     if not (folder / "CURRENT").is_file() and next(folder.glob("[0-9M]*"), None) is not None:
-        raise InputError(damaged(folder, "its file CURRENT is missing"))
+        raise WorkspaceFault(damaged(folder, "its file CURRENT is missing"))
     fault = store_files.fault(folder)
     if fault is not None:
-        raise InputError(damaged(folder, fault))
+        raise WorkspaceFault(damaged(folder, fault))
 
 
 def damaged(folder: Path, reason: str) -> str:
@@ -64,6 +64,8 @@ def damaged(folder: Path, reason: str) -> str:
     )
 
 
-def full(folder: Path, reason: str) -> InputError:
+def full(folder: Path, reason: str) -> WorkspaceFault:
     """Return the error of a disk that takes no more."""
-    return InputError(f"{folder}: the disk is full ({reason[:160]}); free some space and try again; nothing is lost")
+    return WorkspaceFault(
+        f"{folder}: the disk is full ({reason[:160]}); free some space and try again; nothing is lost"
+    )

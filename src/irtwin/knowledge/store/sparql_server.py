@@ -28,7 +28,7 @@ from pyoxigraph import (
     parse_query_results,
 )
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 
 if TYPE_CHECKING:
     from http.client import HTTPResponse
@@ -40,7 +40,7 @@ _FORM, _UPDATE = "application/x-www-form-urlencoded", "application/sparql-update
 _AT_ONCE = 500  # triples looked up by one query
 
 
-class ServerFault(InputError):
+class ServerFault(WorkspaceFault):
     """A server that cannot be reached, or does not do what it is asked for."""
 
 
