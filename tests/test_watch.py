@@ -38,28 +38,38 @@ def lines(count: int) -> str:
     return "".join(json.dumps(one) + "\n" for one in said)
 
 
-@pytest.fixture
-def workspace(tmp_path: Path) -> Path:
-    with Workspace(tmp_path / "w") as place:
+def fill(folder: Path, database: str | None = None) -> Path:
+    with Workspace(folder, database) as place:
         place.ingest(*rows.data_set())
         KnowledgeGraph(place.graph_folder).close()
-    return tmp_path / "w"
+    return folder
 
 
-def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(workspace: Path) -> None:
-    _, said = irtwin("live", "--workspace", workspace).communicate(lines(50) + "junk\njunk\n", timeout=120)
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    return fill(tmp_path / "w")
+
+
+@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
+def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(
+    on_server: bool, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    new = request.getfixturevalue("new_postgresql_database") if on_server else None
+    database, other = (["--database", new()] if new else [] for _ in range(2))
+    workspace = fill(tmp_path / "w", *database[1:])
+    _, said = irtwin("live", "--workspace", workspace, *database).communicate(lines(50) + "junk\njunk\n", timeout=120)
     assert said.count("line refused: a line is not JSON") == 1
     assert "50 samples stored, 2 lines refused" in said
-    archive = workspace.with_name("kept.zip")
-    kept = in_this_process("backup", archive, "--workspace", workspace)
+    archive = tmp_path / "kept.zip"
+    kept = in_this_process("backup", archive, "--workspace", workspace, *database)
     assert (kept.out.strip(), kept.err) == (str(archive), "")
-    after = workspace.with_name("after")
-    in_this_process("restore", archive, "--workspace", after)
+    after = tmp_path / "after"
+    in_this_process("restore", archive, "--workspace", after, *other)
     question = "SELECT (series:integral(?run, 'power', 0, 9) AS ?joules) { ?run irt:State_Time ?at }"
     for folder in (workspace, after):
         asked = in_this_process("query", question, "--format", "json", "--workspace", folder)
         assert json.loads(asked.out) == [{"joules": pytest.approx(490.0)}], asked.err
-    again = in_this_process("restore", archive, "--workspace", after)
+    again = in_this_process("restore", archive, "--workspace", after, *other)
     assert "already exists" in again.err
     assert again.status == 2
 
