@@ -21,6 +21,7 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.backup import backup, restore
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.storage import database
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base, Series
 from irtwin.storage.series import checksum
@@ -150,6 +151,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from tests import rows
 from tests.memory_s3 import memory_s3
+from irtwin.storage import database
 from irtwin.storage.database import Workspace
 with Workspace(Path(sys.argv[1])) as place:
     for number in range(10**9):
@@ -341,3 +343,19 @@ def test_what_extends_a_workspace_goes_with_it(tmp_path: Path) -> None:
         backup(place, graph, tmp_path / "all.zip")
     restore(tmp_path / "all.zip", tmp_path / "after")
     assert [(tmp_path / "after" / name).read_text() for name in names] == [f"# {name}" for name in names]
+
+
+def test_a_large_database_is_looked_through_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with Workspace(tmp_path / "w") as place:
+        fill(place)
+        with place.engine.begin() as connection:
+            connection.exec_driver_sql("CREATE TABLE mine AS SELECT hex(zeroblob(2000)) AS text FROM series, run")
+    file = tmp_path / "w" / "irtwin.db"
+    content = file.read_bytes()
+    file.write_bytes(content[:-4096] + bytes(4096))
+    monkeypatch.setattr(database.engine, "check", lambda engine: None)  # as for one of more than 100 MB
+    with Workspace.existing(tmp_path / "w") as place, KnowledgeGraph(place.graph_folder) as graph:
+        monkeypatch.undo()
+        with pytest.raises(InputError, match="the database is damaged"):
+            backup(place, graph, tmp_path / "kept.zip")
+    assert not (tmp_path / "kept.zip").exists()

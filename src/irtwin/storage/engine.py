@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError, WorkspaceFault
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
-_MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
+MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
 _DAMAGE = ("malformed", "not a database", "could not decode to UTF-8", "Could not decode to UTF-8")
 _SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
 _FULL = ("is full", "disk I/O error")
@@ -145,15 +145,15 @@ def use_write_ahead_log(engine: Engine) -> None:
         time.sleep(0.05)
 
 
-def check(engine: Engine) -> None:
-    """Look through an SQLite database that is not large. Raises WorkspaceFault where its file is damaged."""
+def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> None:
+    """Look through an SQLite database that is not larger. Raises WorkspaceFault where its file is damaged."""
     if engine.dialect.name != "sqlite":
         return
     with engine.connect() as connection:
         size = connection.exec_driver_sql(
             "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
         ).scalar_one()
-        if size > _MOST_LOOKED_THROUGH:
+        if size > most_bytes:
             return
         found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
     if found != "ok":

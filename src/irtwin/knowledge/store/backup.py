@@ -6,6 +6,7 @@ The database goes as rows, so that a backup of an SQLite workspace may be restor
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shutil
@@ -48,8 +49,9 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
 
     Rows and files are those of one moment: files are linked while the writers' lock is held, rows read from a snapshot
     taken then. The graph is that of a moment just after; what it lacks or has more is set right by the next mapping.
-    Raises InputError where a file that the database names is missing or altered, or the graph is damaged.
+    Raises InputError where a file that the database names is missing or altered, or graph or database are damaged.
     """
+    engine.check(place.engine, math.inf)  # a large one was not looked through at opening
     with files.working_folder(place.folder, ".backup-") as held:
         storage = elsewhere(place.folder)
         if storage is not None:  # before writers have to wait: the network may be slow
