@@ -197,7 +197,8 @@ def _student(mean: np.ndarray, variance: np.ndarray, freedom: np.ndarray) -> np.
 def _logarithms(one: Map, level: np.ndarray, fewest: int) -> np.ndarray:
     """Return the logarithm of mean square over level, (U, g, R); NaN of units with too few samples."""
     enough = one.counts >= fewest
-    ratio = np.divide(one.squares, one.counts * level, out=np.ones_like(one.squares), where=enough)
+    expected = one.counts * np.where(enough, level, 1.0)  # a level may be infinite where there are no samples
+    ratio = np.divide(one.squares, expected, out=np.ones_like(one.squares), where=enough)
     return np.where(enough, np.log(np.maximum(ratio, np.finfo(float).tiny)), np.nan)
 
 
