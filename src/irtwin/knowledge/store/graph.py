@@ -445,7 +445,9 @@ class KnowledgeGraph:
 
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
     """Say of each triple that it belongs into the named graph, or into the default graph."""
-    graph = DefaultGraph() if name is None else NamedNode(name)
+    if name is None:  # to name the default graph takes as long as all the rest
+        return (Quad(*triple) for triple in triples)
+    graph = NamedNode(name)
     return (Quad(*triple, graph) for triple in triples)  # type: ignore[call-arg]
 
 
