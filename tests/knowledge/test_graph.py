@@ -35,6 +35,17 @@ def test_triple_in_two_graphs_counts_once() -> None:
     assert total(graph) == 0
 
 
+def test_many_new_quads_go_into_files_of_their_own_and_count_once(tmp_path: Path) -> None:
+    many = [quad(f"{number}", 1.0, A) for number in range(10_000)]
+    with KnowledgeGraph(tmp_path / "graph") as graph:
+        graph.replace([quad("0", 1.0, B)], B)  # the first of them, in another graph
+        log = sum(file.stat().st_size for file in (tmp_path / "graph").glob("*.log"))
+        graph.change([], many)
+        assert sum(file.stat().st_size for file in (tmp_path / "graph").glob("*.log")) == log
+        assert set(graph.quads()) == {*many, quad("0", 1.0, B)}
+        assert total(graph) == 10_000.0
+
+
 def test_replace_drops_graphs_below_that_have_nothing_left(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
     kept = [quad for quad in two_robots if "Arm_B" not in quad.graph_name.value]
     changed = graph.replace(kept, GRAPH_SOURCE, GRAPH_ACTIVITY)

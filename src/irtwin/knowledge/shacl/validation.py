@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
+from itertools import chain
 
 import pyshacl
 import rdflib
@@ -19,11 +20,12 @@ from rdflib.namespace import SH
 from irtwin.knowledge import each_part, parts
 from irtwin.knowledge.conclusions import content_name
 from irtwin.knowledge.garbage import seldom_collected
-from irtwin.knowledge.parts import Joined, Ontology, Region
+from irtwin.knowledge.locality import ANY
+from irtwin.knowledge.parts import Joined, Name, Ontology, Region
 from irtwin.knowledge.reasoning import asserted
 from irtwin.knowledge.reasoning import made_of as reasoned_from
 from irtwin.knowledge.shacl.of_ontology import SUB_CLASS_OF, with_ontology
-from irtwin.knowledge.shacl.suspects import any_suspect, queries
+from irtwin.knowledge.shacl.suspects import Queries, any_suspect, queries
 from irtwin.knowledge.store.changes import DERIVED_FROM, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
@@ -31,9 +33,14 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_REASONED,
     GRAPH_VALIDATION,
+    RDF,
     shorten,
 )
 from irtwin.resources import Files
+
+Results = Iterator[tuple[rdflib.term.Node, rdflib.Graph]]  # with what is said of each
+
+_TYPE = NamedNode(RDF + "type")
 
 
 @dataclass(frozen=True)
@@ -92,9 +99,9 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | No
     if changed is None:
         report, checked = _empty(), each_part.of_each(graph, ontology, _results)
     else:
-        report = _as_rdflib(graph.triples(GRAPH_VALIDATION))
-        regions = parts.some(graph, ontology, nodes_of(changed), asserted=True)
-        checked = each_part.of_these(ontology, _taken_out(report, regions), _results)
+        report, nodes = _as_rdflib(graph.triples(GRAPH_VALIDATION)), nodes_of(changed)
+        regions = parts.some(graph, ontology, nodes, asserted=True)
+        checked = each_part.of_these(ontology, regions, partial(_results_anew, report, nodes))
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
     with closing(checked):
         for result, said in checked:
@@ -104,16 +111,46 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | No
     return report
 
 
-def _taken_out(report: rdflib.Graph, regions: Iterable[Region | None]) -> Iterator[Region | None]:
-    """Take what a report says of some parts out of it, as they go by."""
-    for region in regions:
-        for result in _about(report, region.nodes) if region else ():
-            report -= report.cbd(result)
-            report.remove((None, SH.result, result))
-        yield region
+def _results_anew(report: rdflib.Graph, changed: set[Name], ontology: Ontology, regions: list[Region]) -> Results:
+    """Yield what is found in some parts since nodes changed, and take what the report says of these parts out of it."""
+    region = parts.one(regions)
+    before = _about(report, region.nodes)
+    if not before and _is_clear(ontology, region, changed):
+        return
+    for result in before:
+        report -= report.cbd(result)
+        report.remove((None, SH.result, result))
+    yield from _results(ontology, regions)
 
 
-def _results(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[rdflib.term.Node, rdflib.Graph]]:
+def _is_clear(ontology: Ontology, region: Region, changed: set[Name]) -> bool:
+    """Whether a part that kept all constraints still does, since some nodes changed.
+
+    It tells by the nodes that changed and those joined to them. What others are held to is as it was: what is said of
+    them, and the types of what they are joined to. Queries that look farther are asked of all that they look at.
+    """
+    if any(isinstance(node, BlankNode) for node in region.nodes):
+        return False
+    around = set(changed)
+    for subject, _, object in region.asserted:
+        if subject in changed or object in changed:
+            around.update((subject, object))
+    around &= region.nodes
+    shapes = _shapes(frozenset(ontology.triples), ontology.resources.of("shapes"))
+    store, asked = shapes.store_of(ontology.triples)
+    store.extend(in_graph(triple for triple in region.asserted if _is_asked_of(triple, around, asked)))
+    return not any_suspect(store, asked, around)
+
+
+def _is_asked_of(triple: Triple, around: set[Name], asked: Queries) -> bool:
+    """Whether queries may look at a triple, those that look near nodes only around some."""
+    subject, predicate, object = triple
+    if predicate == _TYPE or predicate.value in asked.read or ANY in asked.read:
+        return True
+    return subject in around or object in around
+
+
+def _results(ontology: Ontology, regions: list[Region]) -> Results:
     """Yield what is found in some parts, results with what is said of them. Raises Joined for nodes without a name."""
     region = parts.one(regions)
     if any(isinstance(node, BlankNode) for node in region.nodes):
@@ -155,17 +192,14 @@ class _Robots:
         return self._known[node]
 
 
-def _report(data: Iterable[Triple], ontology: Ontology, files: Files) -> rdflib.Graph | None:
+def _report(said: set[Triple], ontology: Ontology, files: Files) -> rdflib.Graph | None:
     """Return what pySHACL finds; None without asking it where nothing is suspected."""
     shapes = _shapes(frozenset(ontology.triples), files)
-    said = shapes.unions.union(data)
-    store = Store()
-    store.extend(in_graph(said))
-    classes = {quad.triple for quad in store.quads_for_pattern(None, SUB_CLASS_OF, None, None)}
-    if not any_suspect(store, shapes.suspects(frozenset(classes))):
+    store, asked = shapes.store_of(said)
+    if not any_suspect(store, asked):
         return None
     report: rdflib.Graph
-    _, report, _ = pyshacl.validate(_as_rdflib(said), shacl_graph=shapes.graph)
+    _, report, _ = pyshacl.validate(_as_rdflib(shapes.unions | said), shacl_graph=shapes.graph)
     return report
 
 
@@ -174,7 +208,7 @@ class _Constraints:
 
     def __init__(self, shapes: set[Triple]):
         self._shapes = shapes
-        self._suspects: dict[frozenset[Triple], list[str]] = {}
+        self._queries: dict[frozenset[Triple], Queries] = {}
         self.unions = {triple for triple in shapes if triple.predicate == SUB_CLASS_OF}
 
     @cached_property
@@ -182,11 +216,14 @@ class _Constraints:
         """The shapes, for pySHACL."""
         return _as_rdflib(self._shapes)
 
-    def suspects(self, classes: frozenset[Triple]) -> list[str]:
-        """Return the queries for suspects, where data say this by rdfs:subClassOf."""
-        if classes not in self._suspects:
-            self._suspects = {classes: queries(self._shapes, classes)}
-        return self._suspects[classes]
+    def store_of(self, data: Iterable[Triple]) -> tuple[Store, Queries]:
+        """Return a store of data, and the queries for suspects in it: what it says of classes is part of them."""
+        store = Store()
+        store.extend(in_graph(chain(self.unions, data)))
+        classes = frozenset(quad.triple for quad in store.quads_for_pattern(None, SUB_CLASS_OF, None, None))
+        if classes not in self._queries:
+            self._queries = {classes: queries(self._shapes, classes)}
+        return store, self._queries[classes]
 
 
 @lru_cache(maxsize=1)

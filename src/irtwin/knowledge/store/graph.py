@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
 _MOST_KEPT = 2_000  # values of an answer that is kept
 _NAMED_AT_ONCE = 5_000  # IRIs in a query
+_MANY = 10_000  # new quads: from there on a file of their own is quicker than the store's log, and takes no memory
 URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
 _ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base }} }} LIMIT 1"
 
@@ -216,7 +217,8 @@ class KnowledgeGraph:
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
         with self._writing() as store:
             if not taken and isinstance(store, Store):
-                store.extend(with_union(given))
+                put = store.bulk_extend if len(given) >= _MANY else store.extend
+                put(with_union(given))
             elif taken or given:
                 triples = {quad.triple for quad in taken}
                 remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
@@ -445,7 +447,9 @@ class KnowledgeGraph:
 
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
     """Say of each triple that it belongs into the named graph, or into the default graph."""
-    graph = DefaultGraph() if name is None else NamedNode(name)
+    if name is None:  # to name the default graph takes as long as all the rest
+        return (Quad(*triple) for triple in triples)
+    graph = NamedNode(name)
     return (Quad(*triple, graph) for triple in triples)  # type: ignore[call-arg]
 
 
