@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from irtwin.effects.catalogue import catalogue
+from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, REPEATS, Floor
 from irtwin.gap.document import document
+from irtwin.gap.isolation import verdict
 from irtwin.gap.isolation.closing import Closing
 from irtwin.gap.isolation.verdict import (
     AMBIGUOUS,
@@ -102,6 +104,28 @@ def test_without_repeats_nothing_is_left_open():
     assert left([5.0, 1.0], [5.0, 1.0], source=OUT_OF_BAND) is None
 
 
+LITTLE = Closing(share=0.2, interval=(-0.1, 0.5), floors=0.6, size=0.4)
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ({"spread": 0.8}, MUCH_IS_LEFT),  # 1.25 floors squared are left
+        ({"spread": 1.3}, None),  # as much as reference runs leave over one another
+        ({"spread": None}, None),  # too few of them to say
+        ({"spread": 0.8, "alike": False}, None),
+        ({"spread": 0.8, "causes": [CAUSE]}, None),  # something that matters is named
+        ({"spread": 0.8, "causes": [CAUSE], "closing": LITTLE}, MUCH_IS_LEFT),
+        ({"spread": 0.8, "source": OUT_OF_BAND}, None),
+    ],
+)
+def test_without_a_cause_more_than_reference_runs_leave_over_one_another_is_left_open(monkeypatch, said, why):
+    more = dict(said)
+    found = more.pop("spread")
+    monkeypatch.setattr(verdict, "spread", lambda system, floor: found)
+    assert left([1.5, 1.0], [1.5, 1.0], **{"alike": True, **more}) == why
+
+
 def test_a_gap_that_only_an_impossible_number_closes_is_left_open():
     assert left([5.0, 1.0], [1.2, 1.0], [CAUSE], unmatched=True) == IMPOSSIBLE_NUMBER
 
@@ -136,3 +160,15 @@ def test_causes_that_close_nothing_do_not_close_a_gap():
         )
         == DOES_NOT_REPEAT
     )
+
+
+@pytest.mark.parametrize(
+    ("role", "step", "alike"),
+    [("reference", 0.004, True), ("reference", 0.0042, True), ("reference", 0.008, False), ("simulated", 0.004, False)],
+)
+def test_reference_runs_are_alike_where_they_were_logged_at_the_rate_of_the_observed_ones(role, step, alike):
+    def run(role, step):
+        return SimpleNamespace(role=role, signals=SimpleNamespace(time=np.arange(0, 8, step)))
+
+    case = Case(None, (), (run("observed", 0.004), run(role, step)), {}, (None, {}), DEFAULT)
+    assert case.alike is alike

@@ -252,6 +252,7 @@ def diagnose(
             floor,
             thresholds,
             unmatched=refusals.unmatched,
+            alike=case.alike,
             differing=differ,
             explained=[one.disturbance for one in taken],
         ),

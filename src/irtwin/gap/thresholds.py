@@ -302,6 +302,9 @@ class Verdict:
     closed: float = _threshold(
         0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-unexplained-verdict.md"
     )
+    rates: float = _threshold(
+        0.1, "rates of logs that differ by more are not alike", "share", "decisions/gap-unexplained-verdict.md"
+    )
     likely: float = _threshold(
         0.5, "a cause or a family speaks from it; below it is a guess", "confidence", "more likely than not"
     )

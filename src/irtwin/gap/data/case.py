@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
@@ -83,6 +85,12 @@ class Case:
         """The role of the runs that the observed ones are held against: "reference", "simulated" or none."""
         roles = {run.role for run in self.runs}
         return next((role for role in ("reference", "simulated") if role in roles), None)
+
+    @property
+    def alike(self) -> bool:
+        """Whether the runs that observed ones are held against are reference runs, all logged at nearly one rate."""
+        steps = [float(np.median(np.diff(run.signals.time))) for run in self.runs]
+        return self.against == "reference" and max(steps) <= (1 + self.thresholds.verdict.rates) * min(steps)
 
     @property
     def with_torque(self) -> list[Motion]:

@@ -13,6 +13,7 @@ from irtwin.gap.data.noise_floor import REPEATS, Floor
 from irtwin.gap.document import document
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.spread import spread
 from irtwin.gap.regression.normal_equations import noise_before, reference_rms
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.thresholds import Thresholds, Verdict
@@ -29,12 +30,14 @@ def left_open(
     limits: Thresholds,
     *,
     unmatched: bool = False,
+    alike: bool = False,
     differing: Sequence[Disturbance] = (),
     explained: Sequence[Disturbance] = (),
 ) -> str | None:
     """Return why the gap stays unexplained, however sure its causes are; None where it does not.
 
     `unmatched`: a cause that cannot be true explains the data far better than those that were named instead.
+    `alike`: reference runs were logged as the observed ones are, so that what they leave over one another counts.
     `differing`: what differs between repeats, the largest share first; `explained`: those of it that effects explain.
     """
     if unmatched:
@@ -46,6 +49,8 @@ def left_open(
         excesses = (_largest(finding, explained, located) for finding in findings)
         before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
         much = max(limits.verdict.excess, (1 - limits.verdict.closed) * before)
+        if alike and not named:
+            much = min(much, _spread(findings, much))
         if after > much and not (nameless and beside <= much):
             return MUCH_IS_LEFT
     return DOES_NOT_REPEAT if nameless else None
@@ -65,6 +70,12 @@ def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
     if not likely:
         return UNEXPLAINED
     return AMBIGUOUS if any(len(sure) > 1 for sure in likely) else ATTRIBUTED
+
+
+def _spread(findings: Sequence[Finding], unknown: float) -> float:
+    """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
+    known = [spread(one.system, one.floor) for one in findings if one.floor is not None]
+    return max((unknown if one is None else one for one in known), default=unknown)
 
 
 def _largest(
