@@ -55,11 +55,13 @@ def labels(*kinds):
     return {trace.motion.run: trace.motion.run for kind in kinds for trace in kind}
 
 
-def located(observed, others=(), acting=None):
+def located(observed, others=(), acting=None, leaving=None):
     seen, known = joint_maps((observed, others), labels(observed, others), DEFAULT)
     follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
     level = level_of(FLOOR, seen, known, DEFAULT.places.fewest_samples)
-    return locate("torque", JOINTS, follows, seen, level, limits=DEFAULT.places, reference=known, acting=acting)
+    return locate(
+        "torque", JOINTS, follows, seen, level, limits=DEFAULT.places, reference=known, acting=acting, leaving=leaving
+    )
 
 
 def test_noise_has_no_place():
@@ -115,6 +117,12 @@ def test_a_cause_of_which_no_place_is_sure_has_those_to_which_it_adds():
     assert {place.joint for place in places} == {"joint_2"}
     assert places[0].regime in {"accelerating", "braking", "reversal"}
     assert all(place.q > 0.05 for place in places)
+
+
+def test_the_joint_that_leaves_the_gap_open_is_named_though_no_place_of_it_is_sure():
+    observed = [*traces(count=7), *traces(on(1, lambda motion, torque: 1.5 * np.sign(motion.dq[:, 1])), 1, first=7)]
+    assert located(observed) == []
+    assert {place.joint for place in located(observed, leaving=1)} == {JOINTS[1]}
 
 
 def test_what_the_reference_runs_show_too_is_no_place():

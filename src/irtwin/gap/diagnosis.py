@@ -40,7 +40,7 @@ from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.torque_scale import torque_scale
-from irtwin.gap.isolation.verdict import NO_GAP, UNEXPLAINED, UNSURE, left_open, verdict_of
+from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
@@ -238,7 +238,16 @@ def diagnose(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )
     left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
-    located = places(left, seed)
+    open_because = left_open(
+        findings,
+        floor,
+        thresholds,
+        unmatched=refusals.unmatched,
+        alike=case.alike,
+        differing=differ,
+        explained=[one.disturbance for one in taken],
+    )
+    located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
     tell("Designing the next experiment")
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
     measures = {channel.finding.name: flexible_regression(channel, case.seen, seed) for channel in planned}
@@ -247,15 +256,7 @@ def diagnose(
     )
     return Diagnosis(
         description=case.robot,
-        left_open=left_open(
-            findings,
-            floor,
-            thresholds,
-            unmatched=refusals.unmatched,
-            alike=case.alike,
-            differing=differ,
-            explained=[one.disturbance for one in taken],
-        ),
+        left_open=open_because,
         channels=tuple(with_removed(finding, taken) for finding in findings),
         floor=floor,
         locations=tuple(located),

@@ -14,7 +14,7 @@ from irtwin.gap.document import document
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.spread import spread
-from irtwin.gap.regression.normal_equations import noise_before, reference_rms
+from irtwin.gap.regression.normal_equations import System, noise_before, reference_rms
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.thresholds import Thresholds, Verdict
 
@@ -56,6 +56,17 @@ def left_open(
     return DOES_NOT_REPEAT if nameless else None
 
 
+def most_left(findings: Sequence[Finding]) -> tuple[str, int]:
+    """Return the channel and the place in it with the largest excess that causes leave, over floor and references."""
+    left = {
+        (finding.name, place): float(((finding.fitted[1] / _level(finding.system, finding.floor)) ** 2)[place])
+        for finding in findings
+        if finding.floor is not None
+        for place in range(len(finding.places))
+    }
+    return max(left, key=lambda place: left[place])
+
+
 def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
     """Return the verdict on a gap that is not left open: `unexplained` where no cause that matters is likely.
 
@@ -88,12 +99,15 @@ def _largest(
     """
     if finding.floor is None:
         return 0.0, 0.0, 0.0
-    level = finding.floor
-    if finding.system.both:
-        level = np.maximum(level, reference_rms(finding.system, noise_before(finding.system)))
+    level = _level(finding.system, finding.floor)
     before, after = ((rms / level) ** 2 - 1 for rms in finding.fitted)
     before = before + _excess(explained, finding, level)
     return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
+
+
+def _level(system: System, floor: np.ndarray) -> np.ndarray:
+    """Return (g,) RMS: the floor, or what the reference runs show, if that is more."""
+    return np.maximum(floor, reference_rms(system, noise_before(system))) if system.both else floor
 
 
 def _excess(some: Sequence[Disturbance], finding: Finding, level: np.ndarray) -> np.ndarray:

@@ -99,9 +99,13 @@ def against_reference(finding: Finding) -> bool:
     return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
 
 
-def places(left: Sequence[ChannelResidual], seed: int) -> list[Location]:
-    """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess."""
-    found = [(one, _places(one, seed)) for one in left]
+def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None) -> list[Location]:
+    """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess.
+
+    `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not.
+    """
+    channel, place = leaving or (None, None)
+    found = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
 
     def order(pair: tuple[ChannelResidual, list[Location]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
@@ -153,7 +157,7 @@ def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.nda
     return found
 
 
-def _places(left: ChannelResidual, seed: int) -> list[Location]:
+def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[Location]:
     names = left.finding.places
     best = [followed(left.before, k, joint) for k, joint in enumerate(names)]
     located = locate(
@@ -166,6 +170,7 @@ def _places(left: ChannelResidual, seed: int) -> list[Location]:
         explained=left.explained,
         acting=left.acting,
         acts=left.acts,
+        leaving=leaving,
         limits=left.limits,
         seed=seed,
     )

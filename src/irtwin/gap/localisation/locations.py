@@ -68,6 +68,7 @@ def locate(
     explained: Map | None = None,
     acting: np.ndarray | None = None,
     acts: Map | None = None,
+    leaving: int | None = None,
     seed: int = 0,
 ) -> list[Location]:
     """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first; `runs` are empty.
@@ -78,7 +79,7 @@ def locate(
     also of that over what they leave, `explained`. Joints on which causes are acting come before the others, all in
     the order of their excess; a joint's regimes in that of their share of it, its concentration there, and whether they
     suit the variable. A joint on which causes are acting, but none of whose places is sure, has those to which they add
-    (`acts`) more than on average.
+    (`acts`) more than on average; the one whose excess leaves the gap open (`leaving`), those that show more than that.
     """
     share, excess = _shares(seen, level, np.ones((1, len(seen.squares))))
     rng = np.random.default_rng(seed)
@@ -119,6 +120,9 @@ def locate(
         sure = {one.joint for one in found}
         unsure = [place for place in range(len(joints)) if acting[place] and joints[place] not in sure]
         found += [location(place, r, rank) for place in unsure for r, rank in _where_added(acts, place)]
+    if leaving is not None and joints[leaving] not in {one.joint for one in found}:
+        foremost = np.flatnonzero((concentration[leaving] > 1) & (share[0, leaving] >= limits.least_share))
+        found += [location(leaving, int(r), float(share[0, leaving, r])) for r in foremost]
     found = [one for one in found if one.regime != LOADED or one.follows in _LOADS]
     last = np.zeros(len(joints), dtype=bool) if acting is None else ~acting
     order = {joint: (bool(last[place]), -of_joint[place]) for place, joint in enumerate(joints)}
