@@ -166,13 +166,22 @@ NOTED = """
 """
 
 
-def test_noted_rows_are_mapped(new_postgresql_database: Callable[[], str], tmp_path: Path) -> None:
-    engine = create_engine(new_postgresql_database())
-    document = tmp_path / "a.r2rml.ttl"
+def noted(url: str, folder: Path) -> tuple[Engine, Path]:
+    """Return a database of 50 rows whose changes are noted, and a mapping of them."""
+    engine, document = create_engine(url), folder / "a.r2rml.ttl"
     document.write_text(PREFIXES + NOTED)
-    run(engine, "CREATE TABLE r (id varchar, n int, v float, PRIMARY KEY (id, n))", "CREATE ROLE guest")
-    run(engine, "INSERT INTO r SELECT i::text, i % 3, i FROM generate_series(1, 50) i", "GRANT ALL ON r TO guest")
+    run(
+        engine,
+        "CREATE TABLE r (id varchar, n int, v float, PRIMARY KEY (id, n))",
+        "INSERT INTO r SELECT i::text, i % 3, i FROM generate_series(1, 50) i",
+    )
     keep_notes(engine, ["r"])
+    return engine, document
+
+
+def test_noted_rows_are_mapped(new_postgresql_database: Callable[[], str], tmp_path: Path) -> None:
+    engine, document = noted(new_postgresql_database(), tmp_path)
+    run(engine, "CREATE ROLE guest", "GRANT ALL ON r TO guest")
     graph = KnowledgeGraph()
 
     def follow() -> None:
@@ -210,12 +219,8 @@ def test_noted_rows_are_mapped(new_postgresql_database: Callable[[], str], tmp_p
 
 
 def test_a_role_that_may_only_read_the_rows(new_postgresql_database: Callable[[], str], tmp_path: Path) -> None:
-    engine = create_engine(new_postgresql_database())
-    document = tmp_path / "a.r2rml.ttl"
-    document.write_text(PREFIXES + NOTED)
-    run(engine, "CREATE TABLE r (id varchar, n int, v float, PRIMARY KEY (id, n))", "CREATE ROLE reader LOGIN")
-    run(engine, "INSERT INTO r VALUES ('a', 1, 1)", "GRANT SELECT ON r TO reader")
-    keep_notes(engine, ["r"])
+    engine, document = noted(new_postgresql_database(), tmp_path)
+    run(engine, "CREATE ROLE reader LOGIN", "GRANT SELECT ON r TO reader", "DELETE FROM r WHERE id <> '1'")
     reader = create_engine(engine.url.set(username="reader"))
     graph = KnowledgeGraph()
     for value in (1, 2):

@@ -200,11 +200,13 @@ def keep_notes(engine: Engine, tables: Collection[str]) -> None:
     if dialect is None:
         return
     with engine.connect() as connection:
-        own = set(connection.exec_driver_sql(dialect.own).scalars())
-        lacking = (_keys(connection, dialect).keys() & own & set(tables)) - noted_tables(connection).keys()
-    if lacking:
+        keys = _keys(connection, dialect)
+        own = keys.keys() & set(connection.exec_driver_sql(dialect.own).scalars())
+        wanted = own & set(tables)
+        is_lacking = TABLE not in keys or _lacking(connection, dialect, {table: keys[table] for table in wanted})
+    if wanted and is_lacking:
         with writing(engine) as session:
-            _make(session.connection(), dialect, lacking)
+            _make(session.connection(), dialect, wanted)
     elif dialect.fewer and TABLE in own:
         with engine.begin() as connection:
             connection.exec_driver_sql(dialect.fewer)
