@@ -15,6 +15,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.document.document import Document, schema
+from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
 pytestmark = pytest.mark.slow
@@ -102,6 +103,19 @@ def test_a_change_is_named_beside_the_reference_runs():
     (parameter,) = diagnosis.to_json()["causes"][0]["parameters"]
     assert parameter["value"] == pytest.approx(3.0, rel=0.1)
     assert parameter["interval95"][0] < 3.0 < parameter["interval95"][1]
+
+
+@pytest.mark.parametrize("size", [0.0, 0.15])
+def test_what_has_no_cause_is_told_beyond_what_reference_runs_leave_over_one_another(size):
+    unknown = on_joint(1, lambda m: size * np.sign(np.sin(9 * m.q[:, 0] + 5 * m.q[:, 2])))
+    both = [*runs(role="reference"), *runs(change=unknown, first=20)]
+    without_power = [replace(run, signals=replace(run.signals, power=None)) for run in both]
+    diagnosis = diagnose(data_set(without_power, effects=WITH_LOSS))
+    assert diagnosis.causes == ()
+    (torque,) = diagnosis.channels
+    assert max((torque.fitted[1] / torque.floor) ** 2 - 1) < DEFAULT.verdict.excess
+    assert diagnosis.verdict == ("unexplained" if size else "no_gap")
+    assert {place.joint for place in diagnosis.document.locations} == ({"joint_2"} if size else set())
 
 
 def test_withheld_friction_comes_back():
