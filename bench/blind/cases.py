@@ -42,6 +42,7 @@ SEEDS = {
     "test_3": 37_000_000,
     "test_4": 43_000_000,
     "test_5": 49_000_000,
+    "test_6": 55_000_000,
     "local": 84_000_000,  # development
 }
 OF_THEIR_OWN = {"local": (LOCAL, (1.0, 3.0))}  # effects and levels of splits that do not draw from all
