@@ -76,7 +76,7 @@ def test_by_way_all_of_the_load_is_lost_until_the_motor_has_crossed_the_gap():
 
 @pytest.mark.parametrize(
     "effect",
-    [Backlash(), Backlash(b=0.01, by_way=True), JointElasticity(frequency=8.0)],
+    [Backlash(), Backlash(b=0.01, by_way=True), JointElasticity(antiresonance=8.0)],
     ids=["backlash", "by_way", "elasticity"],
 )
 def test_a_part_with_its_reach_gives_what_the_whole_gives(effect):

@@ -228,7 +228,7 @@ CASES = [
         noise=1e-3,
     ),
     Case(
-        compliance.JointElasticity(frequency=10.0, joints=J2),
+        compliance.JointElasticity(antiresonance=10.0, joints=J2),
         {("K", "joint_2"): SOFT},
         lambda s: behind_a_spring(s, SOFT, 11.5),
         seconds=8.0,

@@ -80,6 +80,12 @@ def test_what_a_person_would_not_miss_does_not_matter(one: Closing) -> None:
     assert not one.matters(LIMITS)
 
 
+def test_a_cause_that_is_likely_matters_however_unsure_it_is_what_it_closes() -> None:
+    assert Closing(share=0.27, interval=(-0.17, 0.72), floors=1.0, size=1.0).matters(LIMITS, likely=True)
+    assert not Closing(share=0.27, interval=(-0.17, 0.72), floors=0.4, size=1.0).matters(LIMITS, likely=True)
+    assert not Closing(share=0.01, interval=(-0.17, 0.72), floors=1.0, size=1.0).matters(LIMITS, likely=True)
+
+
 def test_what_a_person_would_miss_matters() -> None:
     assert closed([2.0, 0.0]).matters(LIMITS) is True
     assert Closing(share=0.03, interval=(0.01, 0.05), floors=0.6, size=0.4).matters(LIMITS)

@@ -51,15 +51,18 @@ def left(before, after, causes=(), source=REPEATS, closing=MUCH, **more):
     return left_open([finding], Floor(floor, None, source), DEFAULT, **more)
 
 
-def finding(*classes, matters=True):
-    """A finding with a class of confidences for each cause: its own first, then of what cannot be told from it."""
+def finding(*classes, matters=True, least=0.1, effect="stribeck_friction"):
+    """A finding with a class of confidences for each cause: its own first, then of what cannot be told from it.
+
+    It closes at least the share `least` for sure.
+    """
     name = f"c{next(COUNT)}"
     members = [
-        document.Member(cause=f"{name}.{k}", effect=f"e{k}.{place}", family="friction", confidence=sure)
+        document.Member(cause=f"{name}.{k}", effect=effect, family="friction", confidence=sure)
         for k, some in enumerate(classes)
-        for place, sure in enumerate(some)
+        for sure in some
     ]
-    return SimpleNamespace(matters=matters, members=members)
+    return SimpleNamespace(matters=matters, members=members, share_interval95=(least, 0.9))
 
 
 @pytest.mark.parametrize(
@@ -76,6 +79,10 @@ def finding(*classes, matters=True):
         ([finding([0.4], [0.4])], UNEXPLAINED),
         ([finding([0.2, 0.1])], UNEXPLAINED),
         ([finding([0.3]), finding([0.9], matters=False)], UNEXPLAINED),
+        ([finding([0.9], least=-0.1)], UNEXPLAINED),  # it is there; that it closes anything is not sure
+        ([finding([0.9], least=-0.1), finding([0.9])], ATTRIBUTED),
+        ([finding([0.6, 0.3], least=-0.1), finding([0.9])], ATTRIBUTED),
+        ([finding([0.9], least=-0.1, effect="periodic_disturbance")], ATTRIBUTED),  # runs differ: a gap by itself
     ],
 )
 def test_causes_that_are_likely_make_the_verdict(findings, verdict):

@@ -271,23 +271,23 @@ class Backlash(_Compliance):
 class JointElasticity(_Compliance):
     """A link that swings behind its motor; or a motor that turns beyond its link, Ia d2/dt2 (tau_load/K).
 
-    Which of the two depends on where the position is measured: on the motor, or (`frequency` 0) on the link. The
-    frequency (Hz) is that of the link in the robot's middle pose while the motor holds; it follows the pose. The
-    coefficient is a share of about one, or Ia/K (s^2).
+    Which of the two depends on where the position is measured: on the motor, or (`antiresonance` 0) on the link. The
+    antiresonance (Hz) is the frequency of the link's swing while the motor holds, with the joint's mean inertia; in
+    each pose it follows that pose's. The coefficient is a share of about one, or Ia/K (s^2).
     """
 
     id: ClassVar[str] = "joint_elasticity"
     family: ClassVar[str] = "transmission"
 
-    frequency: float = 0.0
+    antiresonance: float = 0.0
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the link's encoder, and swings of 5 to 40 Hz."""
-        return self.variants(frequency=(0.0, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 20.0, 40.0))
+        return self.variants(antiresonance=(0.0, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 20.0, 40.0))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Ia/K, or the share."""
-        if self.frequency == 0:
+        if self.antiresonance == 0:
             return (Term("Ia/K", "s^2", joint.name, spread=5e-3, lowest=0.0),)
         return (Term("share", "1", joint.name, lowest=0.0),)
 
@@ -295,10 +295,10 @@ class JointElasticity(_Compliance):
         """Return what a unit of the coefficient adds."""
         acting = self._places(robot)
         load = load_torque(robot, motion, predicted)[:, acting]
-        if self.frequency == 0:
+        if self.antiresonance == 0:
             return (_at(acting, motion, differentiate(differentiate(load, motion.rate), motion.rate)),)
         inertia = load_inertia(robot, motion, predicted)[:, acting]
-        speed = 2 * np.pi * self.frequency * np.sqrt(_middle_inertia(robot)[acting] / inertia)
+        speed = 2 * np.pi * self.antiresonance * np.sqrt(_mean_inertia(robot)[acting] / inertia)
         (passed,) = transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start)
         return (_at(acting, motion, passed - load),)
 
@@ -307,10 +307,10 @@ class JointElasticity(_Compliance):
     ) -> tuple[Quantity, ...]:
         """Return K; nothing where the rotor's inertia is needed and not known."""
         found = []
-        stiffness = (2 * np.pi * self.frequency) ** 2 * _middle_inertia(robot)
+        stiffness = (2 * np.pi * self.antiresonance) ** 2 * _mean_inertia(robot)
         for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True):
             rotor = (known or {}).get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
-            top = rotor if self.frequency == 0 else float(stiffness[robot.index(joint.name)])
+            top = rotor if self.antiresonance == 0 else float(stiffness[robot.index(joint.name)])
             if top and value > 0:
                 sure = value - 1.96 * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
@@ -320,14 +320,10 @@ class JointElasticity(_Compliance):
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how soft the acting joint that moves least can be."""
-        inertia = _middle_inertia(robot)[self._places(robot)]
+        inertia = _mean_inertia(robot)[self._places(robot)]
         softest = (2 * np.pi * _SLOWEST) ** 2 * float(inertia.min())
         return {"K": Possible(softest, np.inf, f"softer, the link would swing at less than {_SLOWEST:g} Hz")}
 
 
-def _middle_inertia(robot: Robot) -> np.ndarray:
-    """Return (n,) the inertia that each joint moves in the middle of all joints' ranges, by the URDF."""
-    model = robot.model
-    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
-    middle = np.where(np.isfinite(lower + upper), (lower + upper) / 2, 0.0)
-    return np.maximum(np.diag(pin.crba(model, model.createData(), middle)), _LIGHTEST)
+def _mean_inertia(robot: Robot) -> np.ndarray:
+    return np.asarray(np.maximum(robot.mean_inertia, _LIGHTEST))

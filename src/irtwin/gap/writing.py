@@ -18,7 +18,8 @@ from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals, where_runs_are_few
+from irtwin.gap.isolation.confidence import confidence, of_rivals, where_runs_are_few
+from irtwin.gap.isolation.confidence import of_family as confidence_of_family
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
@@ -121,7 +122,8 @@ def findings(
     found = []
     for (channel, branch), own, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
         members = [_members(cause, limits.confidence) for cause in own]
-        likely = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
+        classes = [sum(one.confidence for one in some) for some in members]
+        of_family = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
         found.append(
             document.Finding(
                 id=name,
@@ -129,11 +131,11 @@ def findings(
                 joints=on,
                 scope=branch.scope,
                 channel=channel.name,
-                confidence=of_family(likely, limits.confidence),
+                confidence=confidence_of_family(of_family, limits.confidence),
                 share=branch.closing.share,
                 share_interval95=branch.closing.interval,
                 share_of=branch.closing.share_of,
-                matters=branch.closing.matters(limits.matters),
+                matters=branch.closing.matters(limits.matters, likely=max(classes) >= limits.verdict.likely),
                 members=tuple(one for some in members for one in some),
             )
         )

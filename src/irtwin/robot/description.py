@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from irtwin.robot.model import build_model
+from irtwin.robot.model import build_model, mean_inertia
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,11 @@ class Robot:
     def model(self) -> pin.Model:
         """The Pinocchio model, nq = nv = n, built from `urdf`."""
         return build_model(self.urdf)
+
+    @cached_property
+    def mean_inertia(self) -> np.ndarray:
+        """(n,) kg m^2 or kg: the inertia that each joint moves while the others hold, the mean over poses."""
+        return mean_inertia(self.model)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:

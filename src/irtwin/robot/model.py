@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import SubElement, tostring
 
+import numpy as np
 import pinocchio as pin
 from defusedxml import ElementTree as SafeXml
+from scipy.stats.qmc import Sobol
 
 _UNBOUNDED = {"lower": "-1e9", "upper": "1e9", "velocity": "1e9", "effort": "1e9"}
+_POSES = 64
 
 
 def build_model(urdf: str) -> pin.Model:
@@ -33,3 +36,16 @@ def build_model(urdf: str) -> pin.Model:
         if kind != "fixed" and joint.find("limit") is None:
             SubElement(joint, "limit", _UNBOUNDED)
     return pin.buildModelFromXML(tostring(root, encoding="unicode"))
+
+
+def mean_inertia(model: pin.Model) -> np.ndarray:
+    """Return (n,) the inertia that each joint moves while the others hold: the mean over poses that fill their ranges.
+
+    In kg m^2, or kg of a prismatic joint. A joint of more than a turn, or without limits, has all of one turn.
+    """
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    wide = upper - lower > 2 * np.pi
+    lower, upper = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
+    poses = lower + (upper - lower) * Sobol(model.nq, scramble=False).random(_POSES)
+    data = model.createData()
+    return np.asarray(np.mean([pin.crba(model, data, pose).diagonal() for pose in poses], axis=0))

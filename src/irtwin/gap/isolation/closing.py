@@ -31,10 +31,13 @@ class Closing:
         """What the share is of, in words."""
         return "the mean square, as no floor is known" if self.floors is None else "the gap above the floor"
 
-    def matters(self, limits: Matters) -> bool:
-        """Return whether a person would miss it: enough of the gap, more than noise, and for sure more than nothing."""
+    def matters(self, limits: Matters, *, likely: bool = False) -> bool:
+        """Return whether a person would miss it: enough of the gap, more than noise, and for sure more than nothing.
+
+        `likely`: the cause is there, more likely than not; then how much it closes need not be sure.
+        """
         more_than_noise = self.floors is None or self.floors >= limits.least_floors
-        return self.share >= limits.least_share and more_than_noise and self.interval[0] > 0
+        return self.share >= limits.least_share and more_than_noise and (likely or self.interval[0] > 0)
 
 
 def closing(

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.noise_floor import REPEATS, Floor
 from irtwin.gap.document import document
 from irtwin.gap.isolation.branches import branches
@@ -68,19 +69,32 @@ def most_left(findings: Sequence[Finding]) -> tuple[str, int]:
 
 
 def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
-    """Return the verdict on a gap that is not left open: `unexplained` where no cause that matters is likely.
+    """Return the verdict on a gap that is not left open.
 
+    It is `unexplained` where no cause that matters is likely, or none that is likely closes more than nothing for sure.
     A cause is likely where it is, or one of the effects that the data cannot tell from it.
     """
-    classes: dict[str, list[float]] = {}
-    for member in (one for finding in findings if finding.matters for one in finding.members):
-        classes.setdefault(member.cause, []).append(member.confidence)
-    if not classes:
+    mattering = [finding for finding in findings if finding.matters]
+    if not mattering:
         return NO_GAP
-    likely = [sure for sure in classes.values() if sum(sure) >= limits.likely]
+    classes = [sure for finding in mattering if _closes_for_sure(finding) for sure in _classes(finding)]
+    likely = [sure for sure in classes if sum(sure) >= limits.likely]
     if not likely:
         return UNEXPLAINED
     return AMBIGUOUS if any(len(sure) > 1 for sure in likely) else ATTRIBUTED
+
+
+def _closes_for_sure(finding: document.Finding) -> bool:
+    """Return whether a finding closes more than nothing; what differs between repeats is a gap, however little."""
+    return finding.share_interval95[0] > 0 or all(catalogue()[one.effect].disturbance for one in finding.members)
+
+
+def _classes(finding: document.Finding) -> list[list[float]]:
+    """Return the confidences of each cause of a finding and of what the data cannot tell from it."""
+    classes: dict[str, list[float]] = {}
+    for member in finding.members:
+        classes.setdefault(member.cause, []).append(member.confidence)
+    return list(classes.values())
 
 
 def _spread(findings: Sequence[Finding], unknown: float) -> float:

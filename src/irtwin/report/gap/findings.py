@@ -113,7 +113,8 @@ def sentence(
         part = "" if not told else f" Part of it is {said}." if guessed else f" Part of it is closed: {said}."
         return f"{_left(because, where, differ)}{part}{beside}"
     if verdict == "unexplained":
-        said = f"there is a gap{where}, and no cause that was found is sure: {said}"
+        unsure = "no cause that was found is sure" if guessed else "how much of it is closed is not sure"
+        said = f"there is a gap{where}, and {unsure}: {said}"
     elif guessed:
         said = f"several effects explain the gap{where}, and none of them is sure: {said}"
     if closes is None:
