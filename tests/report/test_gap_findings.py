@@ -90,6 +90,16 @@ def test_guesses_alone_are_said_to_be_guesses() -> None:
     )
 
 
+def test_a_likely_cause_that_may_close_nothing_is_told_with_what_is_not_sure() -> None:
+    likely = finding(share=0.27, interval=(-0.17, 0.72))
+    told = said("unexplained", likely, where=" in the torque", closes=None, because="unsure")
+    assert told == (
+        "There is a gap in the torque: friction of joint_5 differs from the twin’s (97 % sure): load-dependent friction "
+        "(55 %) or position-dependent friction (30 %). How much of the gap that makes is not sure. "
+        "That closes 27 % of the gap in torque on held-out runs (95 % interval −17 % to 72 %)."
+    )
+
+
 def test_alternatives_of_other_families_are_named_where_one_of_them_is_likely() -> None:
     guess = finding("load", confidence=0.4, members=((("cable drag", 0.4), ("torque ripple", 0.3)),))
     assert said("ambiguous", guess) == (

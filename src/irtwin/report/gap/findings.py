@@ -113,14 +113,14 @@ def sentence(
         part = "" if not told else f" Part of it is {said}." if guessed else f" Part of it is closed: {said}."
         return f"{_left(because, where, differ)}{part}{beside}"
     if verdict == "unexplained":
-        unsure = "no cause that was found is sure" if guessed else "how much of it is closed is not sure"
-        said = f"there is a gap{where}, and {unsure}: {said}"
+        said = f"there is a gap{where}{', and no cause that was found is sure' if guessed else ''}: {said}"
     elif guessed:
         said = f"several effects explain the gap{where}, and none of them is sure: {said}"
     if closes is None:
         closes = "".join(_closes(one, len(told)) for one in told[:1])
     differing = f" Besides, runs of one motion differ by {differ}, which no effect explains." if differ else ""
-    return f"{said[:1].upper()}{said[1:]}.{closes}{differing}{beside}"
+    unsure = " How much of the gap that makes is not sure." if verdict == "unexplained" and not guessed else ""
+    return f"{said[:1].upper()}{said[1:]}.{unsure}{closes}{differing}{beside}"
 
 
 def _told(findings: Sequence[Finding]) -> list[Finding]:
