@@ -94,8 +94,8 @@ def test_a_likely_cause_that_may_close_nothing_is_told_with_what_is_not_sure() -
     likely = finding(share=0.27, interval=(-0.17, 0.72))
     told = said("unexplained", likely, where=" in the torque", closes=None, because="unsure")
     assert told == (
-        "There is a gap in the torque: friction of joint_5 differs from the twin’s (97 % sure): load-dependent friction "
-        "(55 %) or position-dependent friction (30 %). How much of the gap that makes is not sure. "
+        "There is a gap in the torque: friction of joint_5 differs from the twin’s (97 % sure): load-dependent "
+        "friction (55 %) or position-dependent friction (30 %). How much of the gap that makes is not sure. "
         "That closes 27 % of the gap in torque on held-out runs (95 % interval −17 % to 72 %)."
     )
 

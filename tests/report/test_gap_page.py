@@ -167,6 +167,14 @@ def test_a_gap_whose_causes_are_unsure_is_nowhere_called_explained(tmp_path: Pat
         assert action not in page
 
 
+def test_a_place_that_chance_may_make_is_marked(tmp_path: Path) -> None:
+    said = gap_cases.diagnosis("attributed")
+    assert "perhaps low speed" not in page_of(tmp_path / "sure", said)
+    said["locations"][0]["false_discovery_rate"] = 0.3
+    page = page_of(tmp_path / "unsure", said)
+    assert "<td>perhaps low speed</td>" in page and "chance may make such a place too" in page
+
+
 def test_classes_of_several_causes_are_kept_apart(tmp_path: Path) -> None:
     said = gap_cases.diagnosis("ambiguous")
     said["causes"][1] |= {"effect": "payload", "joints": [], "indistinguishable_from": ["base_tilt"]}

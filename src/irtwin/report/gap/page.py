@@ -106,9 +106,10 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
 
 
 def _places(rows: Sequence[Row]) -> list[Row]:
-    """Return the places that have a part of the gap worth a line; all, where none has."""
-    least = DEFAULT.places.least_share
-    return [row for row in rows if row["excess"] > 0 and row["share"] >= least] or list(rows)
+    """Return the places that have a part of the gap worth a line; all, where none has. `sure`: beyond chance."""
+    limits = DEFAULT.places
+    marked: list[Row] = [{**row, "sure": row["rate"] <= limits.false_discoveries} for row in rows]
+    return [row for row in marked if row["excess"] > 0 and row["share"] >= limits.least_share] or marked
 
 
 def _cause(row: Row, answers: Answers) -> dict[str, Any]:
