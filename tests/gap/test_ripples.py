@@ -1,4 +1,4 @@
-"""The order of a fast ripple, found in what the twin leaves."""
+"""Which ripples are tried: known orders where a joint moves through a period, and fast ones that are found."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.synthetic import arm, swing
 
 from irtwin.gap.screening.remainder import Remainder
-from irtwin.gap.screening.ripples import fast_ripples
+from irtwin.gap.screening.ripples import fast_ripples, known_ripples
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(3)
@@ -50,3 +50,20 @@ def test_a_joint_that_stands_still_has_none():
         one.motion.q[:, 1] = 0.3
         one.residual[:, 1] = 1.0
     assert fast_ripples(ROBOT, left, DEFAULT.ripples.least_share) == []
+
+
+def test_a_known_order_is_tried_at_the_joints_that_move_through_a_period_of_it():
+    left = remainders(60.0, 0.0)
+    for one in left:
+        one.motion.q[:, 0] = np.linspace(-np.pi, np.pi, len(one.motion.q))
+        one.motion.q[:, 1] = 0.3
+        one.motion.q[:, 2] = np.linspace(0, 2 * np.pi / 2.5, len(one.motion.q))
+    left.append(Remainder(swing(ROBOT, 9), np.zeros((1, 3)), observed=False, label="reference"))
+    joints = {one.N: one.joints for one in known_ripples(ROBOT, left, 1.0)}
+    assert joints[1.0] == joints[2.0] == ("joint_1",)
+    assert joints[3.0] == joints[24.0] == ("joint_1", "joint_3")
+    assert {one.N: one.joints for one in known_ripples(ROBOT, left, 2.5)}[5.0] == ("joint_1",)
+
+
+def test_without_observed_runs_no_order_is_tried():
+    assert known_ripples(ROBOT, remainders(60.0, 0.0, observed=False), 1.0) == []

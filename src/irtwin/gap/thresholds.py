@@ -152,8 +152,11 @@ class SomePayload:
 
 @dataclass(frozen=True)
 class Ripples:
-    """Fast torque ripples."""
+    """Torque ripples."""
 
+    least_periods: float = _threshold(
+        1.0, "a joint moves through so many of a ripple's periods", "1", "decisions/gap-whole-periods.md"
+    )
     least_share: float = _threshold(
         0.04, "least that a line of the spectrum explains, to be tried", _RESIDUAL, "decisions/gap-fast-ripples.md"
     )

@@ -1,4 +1,4 @@
-"""Fast ripples: the order of each joint's clearest one, from the spectrum over its angle of what the twin leaves."""
+"""Ripples: at which joints each known order is tried, and the order of each joint's clearest fast one."""
 
 from __future__ import annotations
 
@@ -7,12 +7,29 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import find_peaks
 
+from irtwin.effects.effect import Effect
 from irtwin.effects.transmission import SLOW_ORDERS, TorqueRipple
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.robot.description import Robot
 
 _TURN = 4096  # parts of a turn by which angles are told apart: ten a period at the fastest
 _FINE = 4  # points of the spectrum for each that is independent
+
+
+def known_ripples(robot: Robot, left: Sequence[Remainder], least_periods: float) -> list[Effect]:
+    """Return the ripples of known orders, each at the joints that move through so many of its periods in observed runs.
+
+    Within less than a period a ripple is any curve over the angle: also that of a hose, which stiffens.
+    """
+    angles = [one.motion.q for one in left if one.observed]
+    turns = np.ptp(np.concatenate(angles), axis=0) / (2 * np.pi) if angles else np.zeros(len(robot.joints))
+    found = []
+    for ripple in TorqueRipple().candidates(robot):
+        periods = turns * ripple.shape["N"]
+        joints = tuple(name for name, many in zip(robot.joint_names, periods, strict=True) if many >= least_periods)
+        if joints:
+            found.append(ripple.on(*joints))
+    return found
 
 
 def fast_ripples(robot: Robot, left: Sequence[Remainder], least_share: float) -> list[TorqueRipple]:

@@ -21,20 +21,20 @@ from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
 from irtwin.gap.screening.payloads import untold_payload
 from irtwin.gap.screening.remainder import remainders
-from irtwin.gap.screening.ripples import fast_ripples
+from irtwin.gap.screening.ripples import fast_ripples, known_ripples
 from irtwin.gap.screening.together import Both, each_beside_the_other
 from irtwin.identification.two_processes import begun
 
 
 @dataclass(frozen=True)
 class Screened:
-    """Fast ripples and local effects, and a contact and a payload in some of the runs (None: none stands out).
+    """Ripples and local effects at their joints, and a contact and a payload in some runs (None: none stands out).
 
     `waited` gives these two: contacts are searched for beside other work.
     """
 
     waited: Callable[[], Both] = lambda: (None, None)
-    ripples: tuple[TorqueRipple, ...] = ()
+    ripples: tuple[Effect, ...] = ()
     local: tuple[LocalEffect, ...] = ()
 
     @cached_property
@@ -48,12 +48,9 @@ class Screened:
         return self.both[0]
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects to try with those found: contact and local ones in their place only, others there too."""
-        found: list[Effect] = [
-            effect
-            for effect in effects
-            if not isinstance(effect, LocalEffect) and not (self.contact and effect.id == self.contact.effect.id)
-        ]
+        """Return the effects to try with those found: screened ones in their place only, payloads in some runs too."""
+        placed = {self.contact.effect.id} if self.contact else set()
+        found = [one for one in effects if not isinstance(one, LocalEffect | TorqueRipple) and one.id not in placed]
         return [*found, *(one.effect for one in self.both if one), *self.ripples, *self.local]
 
 
@@ -65,7 +62,8 @@ def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
     in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
     payload = untold_payload(case.robot, system, noise, limits.some_payload, seed)
-    ripples = tuple(fast_ripples(case.robot, left, limits.ripples.least_share))
+    known_orders = known_ripples(case.robot, left, limits.ripples.least_periods)
+    ripples = (*known_orders, *fast_ripples(case.robot, left, limits.ripples.least_share))
     local = tuple(local_effects(case.robot, known, left, limits.local, seed))
 
     def both() -> Both:
