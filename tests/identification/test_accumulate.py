@@ -34,8 +34,8 @@ def products(motion, step=1, taps=None):
     return np.einsum("tja,tjb->jab", rows, rows)
 
 
-def reduced(motions, **options):
-    blocks = accumulate(motions, equations, STACK.pattern, **options)
+def reduced(motions):
+    blocks = accumulate(motions, equations, STACK.pattern)
     factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(STACK.pattern)]
     return blocks, np.array([factor.T @ factor for factor in factors])
 
@@ -55,10 +55,11 @@ def test_chunks_join_without_a_seam(monkeypatch):
     np.testing.assert_allclose(reduced([motion])[1], whole, rtol=1e-9, atol=1e-6)
 
 
-def test_columns_are_filtered_as_the_measurement_was():
+def test_columns_are_filtered_as_the_measurement_was(monkeypatch):
+    monkeypatch.setattr(room, "_BLOCKS", 1)
     motion = replace(measure(ROBOT, swing(ROBOT, 3)), cutoff=4.0)
     expected = products(motion, decimation(100, 4.0), kernel(100, 4.0))
-    np.testing.assert_allclose(reduced([motion], blocks=1)[1], expected, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(reduced([motion])[1], expected, rtol=1e-9, atol=1e-6)
 
 
 def test_blocks_are_long_enough_to_be_independent():
@@ -111,13 +112,6 @@ def test_a_factor_is_small_however_long_the_run(count):
     assert max(factor.shape[0] for block in blocks for factor in block.factors) <= len(STACK.torque_terms) + 1
 
 
-def test_more_blocks_are_shorter_down_to_some_periods_of_the_cutoff():
-    motion = replace(measure(ROBOT, swing(ROBOT, 1, seconds=30)), cutoff=2.0)
-    few, more, most = (reduced([motion], blocks=count)[0] for count in (5, 10, 1000))
-    assert (len(few), len(more)) == (5, 10)
-    assert min(block.stop - block.start for block in most) >= 1.9
-
-
 def test_columns_may_come_in_several_arrays_or_when_asked_for():
     motions = [measure(ROBOT, swing(ROBOT, 1))]
     whole = accumulate(motions, equations, STACK.pattern)
@@ -133,7 +127,8 @@ def test_columns_may_come_in_several_arrays_or_when_asked_for():
 
 
 @pytest.mark.parametrize("rows", [5, 40, 3000])
-def test_factors_by_products_hold_the_same_products_though_columns_repeat_or_are_empty(rows):
+def test_factors_by_products_hold_the_same_products_though_columns_repeat_or_are_empty(monkeypatch, rows):
+    monkeypatch.setattr(room, "_BLOCKS", 1)
     rng = np.random.default_rng(rows)
     columns = rng.standard_normal((rows, 1, 12)) * np.logspace(-5, 5, 12)
     columns[..., 3], columns[..., 7] = columns[..., 2] + 2 * columns[..., 4], 0.0
@@ -145,7 +140,7 @@ def test_factors_by_products_hold_the_same_products_though_columns_repeat_or_are
         return Rows(columns[cut], np.zeros_like(measured[cut]), measured[cut])
 
     pattern = np.ones((1, 12), dtype=bool)
-    (plain,), (fast,) = (accumulate([motion], given, pattern, by_products=fast, blocks=1) for fast in (False, True))
+    (plain,), (fast,) = (accumulate([motion], given, pattern, by_products=fast) for fast in (False, True))
     expected, found = (block.factors[0].T @ block.factors[0] for block in (plain, fast))
     assert fast.factors[0].shape[0] <= 13
     assert fast.rows.tolist() == plain.rows.tolist()

@@ -50,8 +50,7 @@ _ROWS = 2048  # of which no more than this are left by decimation: they stay in 
 _PANEL = 64  # columns that LAPACK takes together
 _ROUNDING = 1e-15  # of a column's square: less of what others leave of it is rounding
 _SHARED = 5e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
-BLOCKS = 40
-"""At least, over all motions: enough for intervals."""
+_BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
 
@@ -72,14 +71,9 @@ class Block:
 
 
 def accumulate(
-    motions: Sequence[Motion],
-    equations: Equations,
-    pattern: np.ndarray,
-    *,
-    by_products: bool = False,
-    blocks: int = BLOCKS,
+    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False
 ) -> list[Block]:
-    """Reduce the motions to `blocks` of equal length at least, if these are not too short.
+    """Reduce the motions to blocks.
 
     `pattern`: (g, K) which columns each equation has. What is computed from the motion passes the filter that its
     measurement went through (its `cutoff`), and both are then decimated to what lies below it. Half a kernel at
@@ -87,29 +81,23 @@ def accumulate(
     products of columns, in a quarter of the time where these are many; they are no triangles, and what is below 1e-8 of
     a column is lost in rounding. Raises InputError where nothing is left.
     """
-    found = accumulate_any(motions, equations, pattern, by_products=by_products, blocks=blocks)
+    found = accumulate_any(motions, equations, pattern, by_products=by_products)
     if not found:
         raise _nothing_left(motions)
     return found
 
 
 def accumulate_any(
-    motions: Sequence[Motion],
-    equations: Equations,
-    pattern: np.ndarray,
-    *,
-    by_products: bool = False,
-    blocks: int = BLOCKS,
+    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False
 ) -> list[Block]:
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
     kind = _Products if by_products else _Triangle
-    stretches = [(motion, *one) for motion in motions for one in _stretches(motion, total, blocks)]
-    found = [_Growing(*one, pattern, kind) for one in stretches]
+    found = [_Growing(motion, *stretch, pattern, kind) for motion in motions for stretch in _stretches(motion, total)]
     samples = sum(len(motion.time) for motion in motions)
     alone = samples * int(pattern.sum()) < _SHARED or not can_copy()
-    reduced = _grown(found, equations) if alone else shared(lambda some: _grown(some, equations), found)
-    return [block for block in reduced if block.rows.any()]
+    blocks = _grown(found, equations) if alone else shared(lambda some: _grown(some, equations), found)
+    return [block for block in blocks if block.rows.any()]
 
 
 def _grown(growing: Sequence[_Growing], equations: Equations) -> list[Block]:
@@ -195,11 +183,11 @@ def root(products: np.ndarray) -> np.ndarray:
     return found
 
 
-def _stretches(motion: Motion, total: float, blocks: int) -> list[tuple[int, int]]:
+def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
     """Cut a motion into the sample ranges of its blocks, of equal length."""
     seconds = _seconds(motion)
     shortest = _SHORTEST / motion.cutoff if motion.cutoff else 0.0
-    count = max(1, int(min(np.ceil(blocks * seconds / total), seconds / shortest if shortest else np.inf)))
+    count = max(1, int(min(np.ceil(_BLOCKS * seconds / total), seconds / shortest if shortest else np.inf)))
     edges = np.linspace(0, len(motion.time), count + 1).astype(int)
     return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 

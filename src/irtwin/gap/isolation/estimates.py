@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from irtwin.gap.regression.joint_equations import JointEquations
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.accumulate import BLOCKS, Block
 from irtwin.identification.estimators import Estimate, estimate
 
 
@@ -62,20 +60,4 @@ def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
         blocks.append(replace(block, factors=tuple(factors)))
     rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
     signals = [*[0] * (len(pattern) - 1), 1] if system.beside_power else None
-    return estimate(_joined(blocks), pattern, terms, rows, signals)
-
-
-def _joined(blocks: Sequence[Block]) -> list[Block]:
-    """Return neighbours in a run joined, to as many as intervals need: short blocks depend on each other."""
-    together = max(1, len(blocks) // BLOCKS)
-    found = []
-    for _, of_run in groupby(blocks, key=lambda block: block.run):
-        own = list(of_run)
-        found += [_whole(own[first : first + together]) for first in range(0, len(own), together)]
-    return found
-
-
-def _whole(blocks: Sequence[Block]) -> Block:
-    factors = tuple(np.concatenate(own) for own in zip(*(block.factors for block in blocks), strict=True))
-    rows = np.sum([block.rows for block in blocks], axis=0)
-    return Block(blocks[0].run, blocks[0].start, blocks[-1].stop, rows, factors)
+    return estimate(blocks, pattern, terms, rows, signals)

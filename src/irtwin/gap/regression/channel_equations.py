@@ -48,9 +48,7 @@ def torque_system(
         columns = list(zip(own, candidates.part(motion), strict=True))
         return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion))
 
-    fewest = grouping.blocks(motion.run for motion in motions)
-    asked = with_progress(equations, motions, tell)
-    blocks = accumulate(motions, asked, pattern, by_products=bool(effects), blocks=fewest)
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern, by_products=bool(effects))
     known = stack.prior_rows(stack.torque_terms)
     return enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
@@ -84,9 +82,7 @@ def power_system(
         columns = [own[:, ~stack.fixed], *candidates.part(motion)]
         return Rows([columns], known[:, None], motion.power[:, None])
 
-    fewest = grouping.blocks(motion.run for motion in motions)
-    asked = with_progress(equations, motions, tell)
-    blocks = accumulate(motions, asked, pattern, by_products=bool(effects), blocks=fewest)
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern, by_products=bool(effects))
     known = stack.prior_rows(free)
     return enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 

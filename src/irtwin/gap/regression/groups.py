@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.identification.accumulate import BLOCKS, Block
+from irtwin.identification.accumulate import Block
 
 _GROUPS = 8  # of time, where the runs are fewer
-_FINER = 4  # times as many blocks, where programmed motions are the groups
 
 
 @dataclass(frozen=True)
@@ -27,14 +26,6 @@ class Grouping:
     def few(self, runs: Iterable[str]) -> bool:
         """Return whether the programmed motions of these runs are too few to leave each out in turn."""
         return len({self.label[run] for run in runs if run in self.observed}) < self.fewest
-
-    def blocks(self, runs: Iterable[str]) -> int:
-        """Return into how many blocks of time runs are cut, at least, for which random signs are drawn.
-
-        An effect that speaks seldom speaks in a few long blocks, whose signs are soon as they are. Where runs are few
-        and their stretches the groups, shorter blocks would be taken for independent, which they are not.
-        """
-        return BLOCKS if self.few(runs) else _FINER * BLOCKS
 
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
         """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""

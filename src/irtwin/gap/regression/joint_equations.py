@@ -86,9 +86,7 @@ def joint_equations(
         return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
-    fewest = grouping.blocks(motion.run for motion in motions)
-    asked = with_progress(equations, motions, tell)
-    blocks = accumulate(motions, asked, pattern, by_products=True, blocks=fewest)
+    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern, by_products=True)
     alone = [replace(one, rows=one.rows[:-1], factors=one.factors[:-1]) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(
