@@ -142,7 +142,7 @@ def test_an_effect_that_the_search_does_not_know_is_neither_named_nor_a_rival():
 
 
 def test_one_run_without_power_is_cut_in_time():
-    (run, *_) = runs(1, change=on_joint(2, lambda m: 2 * np.sin(5 * m.q[:, 2])))
+    (run, *_) = runs(1, change=on_joint(2, lambda m: 2 * np.sin(8 * m.q[:, 2])))
     run = replace(run, signals=replace(run.signals, power=None))
     diagnosis = diagnose(data_set([run]))
     document = valid(diagnosis)
