@@ -9,6 +9,7 @@ import pytest
 from tests.synthetic import arm, swing
 
 from irtwin.effects.effect import Predicted
+from irtwin.effects.friction import ChangedFrictionWithTemperature, TemperatureDependentFriction
 from irtwin.effects.load import ExternalContact, Payload
 from irtwin.gap.regression.candidate_columns import Candidates
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, in_scope
@@ -123,3 +124,12 @@ def test_beside_reference_runs_what_acts_in_some_runs_is_a_change():
         (MISSING, [everywhere]),
         (CHANGED, [some]),
     ]
+
+
+def test_a_shape_that_a_change_alone_has_is_not_missing():
+    standing, change = TemperatureDependentFriction(), ChangedFrictionWithTemperature()
+    variants = tuple(Variant(one, (k,), ()) for k, one in enumerate((standing, change)))
+    tried = [Hypothesis(standing.id, "joint_1", scope, variants) for scope in (MISSING, CHANGED)]
+    missing, changed = in_scope(tried, both=True)
+    assert [one.effect for one in missing.variants] == [standing]
+    assert changed == tried[1]

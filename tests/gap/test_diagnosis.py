@@ -12,6 +12,7 @@ import pytest
 from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.friction import TemperatureDependentFriction
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.document.document import Document, schema
@@ -103,6 +104,24 @@ def test_a_change_is_named_beside_the_reference_runs():
     (parameter,) = diagnosis.to_json()["causes"][0]["parameters"]
     assert parameter["value"] == pytest.approx(3.0, rel=0.1)
     assert parameter["interval95"][0] < 3.0 < parameter["interval95"][1]
+
+
+def test_oil_that_thins_otherwise_than_before_is_a_change_which_the_twin_takes():
+    def warmth(run):
+        return 25.0 + 2 * (int(run.split("_")[1]) % 10)  # degC
+
+    def thins(motion):
+        return 8 * motion.dq[:, 1] * (np.exp(-0.02 * (warmth(motion.run) - 38)) - 1)
+
+    def logged(run):
+        temperature = np.full(run.signals.q.shape, warmth(run.name))
+        return replace(run, signals=replace(run.signals, temperature=temperature))
+
+    both = [*runs(10, role="reference"), *runs(10, change=on_joint(1, thins), first=20)]
+    diagnosis = diagnose(data_set([logged(run) for run in both], effects=WITH_LOSS))
+    (_, cause), *_ = diagnosis.causes
+    assert (cause.effect, cause.scope, cause.joints) == ("temperature_dependent_friction", "changed", ("joint_2",))
+    assert TemperatureDependentFriction(joints=("joint_2",)) in diagnosis.twin.effects
 
 
 @pytest.mark.parametrize("size", [0.0, 0.15])

@@ -123,7 +123,8 @@ class Effect(ABC):
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
     so many seconds on either side. What is `rare` shows in some motions alone, and in these strongly.
     What is `imitated` looks like what friction leaves, where joints turn back, if its form is not the twin's. Where a
-    screening chooses the shape to be tried, it was `found_among` so many.
+    screening chooses the shape to be tried, it was `found_among` so many. A shape `of_change` is a change's alone: in a
+    twin, part of it is another effect.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
@@ -158,6 +159,7 @@ class Effect(ABC):
     disturbance: ClassVar[str | None] = None
     manual_test: ClassVar[str | None] = None
     taken_off: ClassVar[str | None] = None
+    of_change: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)
@@ -188,6 +190,14 @@ class Effect(ABC):
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the effect in each shape that is worth trying; a robot's data sheet may add some."""
         return (self,)
+
+    def changes(self) -> tuple[Effect, ...]:
+        """Return the shapes that are worth trying for a change alone."""
+        return ()
+
+    def standing(self) -> Effect:
+        """Return the shape that a change has in a twin where it stays."""
+        return self
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

@@ -206,6 +206,7 @@ class TemperatureDependentFriction(JointEffect):
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
     manual_test: ClassVar[str | None] = "log joint temperatures, from a cold start"
     channel: ClassVar[str] = "torque"
+    rare: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
 
     k: float = 0.02  # 1/K
@@ -214,6 +215,10 @@ class TemperatureDependentFriction(JointEffect):
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return slow and fast thinning."""
         return self.variants(k=(0.005, 0.02, 0.05))
+
+    def changes(self) -> tuple[Effect, ...]:
+        """Return the change that leaves another friction at T0."""
+        return (ChangedFrictionWithTemperature(self.k, self.T0, joints=self.joints, runs=self.runs),)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k Fv."""
@@ -235,6 +240,42 @@ class TemperatureDependentFriction(JointEffect):
             part = (ratio(value, viscous), ratio(deviation, viscous)) if viscous else (self.k, None)
             found.append(quantity("k", joint.name, part[0], "1/K", part[1]))
         return tuple(found)
+
+
+@dataclass(frozen=True)
+class ChangedFrictionWithTemperature(TemperatureDependentFriction):
+    """(Fv + dFv) dq exp(-k (T - T0)) - Fv dq: friction with temperature, where viscous friction is another at T0, too.
+
+    Beside the former friction, which holds at every temperature, a change is known at T0 no better than elsewhere. Both
+    are equal at a temperature of their own.
+    """
+
+    of_change: ClassVar[bool] = True
+
+    def standing(self) -> Effect:
+        """Return it in a twin, where viscous friction is what holds at T0."""
+        return TemperatureDependentFriction(self.k, self.T0, joints=self.joints, runs=self.runs)
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return this one alone."""
+        return (self,)
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return k (Fv + dFv) and dFv."""
+        unit = f"{force_unit(joint)} s/{joint.unit}"
+        return (*super().joint_terms(joint), Term("dFv", unit, joint.name, spread=30.0))
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return dq (exp(-k (T - T0)) - 1)/k and dq; zero where no temperature was measured."""
+        (thinning,) = super().samples(robot, motion, predicted)
+        return (thinning, np.zeros_like(motion.dq) if motion.temperature is None else motion.dq)
+
+    def parameters(
+        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return k, relative to the joint's former Fv: (k (Fv + dFv) - k dFv)/Fv."""
+        thinning = np.kron(np.eye(len(self.acting(robot))), [1.0, -self.k])
+        return super().parameters(robot, thinning @ values, thinning @ covariance @ thinning.T, known)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
             lacking = [joint for joint in joints if not {(cause.effect, joint), (cause.effect, None)} & case.modelled]
             named = [joint for joint in lacking if joint is not None]
             whole = not cause.joints and len(lacking) == len(joints)
-            effect = variant.effect if whole else variant.effect.on(*named)
+            effect = variant.effect.standing() if whole else variant.effect.standing().on(*named)
             if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in added):
                 added.append(effect)
     changed = any(cause.scope == CHANGED for cause in causes)

@@ -407,5 +407,5 @@ def _variants(case: Case, signal: str) -> list[Effect]:
         and not effect.disturbance
         and (bodies or not effect.bodies)
         and can_show(effect, case.seen)
-        for shape in effect.candidates(case.robot)
+        for shape in (*effect.candidates(case.robot), *(effect.changes() if case.others else ()))
     ]

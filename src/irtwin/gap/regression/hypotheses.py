@@ -118,13 +118,17 @@ def bounds(variant: Variant) -> np.ndarray:
 
 
 def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis]:
-    """Return hypotheses without shapes that act in some observed runs only, where these would be `missing` ones.
+    """Return hypotheses, the `missing` ones without the shapes that are a change's.
 
-    Beside reference runs (`both`) such a shape is a change.
+    Such a shape is `of_change`, or acts in some observed runs only, beside reference runs (`both`).
     """
     found = []
     for one in candidates:
-        kept = tuple(v for v in one.variants if not (both and one.scope == MISSING and v.effect.runs is not None))
+        kept = tuple(v for v in one.variants if one.scope == CHANGED or not _of_change(v.effect, both))
         if kept:
             found.append(replace(one, variants=kept))
     return found
+
+
+def _of_change(effect: Effect, both: bool) -> bool:
+    return effect.of_change or (both and effect.runs is not None)
