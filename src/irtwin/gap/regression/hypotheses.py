@@ -38,7 +38,7 @@ class Hypothesis:
     def flexibility(self) -> float:
         """How much it could fit: its coefficients, and the choice among its shapes in bits, screening's too."""
         shapes = len(self.variants) * self.variants[0].effect.found_among
-        return len(self.variants[0].columns) + float(np.log2(shapes))
+        return max(len(variant.columns) for variant in self.variants) + float(np.log2(shapes))
 
     @property
     def of_bodies(self) -> bool:
