@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from tests import small_robots
+from tests.playing import play
 
 from irtwin.asking import ask
 from irtwin.workflow import run
@@ -37,8 +38,5 @@ def test_each_run_ends_with_the_energy_of_the_graph(browser: Any, tmp_path: Path
         assert float(page.inner_text(".is-energy")) * unit == pytest.approx(energy, rel=1e-3)
         page.evaluate(SEEK, 2.0)
         assert page.locator("#figure-torque .cursor:visible").count() == 3
-    page.select_option(".is-speed", "20")
-    page.click(".is-play")
-    page.wait_for_selector(".is-play[aria-label=Pause]")
-    page.wait_for_selector(".is-play[aria-label=Play]")
+    play(page)
     assert complaints == []

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from tests import mesh_robots
 from tests.mesh_robots import HAND
+from tests.playing import play
 from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
 from irtwin.providers.mesh_files import mesh_copies
@@ -201,10 +202,7 @@ def test_another_run_can_be_chosen_here_or_elsewhere(browser: Any, tmp_path: Pat
 def test_it_plays_tells_the_time_and_stops_at_the_end(browser: Any, tmp_path: Path) -> None:
     page, complaints = open_page(browser, tmp_path, kr6())
     page.evaluate("document.addEventListener('irtwin:time', (event) => { window.heard = event.detail.time; })")
-    page.select_option(".is-speed", "20")
-    page.click(".is-play")
-    page.wait_for_selector(".is-play[aria-label=Pause]")
-    page.wait_for_selector(".is-play[aria-label=Play]")
+    play(page)
     assert page.evaluate("window.heard") == pytest.approx(11.0)
     assert complaints == []
 
