@@ -40,7 +40,7 @@ def test_a_link_swings_at_its_own_frequency_after_a_jerk():
     assert passed[-1] == pytest.approx(5, rel=1e-3)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(3e-4, 3e-3), st.floats(0.2, 5.0))
 def test_play_delays_an_impulse_and_keeps_it(play, inertia):
     (passed,) = transmitted(LOAD, np.full_like(LOAD, inertia), RATE, speed(30), 0.5, (play,))

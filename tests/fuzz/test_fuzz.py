@@ -13,9 +13,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from tests.fuzz.case import ALONE, Case, cases, read_case
 from tests.fuzz.commands import fault_of, in_child, try_case_apart
 
-FEW = settings(
-    max_examples=12, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
-)
+FEW = settings(max_examples=12, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck])
 
 
 @pytest.mark.slow
@@ -27,7 +25,7 @@ def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(case: Case)
     assert fault is None, f"{fault.kind}\n{fault.said}\n{case.to_json()}"
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(cases())
 def test_a_case_that_is_kept_reads_as_it_was(case: Case):
     assert read_case(case.to_json()) == case

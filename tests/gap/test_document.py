@@ -88,7 +88,7 @@ def _typed(kind: str, node: dict[str, Any]) -> st.SearchStrategy[Any]:
 
 @pytest.mark.parametrize("kind", [Gap, Location, Cause, Shrink, Experiment, Curves])
 def test_whatever_the_schema_allows_is_read_and_written_alike(kind: type) -> None:
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=40)
     @given(json_of(form.schema(kind)))
     def holds(said: dict[str, Any]) -> None:
         made = form.from_json(kind, said, "part")

@@ -27,7 +27,7 @@ def remainders(order, size, joint=1, observed=True):
     return left
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(26.0, 399.0))
 def test_the_order_is_found_as_finely_as_the_joint_turns_far(order):
     (found,) = fast_ripples(ROBOT, remainders(order, 0.7), DEFAULT.ripples.least_share)

@@ -125,7 +125,7 @@ def full_runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.mark.slow
 @given(runs=st.lists(st.lists(statements, max_size=8), max_size=6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_graph_is_a_full_runs(runs: list[list[SQL]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Place(Path(folder))

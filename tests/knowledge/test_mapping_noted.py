@@ -132,7 +132,7 @@ statements = st.one_of(
 
 
 @given(runs=st.lists(st.lists(statements, max_size=4), min_size=1, max_size=6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_whatever_is_written_the_graph_is_a_full_runs(runs: list[list[str]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Place(Path(folder))

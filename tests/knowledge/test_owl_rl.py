@@ -130,7 +130,7 @@ _KINDS = st.tuples(
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.one_of(_STATEMENTS, _KINDS), min_size=3, max_size=9))
 def test_agrees_with_owlrl_on_drawn_graphs(statements: list[tuple[str, str, str]]) -> None:
     premise = triples(" ".join(f"{' '.join(statement)} ." for statement in statements))
@@ -143,7 +143,7 @@ def test_what_an_individual_is_to_itself_is_kept() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.one_of(_STATEMENTS, _KINDS), min_size=3, max_size=9))
 def test_what_is_kept_is_what_owlrl_finds(statements: list[tuple[str, str, str]]) -> None:
     premise = triples(" ".join(f"{' '.join(statement)} ." for statement in statements))

@@ -167,7 +167,7 @@ def test_a_part_is_no_less_apart_for_being_the_first(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4),
     st.lists(st.sampled_from([None, *JOINING.values()]), min_size=4, max_size=4),

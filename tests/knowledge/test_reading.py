@@ -91,7 +91,7 @@ class Writing(RuleBasedStateMachine):
 
 
 TestWriting = Writing.TestCase
-TestWriting.settings = settings(max_examples=5, stateful_step_count=8, deadline=None)
+TestWriting.settings = settings(max_examples=5, stateful_step_count=8)
 
 
 def test_an_update_that_fails_leaves_what_is_true() -> None:

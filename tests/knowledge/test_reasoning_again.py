@@ -70,7 +70,7 @@ def anew(quads: list[Quad]) -> dict[str, set]:
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4))
 def test_any_change_gives_what_a_full_run_gives(states: list[list[Quad]]) -> None:
     graph = KnowledgeGraph()

@@ -86,7 +86,7 @@ KINDS = st.tuples(NAMES, st.just("a"), st.sampled_from(["ex:C", "ex:D"]))
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.one_of(LINKS, KINDS), max_size=10))
 def test_recursive_rules_agree_with_pyshacl_on_drawn_data(statements: list[tuple[str, str, str]]) -> None:
     shapes = """

@@ -73,7 +73,7 @@ DATA = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(updates=st.lists(st.tuples(st.sampled_from(["INSERT", "DELETE"]), DATA), max_size=4))
 def test_data_by_itself_leaves_what_the_whole_comparison_leaves(updates: list[tuple[str, list]]) -> None:
     looked_up, compared = KnowledgeGraph(), KnowledgeGraph()

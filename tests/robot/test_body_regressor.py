@@ -32,7 +32,7 @@ def one_by_one(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray)
     return np.reshape(found, (len(q), model.nv, 10 * model.nv))
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.data(), st.integers(1, 7), st.integers(0, 2**32 - 1))
 def test_it_is_what_pinocchio_says_of_each_sample(data, joints, seed):
     parents = [data.draw(st.integers(0, number), "parent") for number in range(joints)]

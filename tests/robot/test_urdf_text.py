@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from tests.robot.chains import chains
 from tests.virtual.scene_data import HOSTILE, bare, kr6
 
@@ -32,7 +32,6 @@ def check_same(robot: Robot, other: Robot) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None)
 @given(urdf=chains())
 def test_any_chain_comes_back(urdf: str) -> None:
     robot = parse_urdf(urdf)

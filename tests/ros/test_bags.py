@@ -35,7 +35,6 @@ def run(**channels: Any) -> Signals:
 @pytest.mark.parametrize("form", FORMS)
 @settings(
     max_examples=5,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.differing_executors],
 )
 @given(torque=VALUES, temperature=arrays(float, (N, 2), elements=st.floats(-900, 900)), seed=st.integers(0, 1 << 30))

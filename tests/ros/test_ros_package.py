@@ -180,7 +180,7 @@ def test_ros_own_parser_takes_the_urdf(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(plan=robots(large=False))
 def test_ros_own_parser_takes_any_robot_that_we_take(plan: RobotPlan) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -47,7 +47,7 @@ def test_noise_of_encoders_does_not_drown_the_acceleration():
 
 
 @pytest.mark.slow
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(jitter=st.floats(0, 0.3), seed=st.integers(0, 100))
 def test_jitter_of_sampling_is_evened_out(jitter, seed):
     rng = np.random.default_rng(seed)

@@ -11,14 +11,14 @@ rates = st.floats(10, 1000)
 shares = st.floats(0.02, 1.2)  # cutoff over Nyquist
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(rate=rates, share=shares, level=st.floats(-1e3, 1e3), slope=st.floats(-10, 10), count=st.integers(2, 400))
 def test_constants_and_ramps_pass_unchanged(rate, share, level, slope, count):
     signal = level + slope * np.arange(count)
     np.testing.assert_allclose(low_pass(signal, rate, share * rate / 2), signal, atol=1e-8 * (1 + np.abs(signal).max()))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(share=st.floats(0.05, 0.9), size=st.integers(1, 3))
 def test_linear_and_without_phase(share, size):
     rng = np.random.default_rng(1)

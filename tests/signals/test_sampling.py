@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.data_sets import write
 from tests.synthetic import arm, as_run, measure, swing
@@ -101,7 +101,6 @@ def test_the_median_of_bursts_is_not_the_interval():
 
 
 @pytest.mark.slow
-@settings(deadline=None)
 @given(st.lists(st.floats(1e-6, 1e9), min_size=19, max_size=200))
 def test_no_times_ask_for_many_more_rows_than_there_are_samples(gaps):
     time = np.cumsum([0.0, *gaps])

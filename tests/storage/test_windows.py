@@ -42,7 +42,7 @@ def series(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
         return SeriesWindows(folder / write_series(folder, table).path), power
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(one=MOMENT, other=MOMENT)
 def test_mean_and_extremes_are_those_of_the_samples(series: Known, one: float, other: float) -> None:
     file, power = series
@@ -55,7 +55,7 @@ def test_mean_and_extremes_are_those_of_the_samples(series: Known, one: float, o
         assert found == [pytest.approx(inside.mean(), rel=1e-12), inside.min(), inside.max()]
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(moments=st.lists(MOMENT, min_size=3, max_size=3))
 def test_integrals_are_those_of_the_line_through_the_samples(series: Known, moments: list[float]) -> None:
     file, power = series

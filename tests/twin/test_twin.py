@@ -17,7 +17,7 @@ ROBOT = with_constants(arm(3))
 TWIN = identify(ROBOT, [measure(ROBOT, swing(ROBOT, seed), noise=0.2) for seed in range(2)], ALL)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 1000), payload=st.floats(0, 10), count=st.integers(1, 1500))
 def test_ledger_sums_to_the_energy(seed, payload, count):
     motion = replace(swing(ROBOT, seed, seconds=15), payload_mass=payload).part(0, count)
@@ -35,7 +35,7 @@ def test_ledger_names_who_took_what():
     assert {effect for effect, _ in entries}.isdisjoint({"torque_offset", "mechanical_power"})
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(factor=st.floats(-3, 3))
 def test_torque_is_linear_in_the_parameters(factor):
     motion = swing(ROBOT, 4, seconds=1)
