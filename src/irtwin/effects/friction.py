@@ -256,10 +256,6 @@ class ChangedFrictionWithTemperature(TemperatureDependentFriction):
         """Return it in a twin, where viscous friction is what holds at T0."""
         return TemperatureDependentFriction(self.k, self.T0, joints=self.joints, runs=self.runs)
 
-    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return this one alone."""
-        return (self,)
-
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k (Fv + dFv) and dFv."""
         unit = f"{force_unit(joint)} s/{joint.unit}"
