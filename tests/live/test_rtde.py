@@ -10,6 +10,7 @@ import time
 from dataclasses import replace
 
 import pytest
+from tests.dripping import dripping
 from tests.live.controller import Controller, package, serving
 from tests.synthetic import arm
 
@@ -115,13 +116,16 @@ def test_a_controller_that_falls_silent_is_told(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(rtde, "_AGAIN", 0.05)
     monkeypatch.setattr(rtde, "_PATIENCE", 0.3)
     follower, _ = followed(Controller(quiet=10), 15)
-    assert "the connection is lost (silent for 0.3 s); trying again" in follower.said[0]
+    assert "the connection is lost (no whole package within 0.3 s); trying again" in follower.said[0]
 
 
 @pytest.mark.parametrize(
     ("sent", "reason"),
     [
-        (b"GET / HTTP/1.1\r\n" * 2000, "what it sends is no RTDE|a data package is not what was asked for|silent"),
+        (
+            b"GET / HTTP/1.1\r\n" * 2000,
+            "no RTDE|a data package is not what was asked for|no whole package",
+        ),
         (struct.pack(">HB", 1, 85), "what it sends is no RTDE"),
         (package("U", b"\x07" + bytes(8)), "a data package is not what was asked for"),
         (package("U", b"\x08" + bytes(8 * 28)), "a data package is not what was asked for"),
@@ -178,3 +182,32 @@ def test_another_arm_is_refused_before_it_connects() -> None:
 def test_an_address_that_is_none_is_told(address: str) -> None:
     with pytest.raises(InputError, match="give HOST or HOST:PORT"):
         Rtde(address, robot(), "arm")
+
+
+@pytest.mark.parametrize("timestamp", [math.nan, math.inf, -math.inf, -1e300, 1e300])
+@pytest.mark.parametrize("sample", [0, 5])
+def test_a_timestamp_that_is_none_is_refused_and_the_rest_goes_on(timestamp: float, sample: int) -> None:
+    follower, client = followed(Controller(times={sample: timestamp}), 10)
+    assert follower.refused
+    assert set(follower.refused) == {f"{client.address}: timestamp is not a time in s since 1970"}
+    assert all(math.isfinite(state.time) for state in follower.states)
+
+
+def test_a_package_that_comes_byte_by_byte_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rtde, "_PATIENCE", 0.6)
+    with (
+        dripping(b"V", every=0.2) as port,
+        pytest.raises(InputError, match=r"no controller answers by RTDE \(no whole package within 0.6 s\)"),
+    ):
+        Rtde(f"127.0.0.1:{port}", robot(), "arm")
+
+
+def test_who_follows_a_silent_controller_can_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rtde, "_PATIENCE", 60.0)
+    with serving(Controller(quiet=5)) as port:
+        client, done = Rtde(f"127.0.0.1:{port}", robot(), "arm"), threading.Event()
+        following = threading.Thread(target=client.follow, args=(lambda state: None, lambda reason: None, done))
+        following.start()
+        done.set()
+        following.join(10)
+        assert not following.is_alive()

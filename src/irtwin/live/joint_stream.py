@@ -34,6 +34,13 @@ _GREATEST = {str(channel.streamed): channel.greatest for channel in STREAMED.val
 _LATEST = 253402300799.0  # s: the end of the year 9999
 
 
+def checked_time(time: float, name: str) -> float:
+    """Return a time, s. Raises InputError, with its name, where it is none since 1970."""
+    if not 0.0 <= time <= _LATEST:  # nor NaN
+        raise InputError(f"{name} is not a time in s since 1970")
+    return time
+
+
 @dataclass(frozen=True, slots=True)
 class State:
     """A robot at one moment: `time` in s since 1970; `values` of each streamed channel, in the order of `STREAMED`.
@@ -86,9 +93,7 @@ class StateReader:
                 f"no robot {str(name)[:100]!r} in the workspace: run its data set first; known are {self._known}"
             )
         order = self._order(robot, said.get("name"))
-        time = _number(said, "time")
-        if not 0.0 <= time <= _LATEST:
-            raise InputError("`time` is not a time in s since 1970")
+        time = checked_time(_number(said, "time"), "`time`")
         for field in REQUIRED:
             if field in STREAMED and STREAMED[field].streamed not in said:
                 raise InputError(f"`{STREAMED[field].streamed}` is missing")

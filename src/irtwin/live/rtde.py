@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 
 from irtwin.errors import InputError
-from irtwin.live.joint_stream import STREAMED, State
+from irtwin.live.joint_stream import STREAMED, State, checked_time
 from irtwin.robot.description import Robot
 
 PORT = 30004
@@ -32,9 +32,11 @@ _IF_THERE = (
     "actual_robot_current",  # A
     "payload",  # kg
 )
-_PATIENCE = 5.0  # s without a package: the controller sends some hundred a second
+_PATIENCE = 5.0  # s for a whole package, however it comes: the controller sends some hundred a second
+_LOOK_UP = 0.5  # s of a wait until it is seen that nobody follows any more
 _AGAIN = 1.0  # s until the next try to connect
 _HEAVIEST = 1e6  # kg
+_LONGEST_UP = 1e9  # s since a controller started
 _SKIPPED = 100  # packages of other kinds before an answer
 
 
@@ -65,7 +67,7 @@ class Rtde:
             self._socket = self._connect()
         except (OSError, LostError) as error:
             raise InputError(
-                f"{self.address}: no controller answers by RTDE ({error}); check address and port"
+                f"{self.address}: no controller answers by RTDE ({_reason(error)}); check address and port"
             ) from error
 
     @property
@@ -100,6 +102,8 @@ class Rtde:
                         except InputError as error:
                             refuse(str(error))
             except (OSError, LostError) as error:
+                if done.is_set():
+                    return
                 announce(f"{self.address}: the connection is lost ({_reason(error)}); trying again")
                 self._connect_again(done)
                 if not done.is_set():
@@ -119,23 +123,24 @@ class Rtde:
 
     def _connect(self) -> socket.socket:
         """Connect, agree on version and variables, and start the data."""
+        give_up = time.monotonic() + _PATIENCE  # for all of it
         connection = socket.create_connection(self._where, timeout=_PATIENCE)
         try:
-            if self._ask(connection, _VERSION, struct.pack(">H", 2)) != b"\x01":
+            if self._ask(connection, _VERSION, struct.pack(">H", 2), give_up) != b"\x01":
                 raise LostError("it does not speak version 2 of RTDE")
-            self._set_up(connection)
-            if self._ask(connection, _START, b"") != b"\x01":
+            self._set_up(connection, give_up)
+            if self._ask(connection, _START, b"", give_up) != b"\x01":
                 raise LostError("it does not start to send")
         except BaseException:
             connection.close()
             raise
         return connection
 
-    def _set_up(self, connection: socket.socket) -> None:
+    def _set_up(self, connection: socket.socket, give_up: float) -> None:
         """Ask for the variables, and once more without those that the controller does not have."""
         names = [*_WANTED, *_IF_THERE]
         for _ in range(2):
-            answer = self._ask(connection, _SETUP, struct.pack(">d", self._rate) + ",".join(names).encode())
+            answer = self._ask(connection, _SETUP, struct.pack(">d", self._rate) + ",".join(names).encode(), give_up)
             kinds = answer[1:].decode("ascii", "replace").split(",")
             if not answer or len(kinds) != len(names):
                 raise LostError("it does not say which variables it has")
@@ -148,10 +153,10 @@ class Rtde:
                 return
         raise LostError("it does not keep to the variables that it said")
 
-    def _ask(self, connection: socket.socket, kind: int, content: bytes) -> bytes:
+    def _ask(self, connection: socket.socket, kind: int, content: bytes, give_up: float) -> bytes:
         connection.sendall(_HEAD.pack(_HEAD.size + len(content), kind) + content)
         for _ in range(_SKIPPED):
-            came, answer = _package(connection)
+            came, answer = _package(connection, give_up)
             if came == kind:
                 return answer
         raise LostError("it does not answer")
@@ -161,15 +166,15 @@ class Rtde:
         form = struct.Struct(">B" + "".join(_FORMS[kind] for kind in self._fields.values()))
         offset = None
         while not done.is_set():
-            kind, content = _package(self._socket)
+            kind, content = _package(self._socket, time.monotonic() + _PATIENCE, done)
             if kind != _DATA:
                 continue  # a text of the controller's, say
             if len(content) != form.size or content[0] != self._recipe:
                 raise LostError("a data package is not what was asked for")
             said = self._by_name(form.unpack(content)[1:])
-            if offset is None:
+            if offset is None and 0.0 <= said["timestamp"][0] <= _LONGEST_UP:
                 offset = time.time() - said["timestamp"][0]
-            yield said, offset
+            yield said, math.nan if offset is None else offset
 
     def _by_name(self, values: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
         said, place = {}, 0
@@ -197,7 +202,7 @@ class Rtde:
         payload = said.get("payload", (math.nan,))[0]
         return State(
             self.robot_id,
-            offset + said["timestamp"][0],
+            checked_time(offset + said["timestamp"][0], f"{self.address}: timestamp"),
             tuple(
                 values.get(field, (math.nan,) * (_JOINTS if channel.per_joint else 1))
                 for field, channel in STREAMED.items()
@@ -206,18 +211,30 @@ class Rtde:
         )
 
 
-def _package(connection: socket.socket) -> tuple[int, bytes]:
-    """Return the next package's kind and content."""
-    size, kind = _HEAD.unpack(_exactly(connection, _HEAD.size))
+def _package(connection: socket.socket, give_up: float, done: threading.Event | None = None) -> tuple[int, bytes]:
+    """Return the next package's kind and content, whole before `give_up`, as time.monotonic() has it.
+
+    Raises TimeoutError where it is not, and LostError where it is `done` before.
+    """
+    size, kind = _HEAD.unpack(_exactly(connection, _HEAD.size, give_up, done))
     if size < _HEAD.size:
         raise LostError("what it sends is no RTDE")
-    return kind, _exactly(connection, size - _HEAD.size)
+    return kind, _exactly(connection, size - _HEAD.size, give_up, done)
 
 
-def _exactly(connection: socket.socket, count: int) -> bytes:
+def _exactly(connection: socket.socket, count: int, give_up: float, done: threading.Event | None) -> bytes:
     parts = bytearray()
     while len(parts) < count:
-        part = connection.recv(count - len(parts))
+        left = give_up - time.monotonic()
+        if left <= 0.0:
+            raise TimeoutError
+        if done is not None and done.is_set():
+            raise LostError("it is not followed any more")
+        connection.settimeout(min(left, _LOOK_UP))
+        try:
+            part = connection.recv(count - len(parts))
+        except TimeoutError:
+            continue
         if not part:
             raise LostError("it closed the connection")
         parts += part
@@ -225,7 +242,7 @@ def _exactly(connection: socket.socket, count: int) -> bytes:
 
 
 def _reason(error: Exception) -> str:
-    return f"silent for {_PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)
+    return f"no whole package within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)
 
 
 def _read_address(text: str) -> tuple[str, int]:
