@@ -4,12 +4,15 @@ import json
 from collections.abc import Iterator
 
 import pytest
-from pyoxigraph import Quad
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pyoxigraph import BlankNode, Quad
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain import explain as explaining
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.explain.explanation import Explanation, to_json, to_text
+from irtwin.knowledge.owl_rl.closure import show
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
@@ -135,3 +138,36 @@ def test_written_as_outline_and_as_json(reasoned: KnowledgeGraph) -> None:
 def test_pattern_that_cannot_be_explained_is_refused(reasoned: KnowledgeGraph, pattern: str, message: str) -> None:
     with pytest.raises(InputError, match=message.replace("?", r"\?")):
         explain(reasoned, pattern)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_every_triple_of_the_graph_is_found_as_it_is_written(reasoned: KnowledgeGraph, data: st.DataObject) -> None:
+    quads = sorted((quad for name in reasoned.graphs() for quad in reasoned.quads_in(name)), key=str)
+    triple = data.draw(st.sampled_from(quads)).triple
+    if any(isinstance(term, BlankNode) for term in triple):
+        return
+    as_shown = " ".join(show(term, reasoned.base) for term in triple)
+    for written in (f"{triple.subject} {triple.predicate} {triple.object}", f"{triple} .", as_shown):
+        assert triple in explaining._matching(reasoned, written), written
+
+
+@pytest.mark.parametrize(
+    "object",
+    [
+        '"5.0"^^<http://www.w3.org/2001/XMLSchema#double>',
+        '"5"^^xsd:double',
+        "5",
+        "5.0e0",
+        '"two\nlines, \\"quoted\\""',
+        '"two\\nlines, \\"quoted\\""',
+        '"Hose"@en',
+        "'single'",
+    ],
+)
+def test_a_literal_is_found_however_it_is_written(object: str) -> None:
+    graph = KnowledgeGraph()
+    graph.update(
+        """INSERT DATA { <urn:a> <urn:p> "5.0"^^xsd:double, "Hose"@en, "single", "two\\nlines, \\"quoted\\"" }"""
+    )
+    assert len(explaining._matching(graph, f"<urn:a> <urn:p> {object}")) == 1

@@ -1,5 +1,6 @@
 """A workspace whose log, data set, twin and series are real files: whole, and each tampered with in turn."""
 
+import os
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
@@ -18,6 +19,7 @@ from irtwin.providers.records import inputs, run_iri, twin_iri
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import SourceFile
 
+NOTHING = "irtwin: nothing was checked: no file behind this is known by its checksum"
 RUN, TWIN = f"{rows.ROBOT}.work", f"{rows.ROBOT}.t1"
 CONTENT = {name: name.encode() for name in ("dataset.toml", "robot.urdf", "runs/work.csv", "runs/again.csv")}
 
@@ -131,16 +133,42 @@ def test_a_missing_file_and_a_data_set_elsewhere_are_told_apart(
     assert asked(filled, "irt:Sample_Count")[:2] == (2, ["missing: data/runs/work.csv"])
     (filled / "data").rename(filled / "moved")
     try:
-        status, (line,), _ = asked(filled, "irt:Sample_Count")
+        status, (line, told), _ = asked(filled, "irt:Sample_Count")
     finally:
         (filled / "moved").rename(filled / "data")
-    assert status == 0
+    assert status == 2
     assert line.startswith("cannot be checked: data/runs/work.csv (its data set is not at ")
+    assert told == NOTHING
+
+
+def test_a_total_is_verified_by_the_logs_of_its_runs(
+    filled: Path, tampered: Callable[[str, bytes | None], None]
+) -> None:
+    total = f"id:robot_total/{rows.ROBOT}"
+    status, files, _ = asked(filled, "irt:Run_Count", total)
+    assert status == 0
+    assert {"whole: data/runs/work.csv", "whole: data/runs/again.csv"} <= set(files)
+    tampered("data/runs/again.csv", b"other")
+    status, files, _ = asked(filled, "irt:Run_Count", total)
+    assert status == 2
+    assert [line.partition(" (")[0] for line in files if "whole" not in line] == ["changed: data/runs/again.csv"]
+
+
+def test_what_is_no_plain_file_is_not_read(filled: Path, tampered: Callable[[str, bytes | None], None]) -> None:
+    tampered("data/runs/work.csv", None)
+    pipe = filled / "data" / "runs" / "work.csv"
+    os.mkfifo(pipe)
+    try:
+        status, files, _ = asked(filled, "irt:Sample_Count")
+    finally:
+        pipe.unlink()
+    assert (status, files) == (2, ["cannot be checked: data/runs/work.csv (it is no plain file)", NOTHING])
 
 
 def test_what_is_irtwins_own_has_no_checksum(filled: Path) -> None:
     done = CliRunner().invoke(explain, ["irt:Payload", "a", "--verify", "--json", "--workspace", str(filled / "w")])
-    assert done.exit_code == 0
+    assert done.exit_code == 2
+    assert NOTHING in done.output
     assert '"state": "cannot be checked"' in done.output and '"file": "ontology/robot.ttl"' in done.output
 
 

@@ -33,7 +33,10 @@ from irtwin.resources import Files
 MOST_TRIPLES = 100
 HOPS = 2  # from a statement's terms, before all of the graph is searched for its premises
 
-_TERM = re.compile(r'"(?:[^"\\]|\\.)*"(?:\^\^\S+|@[\w-]+)?|<[^<>\s]*>|\S+')
+_QUOTED = r"""(?P<quoted>"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')(?:\^\^(?P<datatype>\S+)|(?P<language>@[\w-]+))?"""
+_LITERAL = re.compile(_QUOTED, re.DOTALL)
+_TERM = re.compile(rf"{_QUOTED}|<[^<>\s]*>|\S+", re.DOTALL)
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _WILDCARDS = {"?", "*", "_"}
 _ABOVE = "what is said above"
 _RECORDED, _PLANNED = "what was recorded", "what was planned"
@@ -125,7 +128,10 @@ class Explainer:
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
             maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)
-            return Explanation(what, maker, (), None, near.file, near.checksum, near.folder)
+            subject = triple.subject.value if isinstance(triple.subject, NamedNode) else None
+            behind = provenance.behind(self._graph, subject) if near.file is None and subject is not None else []
+            made_of = tuple(map(self.individual, behind))
+            return Explanation(what, maker, made_of, None, near.file, near.checksum, near.folder)
         if name == GRAPH_ONTOLOGY:
             return Explanation(what, "the ontology", file=_module(triple, self._graph.resources.of("ontology")))
         return Explanation(what, f"what was written into {shorten(name)}")
@@ -207,19 +213,32 @@ def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[
 
 
 def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
-    terms = [_sparql(term, f"?_{place}", graph.prefixes) for place, term in enumerate(_TERM.findall(pattern))]
-    terms += [f"?_{place}" for place in range(len(terms), 3)]
-    if len(terms) > 3:
+    said = [found[0] for found in _TERM.finditer(pattern.removesuffix(" ."))]
+    if len(said) > 3:
         raise InputError(f"{pattern}: is more than subject, predicate and object; put text in quotation marks")
+    numbers = {place: term for place, term in enumerate(said) if _NUMBER.fullmatch(term)}
+    terms = [
+        f"?_{place}" if place in numbers else _sparql(term, f"?_{place}", graph.prefixes)
+        for place, term in enumerate(said)
+    ]
+    terms += [f"?_{place}" for place in range(len(terms), 3)]
     text = " ".join(terms)
-    found = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} }} LIMIT {MOST_TRIPLES + 1}")
+    equal = " ".join(f"FILTER(?_{place} = {number})" for place, number in numbers.items())  # whatever its datatype
+    found = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} LIMIT {MOST_TRIPLES + 1}")
     return list(cast(QueryTriples, found))
 
 
 def _sparql(term: str, variable: str, prefixes: Mapping[str, str]) -> str:
-    prefix, colon, name = term.partition(":")
-    if term in _WILDCARDS or term.startswith("?"):
+    if term in _WILDCARDS or term.startswith(("?", "_:")):
         return variable
+    literal = _LITERAL.fullmatch(term)
+    if literal is not None:
+        quoted = literal["quoted"].replace("\n", "\\n").replace("\r", "\\r")
+        datatype = literal["datatype"]
+        return (
+            f"{quoted}^^{_sparql(datatype, variable, prefixes)}" if datatype else f"{quoted}{literal['language'] or ''}"
+        )
+    prefix, colon, name = term.partition(":")
     if colon and prefix in prefixes:
         return f"<{prefixes[prefix]}{name}>"
     return f"<{term}>" if name.startswith("//") and not term.startswith("<") else term

@@ -44,6 +44,17 @@ WHERE {
 }
 ORDER BY ?file"""
 
+_RUNS_OF_TOTAL = """
+SELECT DISTINCT ?run WHERE { ?thing irt:total_of ?robot . ?run irt:run_of ?robot ; irt:File ?file } ORDER BY ?run"""
+
+_NEXT = """
+SELECT DISTINCT ?next
+WHERE {
+  { ?thing ?leads ?next } UNION { ?next irt:source_of ?thing }
+  FILTER(isIRI(?next) && ?next != ?thing)
+}
+ORDER BY ?next"""
+
 _RUN = """
 SELECT ?run
 WHERE {
@@ -58,6 +69,9 @@ WHERE {
   OPTIONAL { ?activity irt:Software ?software }
   OPTIONAL { ?activity prov:endedAtTime ?finished }
 }"""
+
+
+_FARTHEST = 4  # steps: a shape, its link, its robot, and the file that describes that
 
 
 @dataclass(frozen=True)
@@ -100,6 +114,21 @@ def is_planned(graph: KnowledgeGraph, thing: str) -> bool:
 def file_of(graph: KnowledgeGraph, thing: str) -> File:
     """Return the file that a thing is kept in, as far as it is known."""
     return File(**next(iter(graph.query(_FILES, {"thing": thing})), {}))
+
+
+def behind(graph: KnowledgeGraph, thing: str) -> list[str]:
+    """Return the individuals with files that a thing is made of: a total's runs, else the nearest that it leads to."""
+    runs = [row["run"] for row in graph.query(_RUNS_OF_TOTAL, {"thing": thing})]
+    if runs:
+        return runs
+    nodes, seen = [thing], {thing}
+    for _ in range(_FARTHEST):
+        leads_to = (row["next"] for node in nodes for row in graph.query(_NEXT, {"thing": node}))
+        nodes = [node for node in dict.fromkeys(leads_to) if node.startswith(graph.base) and node not in seen]
+        seen.update(nodes)
+        if found := [node for node in nodes if file_of(graph, node).file is not None]:
+            return found
+    return []
 
 
 def told_in(graph: KnowledgeGraph, thing: str, property: str) -> File:

@@ -60,6 +60,8 @@ def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) 
         return Verdict(str(path), UNKNOWN, f"{what} is not at {base}; take it in again from where it is")
     if not path.exists():
         return Verdict(str(path), MISSING)
+    if not (path.is_file() or path.is_dir()):
+        return Verdict(str(path), UNKNOWN, "it is no plain file")
     try:
         now = checksum(path)
     except OSError as error:
