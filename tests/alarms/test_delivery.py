@@ -14,7 +14,7 @@ from irtwin.alarms.delivery import Delivery, Undelivered
 class Deaf:
     """Refuses the first so many messages."""
 
-    name = "somebody"
+    name, patience = "somebody", 30.0
 
     def __init__(self, refusals: int, lasting: bool = False) -> None:
         self.refusals, self.lasting = refusals, lasting
@@ -31,7 +31,7 @@ class Deaf:
 class Stuck:
     """Never comes back from a message until it is let go."""
 
-    name = "somebody"
+    name, patience = "somebody", 30.0
 
     def __init__(self) -> None:
         self.held, self.go = threading.Event(), threading.Event()
@@ -90,3 +90,27 @@ def test_nobody_waits_for_a_receiver_that_is_stuck(monkeypatch: pytest.MonkeyPat
         "somebody: 4 messages not delivered: no time was left",
     ]
     assert taking.lost == 6
+
+
+def test_a_message_that_is_not_done_in_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    receiver = Stuck()
+    receiver.patience = 0.1
+    taking, said = given(receiver, b"1", b"2")
+    receiver.go.set()
+    assert taking.lost == 2
+    held = "it still holds the connection of an earlier message"
+    assert said == [f"somebody: a message could not be delivered: {held}; tried 5 times"] * 2
+
+
+class Broken(Deaf):
+    """Has a bug."""
+
+    def send(self, line: bytes) -> None:
+        raise KeyError("a bug")
+
+
+def test_a_bug_of_a_receiver_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    raised: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", lambda it: raised.append(it.exc_type))
+    given(Broken(0), b"1")
+    assert raised == [KeyError]

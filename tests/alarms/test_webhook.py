@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
+from tests.dripping import dripping
 
 from irtwin.alarms import delivery
 from irtwin.alarms.delivery import Delivery, Undelivered
@@ -105,3 +106,21 @@ def test_neither_path_nor_token_is_said(server: Server) -> None:
     taking.close(30)
     (line,) = said
     assert line.startswith("webhook at 127.0.0.1:") and "private" not in line and TOKEN not in line
+
+
+@pytest.mark.parametrize(
+    ("first", "what"),
+    [(b"HTTP/1.1 2", b"0"), (b"", b"HTTP/1.1 103 Early Hints\r\n\r\n"), (b"HTTP/1.1 200 OK\r\nx: ", b"y")],
+    ids=["a byte of its status", "early hints", "a byte of a header"],
+)
+def test_an_answer_that_never_ends_is_told(first: bytes, what: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delivery, "FIRST_PAUSE", 0.01)
+    said: list[str] = []
+    with dripping(what, 0.1, first) as port:
+        taking = Delivery(Webhook(f"http://127.0.0.1:{port}/", None, 0.3), said.append)
+        taking.put(b"{}")
+        taking._waiting.put(None)
+        taking._thread.join(30)
+        assert not taking._thread.is_alive()
+    assert taking.lost == 1
+    assert "a message could not be delivered: " in said[0]

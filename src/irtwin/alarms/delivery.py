@@ -23,11 +23,15 @@ class Undelivered(Exception):
 
 
 class Receiver(Protocol):
-    """Somebody who is told; `name` says who in messages, and holds no secret."""
+    """Somebody who is told; `name` says who in messages, and holds no secret; `patience`: s that a message may take."""
 
     @property
     def name(self) -> str:
         """Who it is."""
+
+    @property
+    def patience(self) -> float:
+        """How long handing over a message may take in all, s: what waits for each byte alone may wait for ever."""
 
     def send(self, line: bytes) -> None:
         """Hand over a message, a JSON object. Raises Undelivered."""
@@ -40,6 +44,7 @@ class Delivery:
         self._receiver, self._announce = receiver, announce
         self._waiting: queue.Queue[bytes | None] = queue.Queue()
         self._hurry = threading.Event()  # no more pauses
+        self._held: threading.Thread | None = None  # a try that did not end in time
         self.lost = 0
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
@@ -69,12 +74,34 @@ class Delivery:
         pause = FIRST_PAUSE
         for tried in range(1, TRIES + 1):
             try:
-                self._receiver.send(line)
-                return
+                return self._send(line)
             except Undelivered as error:
                 if tried == TRIES or error.lasting or self._hurry.wait(pause):
                     return self._lose(f"{error}; tried {tried} time{'s' * (tried != 1)}")
             pause *= 2
+
+    def _send(self, line: bytes) -> None:
+        """Hand over a message in a thread that may be left behind. Raises Undelivered, also where it takes too long."""
+        if self._held is not None and self._held.is_alive():
+            raise Undelivered("it still holds the connection of an earlier message")
+        outcome: queue.Queue[Exception | None] = queue.Queue(1)
+        trying = threading.Thread(target=self._try, args=(line, outcome), daemon=True)
+        trying.start()
+        try:
+            fault = outcome.get(timeout=self._receiver.patience)
+        except queue.Empty:
+            self._held = trying
+            raise Undelivered(f"not done within {self._receiver.patience:g} s") from None
+        if fault is not None:
+            raise fault
+
+    def _try(self, line: bytes, outcome: queue.Queue[Exception | None]) -> None:
+        try:
+            self._receiver.send(line)
+        except Exception as error:  # raised where the message is waited for
+            outcome.put(error)
+        else:
+            outcome.put(None)
 
     def _lose(self, reason: str) -> None:
         self.lost += 1

@@ -29,6 +29,11 @@ class Broker:
         """Which broker it is."""
         return f"MQTT broker at {self.host}:{self.port}"
 
+    @property
+    def patience(self) -> float:
+        """How long a message may take in all: to connect, to be let in, and to be acknowledged, s."""
+        return 3 * self.timeout + 1.0
+
     def send(self, line: bytes) -> None:
         """Publish a message and wait until the broker has it. Raises Undelivered."""
         client = paho.Client(CallbackAPIVersion.VERSION2)

@@ -9,6 +9,7 @@ import httpx
 from irtwin.alarms.delivery import Undelivered
 
 _TRY_AGAIN = (408, 425, 429)  # statuses below 500 that may pass
+_GRACE = 1.0  # s beyond the timeout of a wait, so that a plain silence is told as such
 
 
 class Webhook:
@@ -18,6 +19,7 @@ class Webhook:
         """Take a URL that `settings` found sound; timeout: s for connecting, and for each wait on the server."""
         self.name = f"webhook at {urlsplit(url).netloc}"  # paths of webhooks are often secrets
         self._url, self._timeout = url, timeout
+        self.patience = timeout + _GRACE
         headers = {"content-type": "application/json", "user-agent": "irtwin"}
         headers |= {} if token is None else {"authorization": f"Bearer {token}"}
         self._client = httpx.Client(timeout=timeout, follow_redirects=False, headers=headers)
