@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import random
 import shutil
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -228,3 +230,17 @@ def test_a_dropped_robot_is_forgotten(workspace: Path, unreasoned: None) -> None
     ).split() == ["s"]
     assert irtwin("drop", "Second arm", "--workspace", workspace).status == 0
     assert asked(workspace, NAMES).split() == ["name"]
+
+
+def test_a_row_that_leads_outside_removes_nothing_there(workspace: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.html").write_text("mine")
+    (tmp_path / "mine.run.journal").write_text("mine")
+    with closing(sqlite3.connect(workspace / "irtwin.db")) as database:
+        for table in Base.metadata.sorted_tables:
+            if "robot_id" in table.columns:
+                database.execute(f"UPDATE {table.name} SET robot_id = '../../mine' WHERE robot_id = 'First'")
+        database.commit()
+    said = irtwin("drop", "First", "--workspace", workspace)
+    assert said.status == 2
+    assert "leads outside the workspace; nothing was read or written" in said.err
+    assert (tmp_path / "mine.html").read_text() == (tmp_path / "mine.run.journal").read_text() == "mine"

@@ -14,6 +14,7 @@ from sqlalchemy import text
 from irtwin.storage.database import Workspace
 from tests import bump_package
 from tests.small_robots import data_set
+from tests.trusting import trust_all
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "irtwin-co2"
 LIMIT = "0.118"  # g; of the three runs one lies above it
@@ -58,6 +59,7 @@ def done(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     own = place / "workspace" / "ontology" / "co2.ttl"  # the workspace's own limit, in place of the package's
     own.parent.mkdir(parents=True)
     own.write_text(shipped.replace('"0.6"', f'"{LIMIT}"'), encoding="utf-8")
+    trust_all(place / "workspace")
     path = os.pathsep.join([str(installed), *filter(None, sys.path)])
     said = subprocess.run(
         [sys.executable, "-c", WORK, place / "workspace", data, bumped],

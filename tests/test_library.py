@@ -1,11 +1,13 @@
 """The physics without a workspace: the examples of the docstrings, run."""
 
 import doctest
+import inspect
 
 import pyarrow.parquet as pq
 import pytest
 
 import irtwin
+import irtwin.errors
 from irtwin import modelling
 from irtwin.workflow import unpack_demo
 
@@ -47,3 +49,20 @@ def test_a_prediction_can_be_kept(demo, tmp_path):
     table = irtwin.predict(twin, run, tmp_path / "out.parquet")
     assert pq.read_table(tmp_path / "out.parquet").equals(table)
     assert "power" not in table.column_names
+
+
+@pytest.mark.parametrize("name", [name for name in irtwin.__all__ if inspect.isfunction(getattr(irtwin, name))])
+def test_each_path_may_be_text(name):
+    hints = inspect.signature(getattr(irtwin, name)).parameters.values()
+    paths = [str(it.annotation) for it in hints if "Path" in str(it.annotation)]
+    assert all("str" in hint for hint in paths)
+
+
+@pytest.mark.slow
+def test_paths_as_text_are_read_and_written(demo, tmp_path):
+    assert irtwin.read_urdf(str(demo / "robot.urdf")).name == "KUKA_KR6_R700"
+    assert irtwin.read_data_set(str(demo)).robot.name == "KUKA_KR6_R700"
+    with pytest.raises(irtwin.errors.InputError, match="cannot be read"):
+        irtwin.read_urdf("none.urdf")
+    with pytest.raises(irtwin.errors.InputError, match="not found"):
+        irtwin.diagnose("none", json_file=str(tmp_path / "gap.json"), report=str(tmp_path / "gap.html"))

@@ -9,6 +9,7 @@ import pytest
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.resources import KINDS, resources_of, shipped
+from tests.trusting import trust_all
 
 
 def test_every_kind_ships_something() -> None:
@@ -21,7 +22,15 @@ def test_a_file_of_the_same_name_replaces_and_any_other_is_added(tmp_path: Path)
     for name in ("shapes/shapes.ttl", "questions/mine.rq", "reports/energy/mine.rq"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("")
-    found = resources_of(tmp_path)
+    aside = resources_of(tmp_path)
+    assert aside.files == resources_of().files
+    assert [file.asked for file in aside.left_aside] == [
+        "shapes/shapes.ttl",
+        "questions/mine.rq",
+        "reports/energy/mine.rq",
+    ]
+    found = resources_of(trust_all(tmp_path))
+    assert not found.left_aside
     assert {str(file): file.replaces for file in found.extensions} == {
         "shapes/shapes.ttl of workspace": True,
         "questions/mine.rq of workspace": False,

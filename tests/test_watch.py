@@ -21,6 +21,7 @@ from tests import rows
 from tests.data_sets import irtwin as in_this_process
 from tests.live.controller import Controller, serving
 from tests.synthetic import arm
+from tests.trusting import trust_all
 
 pytestmark = pytest.mark.slow
 
@@ -93,6 +94,7 @@ def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(wo
     template = workspace / "reports" / "energy" / "page.html.jinja"
     template.parent.mkdir(parents=True)
     template.write_text("{% if %}", encoding="utf-8")
+    trust_all(workspace)
     refused = in_this_process("live", "--workspace", workspace)
     assert refused.status == 2
     assert f"{template}, line 1: " in refused.err

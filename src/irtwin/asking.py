@@ -39,12 +39,12 @@ def explain(triple: str, workspace: Path | str = WORKSPACE, *, graph_url: str | 
         return explain_triples(graph, triple)
 
 
-def export(owl: Path, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> None:
+def export(owl: Path | str, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> None:
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
     from irtwin.knowledge.store.export import export_owl
 
     with open_graph(Path(workspace), graph_url) as graph:
-        export_owl(graph, owl)
+        export_owl(graph, Path(owl))
 
 
 def questions(workspace: Path | str = WORKSPACE) -> Table:
@@ -76,6 +76,12 @@ def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
         raise InputError(f"{workspace}: no graph here; run `irtwin run DATASET --workspace {workspace}` first")
     with Snapshot(folder) as snapshot:
         yield snapshot.graph
+
+
+def contradictions(workspace: Path, url: str | None) -> list[str]:
+    """Return, in words, which statements of a graph contradict each other. Raises InputError as `open_graph`."""
+    with open_graph(workspace, url) as graph:
+        return [row["why"] for row in graph.query("SELECT DISTINCT ?why { ?of irt:Contradiction ?why } ORDER BY ?why")]
 
 
 def checked(workspace: Path) -> Resources:

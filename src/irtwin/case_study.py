@@ -66,7 +66,7 @@ def case_study(workspace: Path, announce: Announce = lambda line: None) -> Path:
     with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place, None) as graph:
         robot = graph.iri(robot_iri(identifier(ROBOT)))
         described, meshes = robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document)
-        out = place.folder / "reports" / "case_study.html"
+        out = place.file("reports/case_study.html")
         render(graph, robot, place.read_file, out, partial(draw_scene, described, meshes))
     return out
 

@@ -74,8 +74,8 @@ def improve(
             map_rows(place, graph)
             populate_others(place, graph, announce)  # live runs by the new twin
             conclude(graph, announce)
-            report = write_report(place, graph, robot_id)
             following = next_experiment(place, graph, robot_id)
+        report = write_report(place, graph_url, robot_id)
         return Improvement(improved.rounds, improved.within, limit, following, report)
 
 

@@ -26,10 +26,10 @@ from irtwin.signals.channels import Signals
 from irtwin.signals.csv_text import csv_text
 from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
-from irtwin.storage.files import write
+from irtwin.storage.files import InsidePath, remove, write
 from irtwin.storage.gap_schema import GapDiagnosis
 
-FOLDER = "next_experiment"
+_FOLDER = "next_experiment"
 _SECONDS = 20.0
 _ITERATIONS = 5  # a motion that moves everything; `irtwin excite` refines one
 
@@ -51,11 +51,10 @@ def next_experiment(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> N
     """
     robot = load_robot(place, robot_id)
     missed = [row for row in ask(graph, "to_reidentify") if row["robot"] == robot.name]
-    folder = place.folder / FOLDER
-    text, motion = folder / f"{robot_id}.txt", folder / f"{robot_id}.csv"
+    text, motion = proposal_files(place, robot_id)
     if not missed:
-        text.unlink(missing_ok=True)
-        motion.unlink(missing_ok=True)
+        remove(text)
+        remove(motion)
         return None
     words = [
         f"The twin misses the energy of {row['run']} by {row['error_percent']:.3g} %, beyond the limit of "
@@ -67,13 +66,18 @@ def next_experiment(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> N
         for row in ask(graph, "next_experiment")
         if row["robot"] == robot.name and row["experiment"]
     ]
-    folder.mkdir(exist_ok=True)
+    text.parent.mkdir(exist_ok=True)
     words += _designed(place, robot_id, motion) or _exciting(robot, motion)
     power = "" if load_twin(place, robot_id)[1].knows_power else "; without power nothing can be judged"
     words.append(f"Log positions, torque or motor currents, and power{power}.")
     words.append(f'Then: irtwin improve "{robot.name}" LOG --workspace {place.folder}')
     write(text, "".join(f"{line}\n" for line in words).encode())
     return NextExperiment(tuple(words), text, motion if motion.exists() else None)
+
+
+def proposal_files(place: Workspace, robot_id: str) -> tuple[InsidePath, InsidePath]:
+    """Return where the words of what to log next of a robot lie, and the motion to play."""
+    return place.file(f"{_FOLDER}/{robot_id}.txt"), place.file(f"{_FOLDER}/{robot_id}.csv")
 
 
 def save_motion(found: Diagnosis, out: Path) -> str:
@@ -105,7 +109,7 @@ def _csv(motion: Motion, robot: Robot) -> str:
     return csv_text(Signals(motion.time - motion.time[0], motion.q, dq=motion.dq, ddq=motion.ddq), robot.joint_names)
 
 
-def _designed(place: Workspace, robot_id: str, out: Path) -> list[str]:
+def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
     """Write the motion of the diagnosis' programme; return how to play it. Nothing where no diagnosis designed any."""
     with place.reading() as session:
         of_robot = select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id)
@@ -116,7 +120,7 @@ def _designed(place: Workspace, robot_id: str, out: Path) -> list[str]:
     if proposed is None:
         return []
     if proposed.programme is None or found.motion_file is None or found.motion_sha256 is None:
-        out.unlink(missing_ok=True)
+        remove(out)
         return [f"No motion is written: {_by_hand(proposed)}."]
     twin = load_twin(place, robot_id)[1]
     write(out, place.read_document(found.motion_file, found.motion_sha256))
@@ -163,12 +167,12 @@ def _of_run(programme: Programme, number: int) -> str:
     return ", ".join(said)
 
 
-def _exciting(robot: Robot, motion: Path) -> list[str]:
+def _exciting(robot: Robot, motion: InsidePath) -> list[str]:
     """Write a motion that excites every base parameter; return how to play it, or what to do where there is none."""
     try:
         excite(robot, _SECONDS, iterations=_ITERATIONS).write_csv(motion)
     except InputError as error:
-        motion.unlink(missing_ok=True)
+        remove(motion)
         return [f"No motion could be designed ({error}). Move all joints, slowly and fast, over their whole range."]
     return [_play(motion, f"{_SECONDS:g}", CollisionModel(robot).checks_itself)]
 

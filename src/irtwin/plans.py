@@ -177,7 +177,7 @@ def _keep(
             graph.load_ontology()
             map_rows(place, graph)
             conclude(graph, lambda line: None)
-            report = write_report(place, graph, robot_id)
+        report = write_report(place, graph_url, robot_id)
         return made, Kept(robot_id, name, stored_price(place, run_id), report)
 
 

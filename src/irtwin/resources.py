@@ -3,7 +3,7 @@
 What ships stands at the top of the source tree, for people who read it, and inside the package once it is installed.
 It is extended by installed packages, each named by an entry point of the group `irtwin.extensions`, and after these by
 the workspace's own folder. Both hold the folders of `KINDS`. A file replaces the one of the same name in the same
-folder that came before; any other is added.
+folder that came before; any other is added. Of a workspace's files only those that its user trusts hold.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import entry_points
 from importlib.util import find_spec
@@ -19,6 +19,7 @@ from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
+from irtwin.trust import trusted
 
 GROUP = "irtwin.extensions"
 MOST_BYTES, MOST_FILES = 10_000_000, 500  # of one file; of one extension
@@ -74,9 +75,14 @@ class Resource:
         """Whether it stands in the workspace's own folder."""
         return self.origin == _WORKSPACE
 
+    @property
+    def asked(self) -> str:
+        """By which name the user trusts it."""
+        return f"{self.kind}/{self.name}"
+
     def __str__(self) -> str:
         """Return folder and name, and who brings it if that is not irtwin: "rules/rules.ttl of irtwin-co2 0.1.0"."""
-        return f"{self.kind}/{self.name}" + (f" of {self.origin}" if self.is_extension else "")
+        return self.asked + (f" of {self.origin}" if self.is_extension else "")
 
 
 Files = tuple[Resource, ...]
@@ -84,9 +90,13 @@ Files = tuple[Resource, ...]
 
 @dataclass(frozen=True)
 class Resources:
-    """All files that hold for a workspace, in the order of their folders and names."""
+    """All files that hold for a workspace, in the order of their folders and names.
+
+    `left_aside`: the workspace's own that its user does not trust.
+    """
 
     files: Files
+    left_aside: Files = ()
 
     def of(self, kind: str, ending: str = "") -> Files:
         """Return the files of a folder whose names have an ending."""
@@ -120,7 +130,11 @@ def resources_of(workspace: Path | None = None) -> Resources:
     if workspace is None:
         return _installed()
     own = _found(workspace, _WORKSPACE)
-    return _joined(_installed(), own) if own else _installed()
+    if not own:
+        return _installed()
+    may = trusted(workspace)
+    known = _joined(_installed(), (file for file in own if file.asked in may))
+    return replace(known, left_aside=tuple(file for file in own if file.asked not in may))
 
 
 @cache

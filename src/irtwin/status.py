@@ -11,7 +11,7 @@ from pathlib import Path
 
 from sqlalchemy import select
 
-from irtwin.asking import WORKSPACE
+from irtwin.asking import WORKSPACE, contradictions
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -25,9 +25,10 @@ from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.schema import Base, Robot, Run, Twin
 from irtwin.storage.series_place import elsewhere
-from irtwin.upkeep import lost_files
+from irtwin.trust import how, trusted
+from irtwin.upkeep import asked, lost_files
 
-_KINDS = {"Measured_Run": "measured", "Planned_Run": "planned", "Live_Run": "live"}
+_KINDS = {"Measured_Run": "measured", "Planned_Run": "planned", "Live_Run": "live", "Replayed_Run": "replayed"}
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,14 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
         found.parts["robots"] = _robots(place) or ["none"]
         with found.noting():
             found.parts["graph"] = [_graph(place, graph_url)]
+            found.faults.extend(contradictions(place.folder, graph_url) if place.knows_robots() else ())
         extensions = place.resources.extensions
         found.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
+        with found.noting():
+            may = trusted(place.folder)
+            aside = [name for name in asked(place.folder) if name not in may]
+            if aside:
+                found.parts["left aside"] = [*aside, f"not trusted yet; {how(place.folder)}"]
         with found.noting():
             check(place.resources)
             check_mappings(place.resources, place.engine)

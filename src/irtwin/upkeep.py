@@ -11,6 +11,8 @@ from pathlib import Path
 from pyoxigraph import Quad
 from sqlalchemy import select
 
+from irtwin.alarms.settings import NAME
+from irtwin.alarms.settings import asks as alarm_asks
 from irtwin.asking import WORKSPACE
 from irtwin.errors import InputError
 from irtwin.knowledge.reasoning import reason
@@ -18,19 +20,32 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
-from irtwin.next_experiment import FOLDER
+from irtwin.next_experiment import proposal_files
 from irtwin.providers.records import find_robot, find_run, run_iri
+from irtwin.resources import resources_of
 from irtwin.storage import files
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import left_behind, of_robot
 from irtwin.storage.object_storage import StorageFault
 from irtwin.storage.rows import named_files
-from irtwin.storage.schema import LIVE, LIVE_RUN, MEASURED_RUN, Run
+from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, Run
 from irtwin.storage.series import is_whole
+from irtwin.storage.series_place import asks as series_asks
 from irtwin.storage.series_place import check as check_series
 from irtwin.workflow import Announce, conclude, map_rows, populate_others, rewriting, write_report
 
 _DAMAGED = "graph.damaged"
+
+
+def asked(workspace: Path) -> list[str]:
+    """Return what the files of a workspace ask for, by name: to hold, to be told of alarms, to have its series.
+
+    Raises InputError where one of them cannot be read.
+    """
+    resources = resources_of(workspace)
+    own = [file.asked for file in (*resources.files, *resources.left_aside) if file.is_of_workspace]
+    settings = files.inside(workspace, NAME)
+    return [*sorted(own), *(alarm_asks(settings) if settings.exists() else []), *series_asks(workspace)]
 
 
 def drop(
@@ -48,10 +63,10 @@ def drop(
         journals = of_robot(place.folder / LIVE, robot_id)
         if set(journals) - set(left_behind(place.folder / LIVE)):
             raise InputError(f'{place.folder}: "{robot}" is being watched; stop `irtwin live` first')
+        made = [*journals, *proposal_files(place, robot_id), place.report_path(robot_id)]
         place.drop_robot(robot_id)
-        proposed = [place.folder / FOLDER / f"{robot_id}{ending}" for ending in (".txt", ".csv")]
-        for file in (*journals, *proposed, place.report_path(robot_id)):
-            file.unlink(missing_ok=True)
+        for file in made:
+            files.remove(file)
         if journals:  # the graph may show what no row ever said
             place.mapped_rows.unlink(missing_ok=True)
         graph.load_ontology()
@@ -73,18 +88,16 @@ def drop_run(
     The robot's report is written anew. Raises InputError where there is no such run or it is watched just now, where it
     stands in a data set or the twin was judged by it, or another run carried it out.
     """
-    with (
-        Workspace.existing(Path(workspace), database) as place,
-        rewriting(place, graph_url) as graph,
-    ):
-        robot_id = find_robot(place, robot)
-        _drop_run(place, robot_id, run)
-        graph.load_ontology()
-        map_rows(place, graph)
-        reason(graph)
-        validate(graph)
+    with Workspace.existing(Path(workspace), database) as place:
+        with rewriting(place, graph_url) as graph:
+            robot_id = find_robot(place, robot)
+            _drop_run(place, robot_id, run)
+            graph.load_ontology()
+            map_rows(place, graph)
+            reason(graph)
+            validate(graph)
         if place.report_path(robot_id).exists():
-            write_report(place, graph, robot_id)
+            write_report(place, graph_url, robot_id)
 
 
 def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
@@ -101,7 +114,7 @@ def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
         run_id = found.run_id
     place.drop_run(run_id, run_iri(run_id))
     if journal is not None:
-        journal.unlink()
+        files.remove(journal)
 
 
 def _check_that_it_may_go(place: Workspace, run: Run) -> None:
@@ -115,7 +128,7 @@ def _check_that_it_may_go(place: Workspace, run: Run) -> None:
         done = session.scalars(select(Run).where(Run.performs == run.run_id)).first()
     if done is not None:
         of_data_set = "take its `performs` out of the data set first"
-        first = "remove that one first" if done.kind == LIVE_RUN else of_data_set if done.role else "both stay"
+        first = "remove that one first" if done.kind in WATCHED_RUNS else of_data_set if done.role else "both stay"
         raise InputError(f'{place.folder}: the run "{done.name}" carried out "{run.name}"; {first}')
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from irtwin import resources
-from irtwin.asking import WORKSPACE
+from irtwin.asking import WORKSPACE, open_graph
 from irtwin.check.check import checked
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -75,22 +75,20 @@ def run(
     announce = _clocked(announce)
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
-    with (
-        Workspace(Path(workspace), database, base=base, series_url=series_url) as place,
-        rewriting(place, graph_url) as graph,
-    ):
-        robot_id = take_in(place, data_set, announce)
-        graph.load_ontology()
-        map_rows(place, graph)
-        conclude(graph, announce)
-        announce("Writing the report")
-        report = write_report(place, graph, robot_id)
-        following = next_experiment(place, graph, robot_id)
-        for line in following.words if following else ():
-            announce(f"  {line}")
-        if populate_others(place, graph, announce):
+    with Workspace(Path(workspace), database, base=base, series_url=series_url) as place:
+        with rewriting(place, graph_url) as graph:
+            robot_id = take_in(place, data_set, announce)
+            graph.load_ontology()
+            map_rows(place, graph)
             conclude(graph, announce)
-        return report
+            following = next_experiment(place, graph, robot_id)
+            if populate_others(place, graph, announce):
+                conclude(graph, announce)
+        announce("Writing the report")
+        report = write_report(place, graph_url, robot_id)
+    for line in following.words if following else ():
+        announce(f"  {line}")
+    return report
 
 
 def diagnose(
@@ -103,10 +101,10 @@ def diagnose(
     workspace: Path | str | None = None,
     database: str | None = None,
     graph_url: str | None = None,
-    json_file: Path | None = None,
-    report: Path | None = None,
-    twin_file: Path | None = None,
-    motion_file: Path | None = None,
+    json_file: Path | str | None = None,
+    report: Path | str | None = None,
+    twin_file: Path | str | None = None,
+    motion_file: Path | str | None = None,
     announce: Announce = lambda line: None,
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
@@ -121,8 +119,10 @@ def diagnose(
     announce = _clocked(announce)
     kept_in = None if workspace is None else Path(workspace)
     check_extensions(resources.resources_of(kept_in))
-    for file in filter(None, (json_file, report, twin_file, motion_file)):
+    places = [None if file is None else Path(file) for file in (json_file, report, twin_file, motion_file)]
+    for file in filter(None, places):
         check_place(file)
+    json_file, report, twin_file, motion_file = places
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
@@ -155,17 +155,18 @@ def adopt(
     robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> Path:
     """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
-    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
-        robot_id = find_robot(place, robot)
-        with staged(place, robot_id) as apart:
-            adopt_twin(apart, robot_id)
-            populate_apart(apart, lambda line: None)
-        graph.load_ontology()
-        map_rows(place, graph)
-        populate_others(place, graph, lambda line: None)  # live runs by the new twin
-        reason(graph)
-        next_experiment(place, graph, robot_id)
-        return write_report(place, graph, robot_id)
+    with Workspace.existing(Path(workspace), database) as place:
+        with rewriting(place, graph_url) as graph:
+            robot_id = find_robot(place, robot)
+            with staged(place, robot_id) as apart:
+                adopt_twin(apart, robot_id)
+                populate_apart(apart, lambda line: None)
+            graph.load_ontology()
+            map_rows(place, graph)
+            populate_others(place, graph, lambda line: None)  # live runs by the new twin
+            reason(graph)
+            next_experiment(place, graph, robot_id)
+        return write_report(place, graph_url, robot_id)
 
 
 def reason_again(
@@ -307,18 +308,22 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
         announce(
             f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"
         )
-    for robot, contradiction in inferred.set_aside:
-        announce(f"  nothing is concluded of {shorten(robot, graph.base)}: {contradiction}")
+    for contradiction, about in inferred.contradictions.items():
+        announce(f"  about {', '.join(shorten(node, graph.base) for node in about)}: {contradiction}")
     for violation in validate(graph):
         announce(f"  {violation}")
 
 
-def write_report(place: Workspace, graph: KnowledgeGraph, robot_id: str) -> Path:
-    """Write a robot's energy report from the graph; return its path."""
-    robot = graph.iri(robot_iri(robot_id))
+def write_report(place: Workspace, graph_url: str | None, robot_id: str) -> Path:
+    """Write a robot's energy report from the graph as it stands; return its path.
+
+    Whoever rewrites the graph is done with that before: others need not wait for a page.
+    """
     out = place.report_path(robot_id)
-    scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
-    render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), graph.resources)
+    with open_graph(place.folder, graph_url) as graph:
+        robot = graph.iri(robot_iri(robot_id))
+        scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
+        render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), place.resources)
     return out
 
 

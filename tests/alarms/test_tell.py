@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from tests import rows
 from tests.data_sets import irtwin as in_this_process
+from tests.trusting import trust_all
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
@@ -50,6 +51,7 @@ def start() -> Iterator[Start]:
 
 def test_a_robot_that_stands_too_long_is_told_once_and_when_it_is_over(workspace: Path, start: Start) -> None:
     (workspace / "alarms.toml").write_text('[[webhook]]\nurl = "http://127.0.0.1:9/down"\n')
+    trust_all(workspace)
     live = start("live", "--workspace", workspace)
     telling = start("alarms", "--follow", "--workspace", workspace)
     assert live.stdin and telling.stdout and telling.stderr

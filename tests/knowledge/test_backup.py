@@ -281,6 +281,49 @@ def test_contents_that_are_no_workspace(archive: Path, name: str, data: bytes | 
     refuse(altered(archive, change), message)
 
 
+def rename_robot(contents: dict[str, bytes], name: str) -> None:
+    for file in contents:
+        if file.startswith("rows/"):
+            contents[file] = contents[file].replace(rows.ROBOT.encode(), name.encode())
+
+
+@pytest.mark.parametrize("name", ["../../../outside", "/tmp/outside", "..", "a/b", "a\\u0000b"])
+def test_rows_that_would_lead_out_of_the_workspace_are_refused(archive: Path, name: str) -> None:
+    refuse(altered(archive, lambda contents: rename_robot(contents, name)), "robot_id .* is none that irtwin writes")
+
+
+@pytest.mark.parametrize(
+    ("found", "put", "message"),
+    [
+        (b'"controlled_axes": 2', b'"controlled_axes": 1' + b"0" * 30, "controlled_axes .* is none that irtwin writes"),
+        (b'"weight_kg": 50.0', b'"weight_kg": ' + b"[" * 100_000 + b"]" * 100_000, "do not fit"),
+        (b'"weight_kg": 50.0', b'"weight_kg": ' + b"9" * 5000, "do not fit"),
+        (b'"weight_kg": 50.0', b'"weight_kg": NaN', "weight_kg .* is none that irtwin writes"),
+        (b'"name": "KUKA KR6 R700"', b'"name": "\\ud800"', "name .* is none that irtwin writes"),
+    ],
+)
+def test_values_that_no_row_holds_are_refused(archive: Path, found: bytes, put: bytes, message: str) -> None:
+    def change(contents: dict[str, bytes]) -> None:
+        contents["rows/robot.jsonl"] = contents["rows/robot.jsonl"].replace(found, put)
+
+    refuse(altered(archive, change), message)
+
+
+def test_a_row_beyond_all_bounds_is_refused(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("irtwin.knowledge.store.backup._LONGEST_ROW", 1 << 20)
+    refuse(altered(archive, lambda contents: contents.update({"rows/robot.jsonl": b" " * (2 << 20)})), "more than 1 MB")
+
+
+def test_a_link_out_of_the_workspace_is_not_backed_up(tmp_path: Path) -> None:
+    (tmp_path / "secret.html").write_text("mine")
+    with Workspace(tmp_path / "place") as place:
+        fill(place)
+        (place.folder / "reports" / "x.html").symlink_to(tmp_path / "secret.html")
+        with KnowledgeGraph(place.graph_folder) as graph, pytest.raises(InputError, match="leads outside"):
+            backup(place, graph, tmp_path / "kept.zip")
+    assert not (tmp_path / "kept.zip").exists()
+
+
 def test_what_is_no_backup(tmp_path: Path) -> None:
     foreign = tmp_path / "foreign.zip"
     for manifest in (None, "{}", '"x"', '{"format": "irtwin backup", "version": 1}', "[" * 100_000):

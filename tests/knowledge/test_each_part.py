@@ -9,6 +9,7 @@ import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 from tests import small_fleet
 from tests.individuals import individual
+from tests.trusting import trust_all
 
 from irtwin import workflow
 from irtwin.errors import InputError
@@ -85,7 +86,10 @@ def test_what_several_processes_conclude_and_find_wrong_is_what_one_does(
     assert begun == [1] * 4  # two to reason, two to validate
     assert by_two == by_one
     inferred, violations, _ = by_one
-    assert [robot for robot, _ in inferred.set_aside] == [individual("robot", "Arm_C")]
+    assert [node for node, _ in inferred.set_aside] == [
+        individual("robot", "Arm_C"),
+        individual("run", "Arm_C.press_1"),
+    ]
     assert inferred.joined_by is None
     assert any(one.robot == individual("robot", "Arm_B") for one in violations)
 
@@ -95,6 +99,7 @@ def test_rules_that_never_end_are_told_by_a_process_too(mapped: Path, tmp_path: 
     shutil.copytree(mapped, place)
     (place / "rules").mkdir()
     (place / "rules" / "endless_rules.ttl").write_text(ENDLESS)
+    trust_all(place)
     with Workspace.existing(place) as workspace, KnowledgeGraph.of_workspace(workspace) as graph:
         with pytest.raises(InputError, match="still find something new after 100 rounds"):
             reason(graph)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.data_sets import irtwin
+from tests.trusting import trust_all
 
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check, check_mappings
@@ -54,6 +55,7 @@ def put(place: Path, name: str, text: str) -> Path:
     file = place / name
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text if name.endswith(".rq") else PREFIXES + text, encoding="utf-8")
+    trust_all(place)
     return file
 
 

@@ -11,6 +11,7 @@ from tests import small_fleet
 from tests.individuals import individual
 
 from irtwin import workflow
+from irtwin.alarms.alarm import alarms
 from irtwin.knowledge import by_parts, parts, reasoning
 from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Contradiction
@@ -184,7 +185,7 @@ def test_any_change_gives_what_the_whole_graph_gives(states: list[list[Quad]], j
         except Contradiction:
             with pytest.raises(Contradiction):
                 anew(quads)
-            assert conclusions(graph) == {}
+            assert conclusions(graph) == before  # nothing goes silent
             continue
         assert inferred(graph) == inferred(anew(quads))
         assert conclusions(graph) == as_one_part(graph)
@@ -224,16 +225,15 @@ def test_a_part_that_goes_takes_its_conclusions_along() -> None:
 
 
 @pytest.mark.parametrize("wrong_robots", [("r",), ("r", "s")])
-def test_a_robot_that_contradicts_itself_is_set_aside_and_the_others_are_concluded_of(wrong_robots) -> None:
+def test_statements_that_contradict_each_other_are_set_aside_and_all_else_is_concluded_from(wrong_robots) -> None:
     runs = {robot: individual("run", f"{robot}.1") for robot in wrong_robots}
     wrong = {quad(run, OWL + "differentFrom", run) for run in runs.values()}
     graph = anew(FACTS)
     graph.change((), wrong)
     done = reason(graph)
-    assert [robot for robot, _ in done.set_aside] == [individual("robot", robot) for robot in wrong_robots]
-    assert all("eq-diff1" in why and runs[robot] for robot, (_, why) in zip(runs, done.set_aside, strict=True))
-    others = [one for robot in ROBOTS if robot not in wrong_robots for one in of_robot(robot)]
-    assert conclusions(graph) == conclusions(anew(others))
+    assert {node for node, _ in done.set_aside} == {*(individual("robot", it) for it in wrong_robots), *runs.values()}
+    assert all("eq-diff1" in why and "nothing is concluded from these" in why for _, why in done.set_aside)
+    assert conclusions(graph) == conclusions(anew(FACTS))
     assert reason(graph).set_aside == done.set_aside
 
     share = quad(individual("run", "s.2"), term("Idle_Share"), Literal(0.9))
@@ -245,10 +245,25 @@ def test_a_robot_that_contradicts_itself_is_set_aside_and_the_others_are_conclud
     assert inferred(graph) == inferred(anew(FACTS))
 
 
-def test_a_contradiction_that_is_no_robots_is_refused() -> None:
-    wrong = quad(LIMITS, OWL + "differentFrom", LIMITS)
-    with pytest.raises(Contradiction, match="eq-diff1"):
-        anew([*FACTS, wrong])
+def test_a_contradiction_that_is_no_robots_is_contained_too() -> None:
+    graph = holding([*FACTS, quad(LIMITS, OWL + "differentFrom", LIMITS)])
+    assert [node for node, _ in reason(graph).set_aside] == [LIMITS]
+    assert conclusions(graph) == conclusions(anew(FACTS))
+
+
+def test_an_ontology_that_contradicts_itself_is_told_and_what_was_concluded_stays() -> None:
+    graph = anew(FACTS)
+    before = conclusions(graph)
+    wrong = Triple(NamedNode(LIMITS), NamedNode(OWL + "differentFrom"), NamedNode(LIMITS))
+    graph.replace([*ONTOLOGY, *in_graph([wrong], GRAPH_ONTOLOGY)], GRAPH_ONTOLOGY)
+    for _ in range(2):
+        with pytest.raises(Contradiction, match="eq-diff1"):
+            reason(graph)
+    assert conclusions(graph) == before
+    assert [alarm.rule for alarm in alarms(graph)] == ["contradiction"]
+    graph.replace(ONTOLOGY, GRAPH_ONTOLOGY)
+    reason(graph)
+    assert inferred(graph) == inferred(anew(FACTS))
 
 
 def test_an_update_that_tells_no_individuals_has_all_done_anew() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.report.robots import six_axis
+from tests.trusting import trust_all
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -24,6 +25,7 @@ def put(place: Path, name: str, text: str) -> Path:
     file = place / "reports" / name
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
+    trust_all(place)
     return file
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from pyoxigraph import NamedNode, RdfFormat, parse
+from tests.trusting import trust_all
 
 from irtwin.cli import cli
 from irtwin.report.ontology.class_tree import Node, class_tree
@@ -121,6 +122,7 @@ my:Night_Run a owl:Class ; rdfs:subClassOf irt:IR_RunProcess ; rdfs:comment "Mad
 def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
     (tmp_path / "ontology").mkdir()
     (tmp_path / "ontology/shifts.ttl").write_text(OWN)
+    trust_all(tmp_path)
     text = page(read_modules(resources_of(tmp_path)))
     found = Anchors(text)
     assert {"module-shifts", "shifts/Night_Run"} <= set(found.ids)

@@ -57,7 +57,7 @@ def test_the_energy_page(browser: Any, energy: Path) -> None:
         banner.scroll_into_view_if_needed()
         assert banner.is_visible()
         assert banner.inner_text().startswith(
-            "Nothing is concluded of this robot: prp-fp: two values of irt:IR_Weight, <50>"
+            "What is said of this robot contradicts itself: prp-fp: two values of irt:IR_Weight, <50>"
         )
         page.emulate_media(media="print", color_scheme=scheme)
         page.evaluate("dispatchEvent(new Event('beforeprint'))")

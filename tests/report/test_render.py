@@ -203,6 +203,6 @@ def test_a_robot_that_contradicts_itself_is_said_on_its_page_alone(graph: Knowle
     (banner,) = re.findall(r'<p class="banner" id="contradiction">(.*?)</p>', page, re.DOTALL)
     said = html.unescape(re.sub("<[^>]*>", "", banner))
     assert said == (
-        f"Nothing is concluded of this robot: {why}. Correct what was said of it, and run the data set again."
+        f"What is said of this robot contradicts itself: {why}. Correct one of them, and run the data set again."
     )
     assert 'id="contradiction"' not in page_of(other)

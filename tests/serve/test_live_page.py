@@ -101,7 +101,9 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     wait_for(lambda: page.inner_text("#stream") == "run ended")
     assert page.evaluate("irtwinLive.states") > 400
     with KnowledgeGraph.as_it_stands(folder / "w" / "graph") as graph:
-        (row,) = graph.query("SELECT ?energy { ?run a irt:Live_Run ; irt:Energy_Consumption ?energy }")
+        (row,) = graph.query(
+            "SELECT ?energy { ?run a irt:Replayed_Run ; irt:Measured_Energy|irt:Modelled_Energy ?energy }"
+        )
     wait_for(lambda: page.inner_text("#energy") == written(row["energy"]))
     assert page.locator("#by-joint .bar").count() == 2
     assert page.locator("#gaps .bar").count() == 3

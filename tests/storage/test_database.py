@@ -223,3 +223,15 @@ def test_a_workspace_of_another_version(tmp_path: Path, change: str, table: str)
         connection.execute(text(change))
     with pytest.raises(InputError, match=f"table {table} is .*of another irtwin version"):
         Workspace(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["reports", "series", "twins", "live", "graph", "irtwin.db", "next_experiment"])
+def test_a_workspace_that_links_elsewhere_is_refused(tmp_path: Path, name: str) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "letter.html").write_text("mine")
+    (tmp_path / "place").mkdir()
+    (tmp_path / "place" / name).symlink_to(mine)
+    with pytest.raises(InputError, match=f"the path '{name}' leads outside the workspace"):
+        Workspace(tmp_path / "place")
+    assert [file.name for file in mine.iterdir()] == ["letter.html"]

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -85,3 +87,27 @@ def test_a_large_file_is_not_looked_through_at_opening(tmp_path: Path) -> None:
     engine.check(opened, len(content) - 1)
     with pytest.raises(InputError, match="damaged"), opened.connect() as connection:
         connection.execute(text("SELECT sum(value) FROM number")).one()
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "sql"),
+    [
+        (b"t_AAAA", "SELECT name FROM sqlite_master"),
+        (b"c_AAAA", "SELECT * FROM t_AAAA"),
+        (b"c_AAAA", "PRAGMA table_info(t_AAAA)"),
+        (b"v_AAAA", "SELECT * FROM t_AAAA"),
+        (b"w_AAAA", "SELECT * FROM shown"),
+    ],
+    ids=["table", "column", "column's description", "value", "view"],
+)
+def test_text_that_is_not_utf8_is_told(tmp_path: Path, spoilt: bytes, sql: str) -> None:
+    file = tmp_path / "odd.db"
+    with closing(sqlite3.connect(file)) as made:
+        made.execute("CREATE TABLE t_AAAA (c_AAAA TEXT)")
+        made.execute("INSERT INTO t_AAAA VALUES ('v_AAAA')")
+        made.execute("CREATE VIEW shown AS SELECT w_AAAA FROM t_AAAA")
+        made.commit()
+    file.write_bytes(file.read_bytes().replace(spoilt, spoilt[:2] + b"\xff\xfe\xff\xfe"))
+    database = engine.open_engine(f"sqlite:///{file}")
+    with database.connect() as connection, pytest.raises(InputError, match=r"odd\.db: holds text that is not UTF-8"):
+        connection.exec_driver_sql(sql).fetchall()

@@ -178,6 +178,17 @@ def test_a_workspace_of_0_1_gets_the_tables_of_now(
         assert [run[:2] for run in of_runs] == [(start, start + timedelta(seconds=s)) for *_, start, s in of_runs]
 
 
+def test_rows_that_another_program_wrote_are_not_migrated(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place:
+        older(place, of_0_1=True)
+        with place.engine.begin() as connection:
+            connection.execute(text("UPDATE joint SET lower_limit_rad = 'low' WHERE name = 'joint_a1'"))
+    with pytest.raises(InputError, match="a row of table joint was changed by another program: lower_limit_rad 'low'"):
+        Workspace(tmp_path)
+    with create_engine(f"sqlite:///{tmp_path / 'irtwin.db'}").connect() as connection:
+        assert migration.revision(connection) != migration.newest()
+
+
 def test_activities_of_an_older_workspace_name_individuals_below_its_base(tmp_path: Path) -> None:
     used = f"{r0002_base_of_individuals.BASE}run/Arm_A.fit_1"
     with Workspace(tmp_path) as place:

@@ -9,6 +9,7 @@ import pytest
 from tests import rows
 from tests.memory_s3 import MemoryS3, memory_s3
 from tests.storage.test_database import WORK, populate
+from tests.trusting import trust_all
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explanation import Explanation
@@ -19,6 +20,7 @@ from irtwin.storage.schema import Series
 from irtwin.storage.series_place import FILE, check, choose, elsewhere
 from irtwin.storage.staging import staged
 from irtwin.storage.windows import open_series
+from irtwin.trust import withdraw
 from irtwin.upkeep import lost_files
 
 pytestmark = pytest.mark.slow
@@ -173,3 +175,16 @@ def test_windows_are_read_from_objects(workspace: Workspace, objects: MemoryS3) 
         open_series(workspace.folder, "series/none.parquet")
     with pytest.raises(InputError, match="leads outside"):
         open_series(workspace.folder, "series/../../none.parquet")
+
+
+def test_storage_that_a_workspace_from_elsewhere_names_is_not_opened(workspace: Workspace, objects: MemoryS3) -> None:
+    populate(workspace)
+    there = set(objects.find("plant"))
+    withdraw(workspace.folder)
+    with pytest.raises(InputError, match=r"series\.toml: names s3://plant/.*nothing is read from .* `irtwin trust "):
+        workspace.remove_orphans()
+    with pytest.raises(InputError, match="`irtwin trust "):
+        Workspace.existing(workspace.folder).read_series(f"{rows.ROBOT}.work")
+    assert set(objects.find("plant")) == there
+    trust_all(workspace.folder)
+    assert workspace.read_series(f"{rows.ROBOT}.work").equals(rows.samples(1))

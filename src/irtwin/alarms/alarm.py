@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal, Self
@@ -16,16 +16,21 @@ from irtwin.resources import Resources
 
 Event = Literal["raised", "cleared"]
 ACTIVE = "active"
+CONTRADICTION = "contradiction"  # what stands in the place of a rule
 _QUESTION = "alarms"
+_CONTRADICTIONS = """SELECT ?robot ?reason {
+  ?of irt:Contradiction ?reason OPTIONAL { ?of irt:has_Information / irt:IR_Name ?robot }
+  FILTER(BOUND(?robot) || NOT EXISTS { ?any irt:Contradiction ?reason ; irt:has_Information ?known })
+} ORDER BY ?robot ?reason"""
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """One row of the question `alarms`; times in ISO 8601, None where the graph says none."""
+    """One row of the question `alarms`, or a contradiction; times in ISO 8601, None where the graph says none."""
 
-    robot: str
-    run: str
-    rule: str  # name of the rule that raised it
+    robot: str | None
+    run: str | None
+    rule: str  # name of the rule that raised it, or CONTRADICTION
     since: str | None
     channel: str | None
     joint: str | None
@@ -51,7 +56,14 @@ class Alarm:
 
 def alarms(graph: KnowledgeGraph, robot: str | None = None) -> list[Alarm]:
     """Return all alarms that a graph knows, of all robots or of the one of this name; active or not."""
-    return [Alarm.of(row) for row in ask(graph, _QUESTION, robot)]
+    return [*map(Alarm.of, ask(graph, _QUESTION, robot)), *_contradictions(graph, robot)]
+
+
+def _contradictions(graph: KnowledgeGraph, robot: str | None) -> Iterator[Alarm]:
+    """Yield an alarm for each contradiction of a robot; of none, if the ontology is what contradicts itself."""
+    for row in graph.query(_CONTRADICTIONS):
+        if robot is None or row["robot"] in (None, robot):
+            yield Alarm(row["robot"], None, CONTRADICTION, None, None, None, None, ACTIVE, row["reason"])
 
 
 def active(found: list[Alarm]) -> Table:

@@ -89,7 +89,7 @@ def follow(
 @contextmanager
 def told_in(workspace: Path) -> Iterator[Told]:
     """Give what was told of a workspace's alarms. Raises InputError where another process tells them already."""
-    folder = workspace / _FOLDER
+    folder = files.inside(workspace, _FOLDER)
     with files.told_when_full(workspace):
         folder.mkdir(exist_ok=True)
         handle = os.open(folder, os.O_RDONLY)

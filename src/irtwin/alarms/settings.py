@@ -1,5 +1,8 @@
 """Who is told of alarms: `alarms.toml` in a workspace. Secrets stand in the environment, the file names the variables.
 
+Each receiver is asked for by a name that says where messages go, and which variables with them. Only variables that
+are called IRTWIN_... are read, so that no file gets at others' secrets.
+
 [[webhook]]
 url = "https://example.com/robots"      # or url_env, where the URL itself is a secret
 token_env = "IRTWIN_WEBHOOK_TOKEN"      # optional: sent as a bearer token
@@ -18,7 +21,8 @@ timeout_s = 5
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Container, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -29,6 +33,8 @@ from irtwin.errors import InputError
 from irtwin.signals.toml_file import Table, read_toml, shown
 
 NAME = "alarms.toml"
+_VARIABLE = re.compile(r"IRTWIN_[A-Z0-9_]{1,100}")
+_OWN = ("IRTWIN_DATABASE", "IRTWIN_GRAPH", "IRTWIN_GRAPH_TOKEN", "IRTWIN_TOKEN")  # that give access to irtwin itself
 _TIMEOUT = 5.0  # s
 _SHORTEST = 0.1  # s
 _KEYS = {
@@ -37,12 +43,30 @@ _KEYS = {
 }
 
 
-def read_receivers(file: Path, environment: Mapping[str, str] = os.environ) -> list[Receiver]:
-    """Return who is to be told by a file. Raises InputError, naming file, table and key, on all that is wrong."""
+def read_receivers(
+    file: Path, environment: Mapping[str, str] = os.environ, may: Container[str] | None = None
+) -> list[Receiver]:
+    """Return who is to be told by a file: those that it `may` tell, by name, or all.
+
+    Raises InputError, naming file, table and key, on all that is wrong.
+    """
+    return [make(table, environment) for asked, make, table in _asked(file) if may is None or asked in may]
+
+
+def asks(file: Path) -> list[str]:
+    """Return what a file asks for, by name. Raises InputError as `read_receivers`."""
+    return [asked for asked, _, _ in _asked(file)]
+
+
+_Maker = Callable[[Table, Mapping[str, str]], Receiver]
+
+
+def _asked(file: Path) -> list[tuple[str, _Maker, Table]]:
+    """Return each receiver of a file: the name by which it is asked for, and what makes it of which table."""
     document = read_toml(file)
     _check(file, "", document, tuple(_KEYS))
-    made: list[Receiver] = []
-    makers: dict[str, Callable[[Table, Mapping[str, str]], Receiver]] = {"webhook": _webhook, "mqtt": _mqtt}
+    found: list[tuple[str, _Maker, Table]] = []
+    makers: dict[str, _Maker] = {"webhook": _webhook, "mqtt": _mqtt}
     for kind, make in makers.items():
         tables = document.get(kind, [])
         if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
@@ -50,10 +74,30 @@ def read_receivers(file: Path, environment: Mapping[str, str] = os.environ) -> l
         for number, values in enumerate(tables, start=1):
             table = Table(file, f"{kind} {number}:", values)
             _check(file, table.name, values, _KEYS[kind])
-            made.append(make(table, environment))
-    if not made:
+            found.append((f"{NAME}: {_where(kind, table)}", make, table))
+    if not found:
         raise InputError(f"{file}: names nobody; write [[webhook]] with url, or [[mqtt]] with host and topic")
-    return made
+    return found
+
+
+def _where(kind: str, table: Table) -> str:
+    """Say where the messages of a table go, and which variables with them; paths of webhooks are often secrets."""
+    url = table.text("url")
+    place = _broker(table) if kind == "mqtt" else _host(table, url)
+    variables = [name for key in ("url_env", "token_env", "password_env") if (name := table.text(key)) is not None]
+    return f"{kind} at {place}" + (f", with {' and '.join(variables)}" if variables else "")
+
+
+def _broker(table: Table) -> str:
+    port = table.values.get("port", 8883 if table.values.get("tls") is True else 1883)
+    return f"{table.text('host')}:{port}, topic {table.text('topic')}"
+
+
+def _host(table: Table, url: str | None) -> str:
+    if url is None:
+        return "the URL of a variable"
+    _check_url(table, url)
+    return urlsplit(url).netloc
 
 
 def _webhook(table: Table, environment: Mapping[str, str]) -> Receiver:
@@ -112,6 +156,11 @@ def _secret(table: Table, key: str, environment: Mapping[str, str]) -> str | Non
     name = table.text(key)
     if name is None:
         return None
+    if not _VARIABLE.fullmatch(name) or name in _OWN:
+        raise InputError(
+            f"{table.file}: {table.name} {key}: {shown(name)[1:-1]} is not read; give the secret in a variable of its "
+            "own whose name begins with IRTWIN_, as IRTWIN_WEBHOOK_TOKEN"
+        )
     value = environment.get(name, "").strip()
     if not (value and value.isascii() and value.isprintable()):
         raise InputError(f"{table.file}: {table.name} {key}: the environment has no usable {shown(name)[1:-1]}")

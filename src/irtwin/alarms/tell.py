@@ -10,11 +10,13 @@ from functools import partial
 from pathlib import Path
 
 from irtwin.alarms.alarm import Alarm, active, alarms, sparql_of_rules
-from irtwin.alarms.delivery import Delivery
+from irtwin.alarms.delivery import Delivery, Receiver
 from irtwin.alarms.follow import follow, told_in
-from irtwin.alarms.settings import NAME, read_receivers
+from irtwin.alarms.settings import NAME, asks, read_receivers
 from irtwin.asking import checked, open_graph
 from irtwin.knowledge.store.table import Table
+from irtwin.storage.files import inside
+from irtwin.trust import how, trusted
 
 
 def listed(workspace: Path, *, graph_url: str | None = None, robot: str | None = None) -> Table:
@@ -32,15 +34,14 @@ def tell(
 ) -> None:
     """Tell each alarm when it begins and when it is over, on standard output and to whom `config` names.
 
-    `config` is `alarms.toml` of the workspace by default, if that is there. `announce` is told what is amiss. Ends with
-    SIGINT or SIGTERM, and gives messages on their way some seconds.
+    `config` is `alarms.toml` of the workspace by default, if that is there, and as far as the user trusts it.
+    `announce` is told what is amiss. Ends with SIGINT or SIGTERM, and gives messages on their way some seconds.
     """
     done = threading.Event()
     look = partial(_alarms, workspace, graph_url, robot)
-    file = config or workspace / NAME
     found = look()  # before anything is made: there may be no workspace
     sparql = sparql_of_rules(checked(workspace))
-    receivers = read_receivers(file) if config is not None or file.exists() else []
+    receivers = read_receivers(config) if config is not None else _of_workspace(workspace, announce)
     with told_in(workspace) as told:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: done.set())
@@ -55,6 +56,18 @@ def tell(
     lost = sum(delivery.lost for delivery in deliveries)
     if lost:
         announce(f"{lost} message{'s' * (lost != 1)} could not be delivered")
+
+
+def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> list[Receiver]:
+    """Return whom the workspace's own file may tell; say whom it would tell, too."""
+    file = inside(workspace, NAME)
+    if not file.exists():
+        return []
+    may = trusted(workspace)
+    for asked in asks(file):
+        if asked not in may:
+            announce(f"{workspace}: not told: {asked.removeprefix(f'{NAME}: ')}; {how(workspace)}")
+    return read_receivers(file, may=may)
 
 
 def _alarms(workspace: Path, graph_url: str | None, robot: str | None) -> list[Alarm]:

@@ -68,7 +68,7 @@ for command in (
     *(motion.plan, motion.predict, motion.slow, motion.excite),
     *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
     *(service.serve, service.live, alarms.alarms),
-    *(upkeep.status, upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
+    *(upkeep.status, upkeep.trust, upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
     robot.robot,
     fleet.fleet,
 ):

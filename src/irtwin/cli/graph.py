@@ -8,7 +8,15 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import Number, announce, database_option, graph_option, say, workspace_option
+from irtwin.cli.options import (
+    Number,
+    announce,
+    database_option,
+    graph_option,
+    say,
+    tell_contradictions,
+    workspace_option,
+)
 
 
 def _known_questions(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -61,19 +69,20 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
 @workspace_option
 @graph_option
 @click.option("--json", "as_json", is_flag=True, help="Write nested JSON objects instead of an outline.")
-@click.option("--verify", is_flag=True, help="Check the files; exit status 2 where one changed or is missing.")
+@click.option("--verify", is_flag=True, help="Check the files; exit status 2 unless they are the same.")
 def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool, verify: bool) -> None:
     """Explain where a triple of the graph comes from.
 
     The explanation names the rule, mapping or provider and the facts it used, down to runs, files and checksums.
     TRIPLE is subject, predicate and object: prefixed names, IRIs or literals. `?` or a missing part matches anything.
     With --verify, a line for each file says whether its SHA-256 is still the one in the graph: whole, changed, missing,
-    or why that cannot be checked.
+    or why that cannot be checked. The exit status is 2 unless some are the same and none is not.
     """
     import json
 
     from irtwin import asking
     from irtwin.knowledge.explain.explanation import to_json, to_text
+    from irtwin.knowledge.explain.verify import WHOLE
     from irtwin.knowledge.explain.verify import verify as verified
 
     found = asking.explain(" ".join(triple), workspace, graph_url=graph_url)
@@ -87,6 +96,9 @@ def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_
         for line in ["", *map(str, files)] if verify else ():
             click.echo(line)
     if any(each.is_wrong for each in files):
+        sys.exit(2)
+    if verify and not any(each.state == WHOLE for each in files):
+        say("irtwin: nothing was checked: no file behind this is known by its checksum")
         sys.exit(2)
 
 
@@ -111,7 +123,8 @@ def reason(
     Without SOURCE, the conclusions in the workspace's graph are drawn again, by the ontology, mappings and rules that
     are there now. With SOURCE, OUT gets what SOURCE says
     and all that follows; the file suffixes decide the formats. If it contradicts itself, nothing is written and the
-    exit status is 3.
+    exit status is 3. In a workspace nothing is concluded from the statements that contradict each other, all else is,
+    and the exit status is 3 too.
 
     \b
     native  OWL 2 RL by the rules that ship. Takes under 1 s for 10,000 triples.
@@ -136,6 +149,7 @@ def reason(
             from irtwin.workflow import reason_again
 
             reason_again(workspace, engine=engine, database=database, graph_url=graph_url, announce=announce)
+            tell_contradictions(workspace, graph_url)
     except Contradiction as clash:
         say(f"irtwin: {source or workspace}: {clash}")
         sys.exit(3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,11 +25,24 @@ class Number(click.FloatRange):
         return float(number)
 
 
+def _left_aside(context: click.Context, option: click.Parameter, workspace: Path) -> Path:
+    """Say what of a workspace does not hold, as its user has not trusted it."""
+    if workspace.is_dir() and not context.resilient_parsing:
+        from irtwin.resources import resources_of
+        from irtwin.trust import how
+
+        names = [file.asked for file in resources_of(workspace).left_aside]
+        if names:
+            say(f"{workspace}: left aside, as nobody trusts it: {', '.join(names)}; {how(workspace)}")
+    return workspace
+
+
 workspace_option = click.option(
     "--workspace",
     type=click.Path(path_type=Path, file_okay=False),
     default=_WORKSPACE,
     show_default=True,
+    callback=_left_aside,
     help="Folder with the database, series, graph and reports.",
 )
 database_option = click.option(
@@ -95,6 +109,17 @@ def say(line: str) -> None:
 def printable(line: str) -> str:
     """Return a line without what breaks lines or steers a terminal: names that were read may hold it."""
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
+
+
+def tell_contradictions(workspace: Path, graph_url: str | None) -> None:
+    """Say which statements of a workspace contradict each other; where there are any, end with status 3."""
+    from irtwin.asking import contradictions
+
+    found = contradictions(workspace, graph_url)
+    for line in found:
+        say(f"irtwin: {workspace}: {line}")
+    if found:
+        sys.exit(3)
 
 
 def announce(line: str) -> None:

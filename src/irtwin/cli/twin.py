@@ -17,6 +17,7 @@ from irtwin.cli.options import (
     payload_mass_option,
     say,
     series_option,
+    tell_contradictions,
     workspace_option,
 )
 
@@ -46,6 +47,8 @@ def run(
     DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
 
     The base of IRIs may stand in `plant.toml` of the workspace instead, as base_iri = "https://plant.example/energy/".
+    Where statements in the graph contradict each other, nothing is concluded from these alone; they are said, and the
+    exit status is 3.
     """
     from irtwin.workflow import run as run_all
 
@@ -60,6 +63,7 @@ def run(
         announce=announce,
     )
     click.echo(report)
+    tell_contradictions(workspace, graph_url)
 
 
 @click.command()

@@ -47,6 +47,30 @@ def repair(workspace: Path, database: str | None, graph_url: str | None) -> None
 
 
 @click.command()
+@click.argument("workspace", type=click.Path(path_type=Path, file_okay=False, exists=True))
+@click.option("--withdraw", is_flag=True, help="Allow nothing of it any more.")
+def trust(workspace: Path, withdraw: bool) -> None:
+    """Allow what the files of a WORKSPACE ask for, and list it.
+
+    A workspace may come from elsewhere. Rules, templates and the like in its folder, whom its alarms.toml tells, with
+    which variables, and the object storage of its series.toml: none of it runs, sends or is written to before. You say
+    so once; what a file asks for later is asked for again.
+    """
+    from irtwin import trust as word
+    from irtwin import upkeep
+
+    if withdraw:
+        word.withdraw(workspace)
+        click.echo(f"{workspace}: nothing is allowed")
+        return
+    asked = upkeep.asked(workspace)
+    word.trust(workspace, asked)
+    for name in asked:
+        click.echo(name)
+    click.echo(f"{workspace}: {'allowed' if asked else 'asks for nothing'}")
+
+
+@click.command()
 @workspace_option
 @database_option
 @graph_option

@@ -8,23 +8,25 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
-from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
+from pyoxigraph import Literal, Quad, RdfFormat, Triple, parse, serialize
 
 from irtwin.knowledge import each_part, parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of
+from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
+from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.owl_rl.beside import Beside, Equality
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.parts import Borders, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, term
+from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED
 
 MOST_WAITING = 50_000  # quads that wait to be written; while they are, workers go on
-_CONTRADICTION = NamedNode(term("Contradiction"))
 
 
 @dataclass(frozen=True)
@@ -117,28 +119,30 @@ def changes_of(ontology: Ontology, regions: list[Region]) -> Iterator[Change]:
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
-    """Conclude of some parts as of one; of a part that contradicts itself nothing but that."""
+    """Conclude of some parts as of one; of a part that contradicts itself all but what follows from the clash."""
     region = regions[0] if len(regions) == 1 else parts.one(regions)
     try:
         yield region, _conclude_of_one(ontology, region)
     except Contradiction as clash:
         if len(regions) == 1:
-            yield region, _set_aside(ontology, region, clash)
+            yield region, _contained(ontology, region, clash)
             return
         for alone in regions:
             yield from _conclude(ontology, [alone])
 
 
-def _conclude_of_one(ontology: Ontology, region: Region) -> Conclusions:
+def _conclude_of_one(ontology: Ontology, region: Region, aside: AbstractSet[Triple] = frozenset()) -> Conclusions:
     if not region.nodes:
         return Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
     if not region.asserted:
         return Conclusions()
     borders = ontology.borders  # numbers terms, so it comes before facts take numbers of their own
     try:
-        closure = Beside(ontology.schema, region.asserted)
+        asserted = region.asserted - aside
+        closure = Beside(ontology.schema, asserted)
         _check(borders, closure)
-        found = by_rules(ontology, ontology.triples, ontology.schema.kept, region.asserted, closure.worth_keeping())
+        found = by_rules(ontology, ontology.triples, ontology.schema.kept, asserted, closure.worth_keeping())
+        found = found.without(aside)
         closure.add(found.concluded())
         _check(borders, closure)
     except Equality as same:
@@ -152,6 +156,13 @@ def _check(borders: Borders, closure: Beside) -> None:
         raise Joined
 
 
-def _set_aside(ontology: Ontology, region: Region, clash: Contradiction) -> Conclusions:
+def _contained(ontology: Ontology, region: Region, clash: Contradiction) -> Conclusions:
+    """Conclude of a part without what clashes; nothing of a part whose clashes have no end."""
     robots = parts.spoken_for(ontology, region.asserted)
-    return Conclusions(made_by={Triple(robot, _CONTRADICTION, Literal(str(clash))) for robot in robots})
+    try:
+        aside, _ = contain(clash, ontology.triples, region.asserted, partial(infer, ontology, region.asserted))
+        found = _conclude_of_one(ontology, region, aside.statements | aside.conclusions)
+    except Contradiction as endless:
+        return Conclusions(made_by={Triple(robot, CONTRADICTION, Literal(str(endless))) for robot in robots})
+    found.made_by = aside.notes(robots)
+    return found

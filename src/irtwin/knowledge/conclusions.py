@@ -6,19 +6,23 @@ import base64
 import hashlib
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Self
 
 from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
+from irtwin.knowledge import parts
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.locality import read_by_rules
+from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.changes import DERIVED_FROM, TRIPLES
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_REASONED
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_OWL_RL, GRAPH_REASONED
 from irtwin.resources import Files, Resources, folder
 
 
@@ -35,6 +39,10 @@ class Conclusions:
         """Return the triples of all the named graphs."""
         return set().union(*self.contents.values())
 
+    def without(self, aside: AbstractSet[Triple]) -> Self:
+        """Return the same without some triples."""
+        return replace(self, contents={name: triples - aside for name, triples in self.contents.items()})
+
     def quads(self) -> set[Quad]:
         """Return all of it as the store gives it back: 1.0 and 1.00 are one double."""
         derivations = {Triple(node, DERIVED_FROM, name) for node, name in self.made_of.items()}  # type: ignore[arg-type]
@@ -50,6 +58,20 @@ def by_rules(ontology: Ontology, *known: Iterable[Triple]) -> Conclusions:
     """Return what the rules conclude of what is known, each into a named graph of its own."""
     resources = ontology.resources
     return Conclusions(running.conclusions(read_by_rules(resources, *known), all_rules(resources)))
+
+
+def infer(ontology: Ontology, premises: set[Triple], aside: AbstractSet[Triple] = frozenset()) -> Conclusions:
+    """Conclude from the ontology and some parts of the graph, without what is set aside, whoever says it."""
+    closure = Closure(ontology.triples)
+    count = len(closure)
+    asserted = premises - aside
+    closure.add(asserted)
+    known = ontology.triples | asserted | closure.worth_keeping()
+    found = by_rules(ontology, known).without(aside)
+    closure.add(found.concluded())
+    found.joined_by = parts.join(ontology, closure, count)
+    found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
+    return found
 
 
 def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:

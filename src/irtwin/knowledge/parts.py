@@ -312,15 +312,12 @@ def parted(ontology: Ontology, triples: Iterable[Triple]) -> Callable[[Name], Na
     return top
 
 
-def groups(ontology: Ontology, triples: Iterable[Triple]) -> tuple[set[Triple], list[set[Triple]]]:
-    """Return what is said of no part, and what is said of each."""
+def robots_about(ontology: Ontology, triples: Iterable[Triple], some: Iterable[Triple]) -> list[Name]:
+    """Return the robots of those parts of a graph that some of its triples stand in."""
     said = list(triples)
     part_of = parted(ontology, said)
-    common, of_parts = set[Triple](), dict[Name, set[Triple]]()
-    for triple in said:
-        nodes = ontology.nodes(triple)
-        (of_parts.setdefault(part_of(nodes[0]), set()) if nodes else common).add(triple)
-    return common, sorted(of_parts.values(), key=lambda part: min(map(str, part)))
+    about = {part_of(node) for one in some for node in ontology.nodes(one)}
+    return [robot for robot in robots(ontology, said) if part_of(robot) in about]
 
 
 def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:

@@ -12,14 +12,16 @@ from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge import by_parts, engines, parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of, notes_of, sizes
+from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of, infer, notes_of, sizes
+from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.garbage import seldom_collected
-from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
+from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.parts import Joined, Ontology
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
@@ -41,7 +43,6 @@ SELECT ?robot ?why WHERE {{ GRAPH <{GRAPH_REASONED}> {{ ?robot <{term("Contradic
 
 _OWL_RL = NamedNode(GRAPH_OWL_RL)
 _ATTRIBUTED_TO = NamedNode(PROV + "wasAttributedTo")
-_CONTRADICTION = NamedNode(term("Contradiction"))
 
 _NOT_CLOSED = (GRAPH_OWL_RL, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
 
@@ -58,8 +59,8 @@ class Inferences:
     """How many triples OWL 2 RL and the rules concluded, and the IRIs of the named graphs that changed.
 
     `joined_by` is a statement that makes the graph one part, so that all of it was reasoned over; None where none is.
-    `set_aside` are the IRIs of the robots of which nothing is concluded, as statements about them contradict each
-    other, and which these are.
+    `set_aside` are the IRIs of whom statements are about that contradict each other, and of their robots, and which
+    these are.
     """
 
     owl_rl: int
@@ -68,14 +69,23 @@ class Inferences:
     joined_by: str | None = None
     set_aside: tuple[tuple[str, str], ...] = ()
 
+    @property
+    def contradictions(self) -> dict[str, list[str]]:
+        """Return each contradiction in words, and whom it is about."""
+        found: dict[str, list[str]] = {}
+        for node, why in self.set_aside:
+            found.setdefault(why, []).append(node)
+        return found
+
 
 @seldom_collected()
 def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
     The closure comes first, so that rules see types and inverses that nobody wrote; then the rules; then the
-    closure of what they concluded. A robot of which statements contradict each other is set aside. InputError names a
-    contradiction that is no robot's, and what was inferred before is dropped. Engines other than the native one close
+    closure of what they concluded. Statements that contradict each other are set aside, and all else is concluded.
+    Contradiction names one of the ontology's own: what was inferred before stays, with a note of it. Engines other than
+    the native one close
     the graph as one part, take no contradiction, and leave what was inferred before as it is where they fail.
     """
     ontology = Ontology.of(graph)
@@ -87,6 +97,9 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
             with suppress(Joined):
                 return _by_parts(graph, ontology, changed)
         return _reason_over_all(graph, ontology, changed)
+    except Contradiction as clash:
+        graph.replace([Quad(_OWL_RL, CONTRADICTION, Literal(str(clash)), NamedNode(GRAPH_REASONED))], GRAPH_REASONED)
+        raise
     except Exception:
         graph.replace([], GRAPH_INFERRED, GRAPH_REASONED)
         raise
@@ -168,47 +181,14 @@ def _made_by(engine: str) -> Triple:
     return Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine))
 
 
-def infer(ontology: Ontology, premises: set[Triple]) -> Conclusions:
-    """Conclude from the ontology and some parts."""
-    closure = Closure(ontology.triples)
-    count = len(closure)
-    closure.add(premises)
-    known = ontology.triples | premises | closure.worth_keeping()
-    found = by_rules(ontology, known)
-    closure.add(found.concluded())
-    found.joined_by = parts.join(ontology, closure, count)
-    found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
-    return found
-
-
 def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> Conclusions:
-    """Conclude from the ontology and all parts that do not contradict themselves; note of the others why."""
+    """Conclude from the ontology and all parts but the statements that contradict each other; note which these are."""
     try:
         return infer(ontology, premises)
     except Contradiction as clash:
-        common, of_parts = parts.groups(ontology, premises)
-        bad = _contradictory(ontology, common, of_parts, clash)
-        found = infer(ontology, premises.difference(*(part for part, _ in bad)))
-        said = ((robot, reason) for part, reason in bad for robot in parts.spoken_for(ontology, part))
-        found.made_by = {Triple(robot, _CONTRADICTION, Literal(reason)) for robot, reason in said}
+        aside, found = contain(clash, ontology.triples, premises, partial(infer, ontology, premises))
+        found.made_by = aside.notes(parts.robots_about(ontology, premises, aside.statements))
         return found
-
-
-def _contradictory(
-    ontology: Ontology, common: set[Triple], of_parts: list[set[Triple]], clash: Contradiction
-) -> list[tuple[set[Triple], str]]:
-    """Return which of the parts, that show a `clash` together, contradict themselves, and how: by halves."""
-    if not of_parts:
-        raise clash
-    if len(of_parts) == 1:
-        return [(of_parts[0], str(clash))]
-    found, half = [], len(of_parts) // 2
-    for some in (of_parts[:half], of_parts[half:]):
-        try:
-            infer(ontology, common.union(*some))
-        except Contradiction as own:
-            found += _contradictory(ontology, common, some, own)
-    return found
 
 
 def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclusions:

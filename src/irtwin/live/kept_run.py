@@ -12,6 +12,7 @@ from irtwin.live.live_run import Tables, Values
 from irtwin.providers import live_energy
 from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import DamagedJournal, Header, Rows, left_behind, read_journal
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run, RunEnergy, relation_to
@@ -43,7 +44,7 @@ def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announ
     return tables
 
 
-def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[Path, Header, Rows]]:
+def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[InsidePath, Header, Rows]]:
     """Return the journals of runs that a crash ended; what cannot be read is put aside and announced."""
     found = []
     for path in left_behind(folder):
@@ -56,7 +57,7 @@ def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[Path, Header
             continue
         except ValueError:
             announce(f"{path}: a crash ended this journal before its first sample; it is deleted")
-            path.unlink()
+            remove(path)
             continue
         announce(f"{header.run_id}: a crash ended this run; its {len(samples)} samples on disk are kept")
         found.append((path, header, samples))
@@ -98,7 +99,7 @@ def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | N
 
 
 def _measured(header: Header, samples: Rows) -> Tables:
-    energy = LiveEnergy(header.run_id, header.robot_id, live_run.joints_of(header.columns), None)
+    energy = LiveEnergy(header.run_id, header.robot_id, live_run.joints_of(header.columns), None, kind=header.kind)
     energy.feed(dict(zip(header.columns, samples.T, strict=True)), last=True)
     return energy_tables(energy, header, float(samples[0, 0]))
 

@@ -19,7 +19,7 @@ from irtwin.providers.records import run_iri
 from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.storage.journal import Header, Rows
-from irtwin.storage.schema import LIVE, LIVE_RUN, Activity, Base, JointState, LiveState, Run, RunEnergy, RunState
+from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunEnergy, RunState
 
 _MADE: dict[str, type[Base]] = {
     "run_state": RunState,
@@ -82,7 +82,7 @@ def rows(
         "run_id": header.run_id,
         "robot_id": header.robot_id,
         "name": header.run_id.removeprefix(f"{header.robot_id}."),
-        "kind": LIVE_RUN,
+        "kind": header.kind,
         "payload_kg": header.payload_kg,
         **dict(zip(_COM, header.payload_com, strict=True)),
         "start_time": _moment(began),

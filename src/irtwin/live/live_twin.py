@@ -13,7 +13,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from pathlib import Path
 from typing import Self
 
 from pyoxigraph import Quad
@@ -28,8 +27,9 @@ from irtwin.live.known_robots import KnownRobots
 from irtwin.live.shown import ShownRuns
 from irtwin.live.watched_run import HOLE, WatchedRun
 from irtwin.storage.database import Workspace
+from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import Header, Rows, read_journal
-from irtwin.storage.schema import LIVE
+from irtwin.storage.schema import LIVE, LIVE_RUN
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
@@ -53,9 +53,14 @@ class LiveTwin:
         graph: KnowledgeGraph,
         announce: Callable[[str], None] = lambda line: None,
         broadcast: Broadcast | None = None,
+        kind: str = LIVE_RUN,
     ) -> None:
-        """Begin to watch, after the runs that a crash left were put in order; `broadcast` is told of each state."""
+        """Begin to watch, after the runs that a crash left were put in order; `broadcast` is told of each state.
+
+        kind: of the runs that begin: REPLAYED_RUN where a log is played, which no total counts.
+        """
         self._place, self._announce, self._broadcast = place, announce, broadcast
+        self._kind = kind
         self._folder = place.folder / LIVE
         self._shown = ShownRuns(place, graph)
         self.robots = KnownRobots(place, announce)
@@ -177,7 +182,7 @@ class LiveTwin:
 
     def _begin(self, state: State) -> WatchedRun:
         joints = self.robots.joints[state.robot_id]
-        run = WatchedRun.begun(self._folder, state, joints, self.robots.plan(state))
+        run = WatchedRun.begun(self._folder, state, joints, self.robots.plan(state), self._kind)
         self._runs[state.robot_id] = run
         return run
 
@@ -294,7 +299,7 @@ class LiveTwin:
             self._refresh()
 
     def _close(
-        self, path: Path, header: Header, samples: Rows, counts: live_run.Values, shown: set[Quad] | None
+        self, path: InsidePath, header: Header, samples: Rows, counts: live_run.Values, shown: set[Quad] | None
     ) -> None:
         """Make a run of a journal, in the database and in the graph, and drop the journal."""
         if len(samples):
@@ -302,7 +307,7 @@ class LiveTwin:
                 self.robots.times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
             tables = keep(self._place, header, samples, {**counts, "stream_state": "ended"}, self._announce)
             self._shown.show(header.run_id, shown, self._shown.mapped(tables))
-        path.unlink()
+        remove(path)
 
     def _refresh(self) -> None:
         """Bring the graph up to date with the database; runs that last look again what it shows of them."""

@@ -9,7 +9,7 @@ from datetime import UTC
 from sqlalchemy import select
 
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE_RUN, Run
+from irtwin.storage.schema import WATCHED_RUNS, Run
 
 _STEP = 2e-6  # s: the database keeps moments to the microsecond
 
@@ -20,7 +20,7 @@ class StoredTimes:
     def __init__(self, place: Workspace) -> None:
         """Read the runs of a workspace."""
         self._runs: defaultdict[str, list[tuple[float, float, str]]] = defaultdict(list)
-        runs = select(Run.robot_id, Run.run_id, Run.start_time, Run.run_time_s).where(Run.kind == LIVE_RUN)
+        runs = select(Run.robot_id, Run.run_id, Run.start_time, Run.run_time_s).where(Run.kind.in_(WATCHED_RUNS))
         with place.reading() as session:
             for robot_id, run_id, began, length in session.execute(runs):
                 assert began is not None  # of a run that was watched

@@ -23,7 +23,7 @@ from irtwin.providers.records import find_plan, find_robot, load_robot
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
-from irtwin.storage.schema import LIVE
+from irtwin.storage.schema import LIVE, LIVE_RUN, REPLAYED_RUN
 from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
@@ -71,7 +71,7 @@ def watch(
         _alone(place, graph_url),
         KnowledgeGraph.of_workspace(_checked(place), graph_url) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
-        LiveTwin(place, graph, announce, broadcast) as twin,
+        LiveTwin(place, graph, announce, broadcast, LIVE_RUN if replayed is None else REPLAYED_RUN) as twin,
     ):
         replay = None if replayed is None or robot is None else _replay(place, replayed, robot, speed)
         receive: Callable[[State], None] = twin.receive

@@ -62,15 +62,17 @@ class WatchedRun:
     _idle: set[Quad] = field(default_factory=set)
 
     @classmethod
-    def begun(cls, folder: Path, state: State, joints: Sequence[str], plan: str | None) -> Self:
+    def begun(cls, folder: Path, state: State, joints: Sequence[str], plan: str | None, kind: str) -> Self:
         """Begin a run and its journal in a folder with a state that is still to be taken; `plan`: its run_id.
+
+        kind: what kind of run it is, as `storage.schema` has it.
 
         Raises InputError where another run of the robot began at the same moment.
         """
         began = datetime.fromtimestamp(state.time, UTC)
         run_id = f"{state.robot_id}.{LIVE}_{began:%Y%m%dT%H%M%S%f}"
         com = state.payload_com or (0.0, 0.0, 0.0)
-        header = Header(run_id, state.robot_id, state.payload or 0.0, live_run.columns(joints), com, plan)
+        header = Header(run_id, state.robot_id, state.payload or 0.0, live_run.columns(joints), com, plan, kind)
         try:
             journal = Journal(folder, header)
         except FileExistsError:
@@ -139,7 +141,7 @@ class WatchedRun:
         """Work out energy and gap from the next states, as far as they go."""
         if self.energy is None:
             of = (self.header.run_id, self.header.robot_id, tuple(self.joints), known)
-            self.energy = LiveEnergy(*of, self.header.payload_kg, self.header.payload_com)
+            self.energy = LiveEnergy(*of, self.header.payload_kg, self.header.payload_com, self.header.kind)
         rows = live_run.journal_rows(states)
         return self.energy.feed(dict(zip(self.header.columns, rows.T, strict=True)), least=LEAST)
 

@@ -18,7 +18,7 @@ from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE_RUN, PLANNED_RUN
+from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS
 from irtwin.twin.price import Figure, Price, cost, saving
 from irtwin.twin.twin import LedgerEntry, Twin
 from irtwin.twin.validate import validate
@@ -28,7 +28,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's energy, its ledger, and its modelled series; of a live run its gap as well; of a plan its price."""
     with workspace.reading() as session:
         run = session.get_one(schema.Run, run_id)
-    if run.kind == LIVE_RUN:
+    if run.kind in WATCHED_RUNS:
         return live_energy.provide(workspace, run_id)
     robot_id = run.robot_id
     twin_id, twin = load_twin(workspace, robot_id)
@@ -44,7 +44,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         used=[*read, twin_iri(twin_id)],
         metered=[] if motion.power is None else [one for one in read if one.startswith("series/")],
         rows=[
-            _run_energy(run_id, twin_id, role, twin, motion, ledger),
+            _run_energy(run, twin_id, role, twin, motion, ledger),
             *(
                 schema.EnergyShare(
                     twin_id=twin_id,
@@ -172,7 +172,7 @@ def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
 
 
 def _run_energy(
-    run_id: str, twin_id: str, role: schema.TwinRun, twin: Twin, motion: Motion, ledger: tuple[LedgerEntry, ...]
+    run: schema.Run, twin_id: str, role: schema.TwinRun, twin: Twin, motion: Motion, ledger: tuple[LedgerEntry, ...]
 ) -> schema.RunEnergy:
     (whole,) = validate(twin, [motion])
     start = int(np.argmax(held_out(role, motion)))
@@ -181,11 +181,12 @@ def _run_energy(
     at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
     standby = sum(entry.energy for entry in ledger if entry.effect in at_rest)
     electrical = any(effect.electrical_loss for effect in twin.stack.effects)
+    energy = whole.modelled_energy if whole.measured_energy is None else whole.measured_energy
     return schema.RunEnergy(
-        run_id=run_id,
+        run_id=run.run_id,
         twin_id=twin_id,
         part=role.part,
-        energy_consumption_j=whole.modelled_energy if whole.measured_energy is None else whole.measured_energy,
+        energy_consumption_j=None if run.role == SIMULATED else energy,
         energy_from="measured" if motion.power is not None else "modelled" if electrical else "mechanical",
         run_power_w=float(np.mean(power)),
         peak_power_w=float(np.max(power)),

@@ -75,9 +75,11 @@ class LiveEnergy:
         known: KnownTwin | None,
         payload: float = 0.0,
         payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        kind: str = schema.LIVE_RUN,
     ) -> None:
         """Begin a run of a robot by its twin, with what its flange carries: kg, and m in the flange's frame."""
         self.known = known
+        self._is_consumption = kind == schema.LIVE_RUN  # a replay takes nothing
         self._run_id, self._robot_id = run_id, robot_id
         twin = None if known is None else known.twin
         self.so_far = EnergySoFar(joints, twin, name=run_id, payload=payload, payload_com=payload_com)
@@ -141,7 +143,7 @@ class LiveEnergy:
             }
         taken = so_far.modelled if measured is None else measured
         return row | {
-            "energy_consumption_j": taken,
+            "energy_consumption_j": taken if self._is_consumption else None,
             "energy_from": "measured" if measured is not None else self._modelled_as,
             "run_power_w": taken / so_far.seconds,
             "peak_power_w": so_far.peak_power,
@@ -212,7 +214,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         joints = tuple(session.scalars(in_order))
     known = known_twin(workspace, run.robot_id)
     com = (run.payload_com_x_m, run.payload_com_y_m, run.payload_com_z_m)
-    energy = LiveEnergy(run_id, run.robot_id, joints, known, run.payload_kg, com)
+    energy = LiveEnergy(run_id, run.robot_id, joints, known, run.payload_kg, com, run.kind)
     table = workspace.read_series(run_id)
     columns = {name: np.array(table.column(name), dtype=float) for name in table.column_names}
     assert run.start_time is not None  # of what was watched

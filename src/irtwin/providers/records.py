@@ -32,12 +32,12 @@ from irtwin.storage import schema
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.files import inside
 from irtwin.storage.schema import (
-    LIVE_RUN,
     MEASURED,
     MEASURED_RUN,
     MODELLED,
     PLANNED,
     PLANNED_RUN,
+    WATCHED_RUNS,
     Base,
     Joint,
     Robot,
@@ -120,7 +120,7 @@ def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet,
         joints = session.scalars(select(Joint.name).where(Joint.robot_id == robot_id).order_by(Joint.position)).all()
     plans = {row.run_id: row.name for row in kept if row.kind == PLANNED_RUN}
     toml = data_set.folder / "dataset.toml"
-    if any(row.kind != LIVE_RUN for row in kept) and tuple(joints) != data_set.robot.joint_names:
+    if any(row.kind not in WATCHED_RUNS for row in kept) and tuple(joints) != data_set.robot.joint_names:
         raise InputError(
             f"{toml}: the workspace keeps runs of this robot with the joints {', '.join(joints)}; remove the robot "
             "with `irtwin drop` first, or give it another name"

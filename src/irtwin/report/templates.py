@@ -10,8 +10,8 @@ from jinja2.bccache import Bucket
 from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
 
-from irtwin.errors import InputError
 from irtwin.report import wording
+from irtwin.report.apart import written_apart
 from irtwin.report.energy import tables
 from irtwin.report.heading import heading
 from irtwin.resources import Resources
@@ -36,14 +36,9 @@ _COMPILED = _CompiledTemplates()
 
 def written(resources: Resources, template: str, **values: Any) -> str:
     """Return the page that a template makes of values. InputError where an extension is why it cannot be made."""
-    try:
-        return environment(resources).get_template(template).render(**values)
-    except jinja2.TemplateError as error:
-        if not any(file.is_extension for file in resources.of("reports")):
-            raise
-        raise InputError(
-            f"{resources.path('reports', template)}: {error}; see the files that extend reports/"
-        ) from error
+    if any(file.is_extension for file in resources.of("reports", ".html.jinja")):
+        return written_apart(resources, template, values)
+    return environment(resources).get_template(template).render(**values)
 
 
 def environment(resources: Resources) -> jinja2.Environment:

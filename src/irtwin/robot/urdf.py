@@ -24,13 +24,13 @@ _MOST_JOINTS = 100  # that move
 _GREY = (0.7, 0.7, 0.72, 1.0)
 
 
-def read_urdf(path: Path) -> Robot:
+def read_urdf(path: Path | str) -> Robot:
     """Read a robot from a URDF file.
 
     Raises InputError where the file cannot be read, does not parse, or describes no robot that can be modelled.
     """
     try:
-        text = read_input(path, _LARGEST).decode()
+        text = read_input(Path(path), _LARGEST).decode()
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save the URDF as UTF-8") from error
     return parse_urdf(text, source=str(path))

@@ -13,10 +13,11 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.snapshot import OLDEST
 from irtwin.knowledge.store.sparql_server import ServerFault
+from irtwin.limits import limit_memory
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.source import Source
-from irtwin.serve.worker import SERVER_FAILS, limit_memory
+from irtwin.serve.worker import SERVER_FAILS
 
 
 class Updates:

@@ -9,12 +9,9 @@ all that comes. Where a SPARQL server keeps the graph, a query that is ended her
 from __future__ import annotations
 
 import json
-import math
-import resource
 import struct
 import sys
 from contextlib import suppress
-from pathlib import Path
 from typing import IO, Any, cast
 
 from pyoxigraph import QueryBoolean, QueryResultsFormat, QuerySolutions, RdfFormat, serialize
@@ -23,6 +20,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.sparql_server import ServerFault
+from irtwin.limits import limit_memory, limit_processor_time
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.source import Source
@@ -83,7 +81,7 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
         limit_memory(memory)
         _frame(out, b"H", b"{}")
         for line in sys.stdin.buffer:
-            _limit_processor_time(seconds)
+            limit_processor_time(seconds)
             request = json.loads(line)
             sink = _Sink(out, most_bytes)
             try:
@@ -142,22 +140,6 @@ def _refuse(out: IO[bytes], error: Exception) -> None:
         print(f"irtwin: {error}", file=sys.stderr)
         status, message = 502, SERVER_FAILS
     _frame(out, b"H", json.dumps({"status": status, "message": message}).encode())
-
-
-def limit_memory(memory: int) -> None:
-    """Have the system refuse this process more than so many bytes beside those that it has now."""
-    sizes = Path("/proc/self/statm")  # in pages; the sixth is what RLIMIT_DATA counts
-    has = int(sizes.read_text().split()[5]) * resource.getpagesize() if sizes.exists() else 0
-    resource.setrlimit(resource.RLIMIT_DATA, (has + memory, has + memory))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def _limit_processor_time(seconds: float) -> None:
-    """Have the system end this process should it work on a query for too long, even if the server is gone."""
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    used = usage.ru_utime + usage.ru_stime
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(used + seconds) + 1, hard))
 
 
 def _frame(out: IO[bytes], kind: bytes, data: bytes) -> None:

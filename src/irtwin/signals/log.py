@@ -86,12 +86,13 @@ class DataSet:
     sha256: Mapping[Path, str] = field(default_factory=dict)  # of `dataset.toml` and the URDF, as they were read
 
 
-def read_data_set(folder: Path, *, repair: bool = False) -> DataSet:
+def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
     """Read and check a data set; `repair` drops bad samples.
 
     A run NAME with holes in time becomes several, NAME, NAME.2 and so on. Raises InputError, naming file, line or
     column, on whatever is wrong.
     """
+    folder = Path(folder)
     file = folder / "dataset.toml"
     document = read_toml(file)
     table = Table(file, "[robot]", take(document, "robot", dict, file, "[robot]"))

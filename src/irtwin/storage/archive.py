@@ -18,7 +18,7 @@ from irtwin.storage import files
 
 _FORMAT = {"format": "irtwin backup", "version": 1}
 _MANIFEST = "manifest.json"
-_MOST_MANIFEST = 1 << 28  # bytes: some 2 million files
+_MOST_MANIFEST = 1 << 26  # bytes: some 400,000 files
 _PIECE = 1 << 20
 
 
@@ -87,7 +87,10 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
     foreign = InputError(f"{archive}: not an irtwin backup; make one with `irtwin backup FILE`")
     if manifest is None or manifest.file_size > _MOST_MANIFEST:
         raise foreign
-    said = json.loads(source.read(manifest))
+    try:
+        said = json.loads(source.read(manifest))
+    except RecursionError:
+        raise foreign from None
     if not isinstance(said, dict) or said.get("format") != _FORMAT["format"]:
         raise foreign
     if said.get("version") != _FORMAT["version"]:

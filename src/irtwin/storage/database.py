@@ -17,7 +17,7 @@ from irtwin.storage import base_iri, engine, files, series_place
 from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
-from irtwin.storage.files import inside
+from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_changes import keep_notes
@@ -37,6 +37,7 @@ from irtwin.storage.rows import (
     with_dependents,
 )
 from irtwin.storage.schema import (
+    LIVE,
     MEASURED,
     MODELLED,
     PLANNED,
@@ -64,6 +65,8 @@ _FROM_A_BACKUP = (
 TWINS, DIAGNOSES, MESHES = "twins", "diagnoses", "meshes"
 TARIFF = "plant.toml"  # what a kilowatt hour costs and emits, and the base of IRIs; a person writes it
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES)  # of files that rows name
+# What is written without being asked for: a link among it would lead into somebody's other files.
+_OWN = (*_FOLDERS, _DATABASE, LIVE, "graph", "reports", "alarms", "next_experiment", "mapped_rows.db", TARIFF)
 
 
 class Workspace:
@@ -99,6 +102,8 @@ class Workspace:
             raise InputError(
                 f"{folder}: cannot create the workspace: {error.strerror}; choose another folder"
             ) from None
+        for name in _OWN:
+            inside(folder, name)
         if url is None:
             _check_that_nothing_is_lost(folder)
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
@@ -147,9 +152,13 @@ class Workspace:
         """Have each change of a row noted from now on, so that a mapping need not read them all again."""
         keep_notes(self.engine, Base.metadata.tables.keys())
 
-    def report_path(self, robot_id: str) -> Path:
+    def file(self, path: str) -> InsidePath:
+        """Return the file that a path in the workspace means. Raises InputError where it leads outside."""
+        return inside(self.folder, path)
+
+    def report_path(self, robot_id: str) -> InsidePath:
         """Where a robot's report lies."""
-        return self.folder / "reports" / f"{robot_id}.html"
+        return self.file(f"reports/{robot_id}.html")
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
@@ -188,7 +197,7 @@ class Workspace:
                 drop_data_set(session, robot.robot_id)
                 session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(values(robot)))
             for path, content in (documents or {}).items():
-                files.write(inside(self.folder, path), content)
+                files.write(self.file(path), content)
             stored = [row for run in runs for row in self._store({run.run_id: series[run.run_id]}, _told(run), None)]
             insert_rows(session, [*rows[1 if known else 0 :], *stored])
             release_plans(session, robot.robot_id)
@@ -229,7 +238,7 @@ class Workspace:
             )
             drop_activities(session, with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
-                files.write(inside(self.folder, path), content)
+                files.write(self.file(path), content)
             modelled = self._store(series or {}, MODELLED, activity.activity_id)
             insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()

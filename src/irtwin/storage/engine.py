@@ -18,7 +18,8 @@ from irtwin.errors import InputError, WorkspaceFault
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
-_DAMAGE = ("malformed", "not a database", "could not decode to UTF-8", "Could not decode to UTF-8")
+_DAMAGE = ("malformed", "not a database")
+_NO_UTF8 = ("ould not decode to UTF-8", "codec can't decode")  # SQLite's words of a value, Python's of a name
 _SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
 _FULL = ("is full", "disk I/O error")
 _OF_SERVER = {  # by the beginning of PostgreSQL's state
@@ -163,6 +164,11 @@ def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> None:
 def _tell(url: URL, error: BaseException) -> None:
     """Raise WorkspaceFault for what SQLite says of a damaged file or a full disk."""
     reason = " ".join(str(error).split())
+    if any(text in reason for text in _NO_UTF8):
+        raise WorkspaceFault(
+            f"{url.database}: holds text that is not UTF-8 ({reason[:160]}); mend it with what wrote it, or "
+            "restore a backup by `irtwin restore ARCHIVE --workspace NEW`"
+        ) from error
     if any(text in reason for text in _DAMAGE):
         raise WorkspaceFault(_damaged(url, reason)) from error
     if any(text in reason for text in _FULL):

@@ -11,8 +11,11 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NewType
 
 from irtwin.errors import InputError, WorkspaceFault
+
+InsidePath = NewType("InsidePath", Path)  # of a file in a workspace: what `inside` returns, and nobody else makes one
 
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
@@ -114,9 +117,22 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def inside(workspace: Path, path: str) -> Path:
-    """Return the file that a workspace's relative path means; InputError where it leads outside."""
-    file = (workspace / path).resolve()
-    if not file.is_relative_to(workspace.resolve()):
-        raise InputError(f"{workspace}: the path {path!r} leads outside the workspace; nothing was read or written")
-    return file
+def inside(workspace: Path, path: str) -> InsidePath:
+    """Return the file that a workspace's relative path means; InputError where it, or a link on its way, leads outside.
+
+    The one gate for what rows, archives and file names say: a database, or a whole folder, may come from elsewhere.
+    """
+    try:
+        is_inside = (workspace / path).resolve().is_relative_to(workspace.resolve())
+    except (OSError, RuntimeError, ValueError):  # a ring of links, a name too long, a NUL
+        is_inside = False
+    if not is_inside:
+        raise InputError(
+            f"{workspace}: the path {path[:200]!r} leads outside the workspace; nothing was read or written"
+        )
+    return InsidePath(workspace / path)
+
+
+def remove(file: InsidePath) -> None:
+    """Remove a file of a workspace, if it is there."""
+    file.unlink(missing_ok=True)

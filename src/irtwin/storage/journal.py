@@ -17,6 +17,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from irtwin.storage.files import InsidePath, inside
+from irtwin.storage.schema import LIVE_RUN, WATCHED_RUNS
+
 Rows = npt.NDArray[np.float64]
 _ENDING = ".journal"
 
@@ -31,6 +34,7 @@ class Header:
     columns: tuple[str, ...]
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, in the flange's frame
     performs: str | None = None  # run_id of the plan that it carries out
+    kind: str = LIVE_RUN  # or REPLAYED_RUN
 
 
 class DamagedJournal(ValueError):
@@ -42,7 +46,7 @@ class Journal:
 
     def __init__(self, folder: Path, header: Header) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self.path = folder / f"{header.run_id}{_ENDING}"
+        self.path = inside(folder, f"{header.run_id}{_ENDING}")
         self._file = os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_APPEND, 0o644)
         fcntl.flock(self._file, fcntl.LOCK_EX)
         self._write(json.dumps(asdict(header)).encode() + b"\n")
@@ -82,23 +86,31 @@ def read_journal(path: Path) -> tuple[Header, Rows]:
 def _header(said: Any) -> Header:
     header = Header(**{**said, "columns": tuple(said["columns"])})
     com = tuple(map(float, header.payload_com))
+    if not header.run_id.startswith(f"{header.robot_id}."):
+        raise ValueError
+    if header.kind not in WATCHED_RUNS:
+        raise ValueError
     texts = (header.run_id, header.robot_id, "" if header.performs is None else header.performs, *header.columns)
     if not all(isinstance(text, str) for text in texts) or header.columns[:1] != ("time",) or len(com) != 3:
         raise TypeError
     return replace(header, payload_kg=float(header.payload_kg), payload_com=com)
 
 
-def of_robot(folder: Path, robot_id: str) -> list[Path]:
+def of_robot(folder: Path, robot_id: str) -> list[InsidePath]:
     """Return the journals of a robot's live runs."""
-    return sorted(folder.glob(f"{robot_id}.*{_ENDING}"))
+    return [path for path in _all(folder) if path.name.startswith(f"{robot_id}.")]
 
 
-def left_behind(folder: Path) -> Iterator[Path]:
+def left_behind(folder: Path) -> Iterator[InsidePath]:
     """Yield the journals that nobody writes: those of processes that crashed."""
-    for path in sorted(folder.glob(f"*{_ENDING}")):
+    for path in _all(folder):
         with path.open("rb") as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 continue
         yield path
+
+
+def _all(folder: Path) -> list[InsidePath]:
+    return [inside(folder, path.name) for path in sorted(folder.glob(f"*{_ENDING}"))]

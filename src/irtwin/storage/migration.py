@@ -12,6 +12,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from irtwin.errors import InputError
 from irtwin.storage import engine as engines
+from irtwin.storage.row_rules import check_rows
 
 REVISIONS = Path(__file__).parent / "revisions"
 _TABLE = "alembic_version"
@@ -47,7 +48,8 @@ def stamp(connection: Connection) -> None:
 def migrate(engine: Engine) -> None:
     """Bring the tables of a database to the newest revision: all of it, or nothing where it fails or is killed.
 
-    A copy of an SQLite file is kept beside it first. Raises InputError where a newer irtwin made the tables.
+    A copy of an SQLite file is kept beside it first. Raises InputError where a newer irtwin made the tables, or another
+    program wrote what irtwin would not.
     """
     with engine.connect() as connection:
         current = revision(connection)
@@ -64,6 +66,7 @@ def migrate(engine: Engine) -> None:
         connection = session.connection()
         if revision(connection) == current:  # else another process has done it meanwhile
             _run(connection)
+            check_rows(connection, engines.shown(engine.url))
 
 
 def _keep_copy(engine: Engine, current: str) -> None:

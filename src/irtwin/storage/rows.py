@@ -14,7 +14,7 @@ from irtwin.errors import InputError
 from irtwin.storage import base_iri
 from irtwin.storage.schema import (
     LIVE,
-    LIVE_RUN,
+    WATCHED_RUNS,
     Activity,
     Base,
     Individuals,
@@ -30,7 +30,7 @@ from irtwin.storage.schema import (
 Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
 
 # table -> its columns that name files of the workspace, with those of their SHA-256
-_FILES = {
+FILES = {
     "series": [("path", "series_id")],
     "twin": [("file", "sha256")],
     "link_shape": [("mesh_file", "mesh_sha256")],
@@ -110,7 +110,7 @@ def modelled_of_live_runs(session: Session, robot_id: str) -> Rows:
 def named_files(connection: Connection) -> list[NamedFile]:
     """Return the files of the workspace that the database names."""
     found = []
-    for table, columns in _FILES.items():
+    for table, columns in FILES.items():
         for file, checksum in columns:
             rows = connection.execute(select(Base.metadata.tables[table])).mappings()
             found += [NamedFile(row[file], row[checksum], _owner(row)) for row in rows if row[file] is not None]
@@ -121,7 +121,7 @@ def files_of(rows: Rows) -> dict[str, str]:
     """Return the files of the workspace that rows name: path -> SHA-256."""
     return {
         row[file]: row[checksum]
-        for table, columns in _FILES.items()
+        for table, columns in FILES.items()
         for file, checksum in columns
         for row in rows.get(table, [])
         if row[file] is not None
@@ -139,7 +139,7 @@ def drop_data_set(session: Session, robot_id: str) -> None:
 
 def drop_recorded(session: Session, robot_id: str) -> None:
     """Drop all that `recorded_rows` returns but the robot itself."""
-    _drop(session, robot_id, Run.kind != LIVE_RUN)
+    _drop(session, robot_id, Run.kind.not_in(WATCHED_RUNS))
 
 
 def _drop(session: Session, robot_id: str, which: ColumnElement[bool], kept: AbstractSet[str] = frozenset()) -> None:
@@ -220,7 +220,7 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
 
 def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
     """Yield each table with the query of a robot's rows in it, without its live runs'."""
-    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.kind != LIVE_RUN)
+    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.kind.not_in(WATCHED_RUNS))
     made = select(Activity.activity_id).where(
         Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
     )
@@ -236,7 +236,7 @@ def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
 
 def _of_live(robot_id: str) -> Select[Any]:
     """Return the query of the activities in which a twin worked out the energy of a robot's live runs."""
-    energies = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.kind == LIVE_RUN)
+    energies = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.kind.in_(WATCHED_RUNS))
     return energies.where(RunEnergy.twin_id.is_not(None))
 
 

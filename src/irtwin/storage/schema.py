@@ -15,8 +15,10 @@ from sqlalchemy.types import TypeDecorator
 
 LIVE = "live"  # provider of what is known of runs that are watched
 METER = "meter"  # provider of what was measured of a run's power
-# Kinds of run, by their classes in the ontology: made up, taken in as a log, or watched while it lasted.
-PLANNED_RUN, MEASURED_RUN, LIVE_RUN = "Planned_Run", "Measured_Run", "Live_Run"
+# Kinds of run, by their classes in the ontology: made up, taken in as a log, watched while it lasted, a log played so.
+PLANNED_RUN, MEASURED_RUN, LIVE_RUN, REPLAYED_RUN = "Planned_Run", "Measured_Run", "Live_Run", "Replayed_Run"
+WATCHED_RUNS = (LIVE_RUN, REPLAYED_RUN)
+SIMULATED = "simulated"  # the role of a run whose log a simulator wrote
 MEASURED, PLANNED, MODELLED = "measured", "planned", "modelled"  # kinds of series
 
 
@@ -131,7 +133,7 @@ class Run(Base):
     run_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
     name: Mapped[str]
-    kind: Mapped[str]  # PLANNED_RUN, MEASURED_RUN or LIVE_RUN
+    kind: Mapped[str]  # PLANNED_RUN, MEASURED_RUN, LIVE_RUN or REPLAYED_RUN
     role: Mapped[str | None]  # as the data set says; none for a run of no data set, which another one leaves as it is
     payload_kg: Mapped[float]
     payload_com_x_m: Mapped[float]
@@ -379,7 +381,7 @@ class RunEnergy(Base):
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     twin_id: Mapped[str | None] = mapped_column(ForeignKey("twin.twin_id"))  # none of a live run of a robot without one
     part: Mapped[str | None]  # the run's part in the twin; one "apart" is not judged by it
-    energy_consumption_j: Mapped[float]
+    energy_consumption_j: Mapped[float | None]  # that a robot took: none of a replay, and of a simulated run
     energy_from: Mapped[str]  # "measured", "modelled", or "mechanical": modelled without the electrical losses
     run_power_w: Mapped[float]  # its mean
     peak_power_w: Mapped[float]

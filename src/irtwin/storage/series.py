@@ -46,8 +46,8 @@ def write_series(workspace: Path, table: pa.Table) -> SeriesFile:
         path = f"{FOLDER}/{series_id}.parquet"
         if storage is not None:
             storage.put({path: temporary})
-        elif not (workspace / path).exists():
-            files.put_in_place(temporary, workspace / path)
+        elif not (file := inside(workspace, path)).exists():
+            files.put_in_place(temporary, file)
     return SeriesFile(series_id, path, table.num_rows, tuple(table.column_names))
 
 

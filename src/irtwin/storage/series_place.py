@@ -11,7 +11,8 @@ from pathlib import Path
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
 from irtwin.storage import files
-from irtwin.storage.object_storage import ObjectStorage
+from irtwin.storage.object_storage import ObjectStorage, checked_url
+from irtwin.trust import how, trust, trusted
 
 FILE = "series.toml"
 _MOST_BYTES = 10_000
@@ -29,10 +30,21 @@ class _Said:
 def elsewhere(folder: Path) -> ObjectStorage | None:
     """Return the object storage that holds a workspace's series; None where its folder does.
 
-    Raises InputError where `series.toml` is damaged, or s3fs is missing.
+    Raises InputError where `series.toml` is damaged, names storage that the user has not trusted it with, or s3fs is
+    missing.
     """
     said = _said(folder)
     return None if said is None else _storage(said.url)
+
+
+def asked(url: str) -> str:
+    """Return the name by which a user trusts a workspace with object storage."""
+    return f"{FILE}: {checked_url(url)}"
+
+
+def asks(folder: Path) -> list[str]:
+    """Return what `series.toml` of a workspace asks for, by name: nothing where there is none."""
+    return [asked(_read(folder / FILE).url)] if (folder / FILE).exists() else []
 
 
 def are_elsewhere(folder: Path) -> bool:
@@ -50,6 +62,7 @@ def choose(folder: Path, url: str, has_series: bool) -> None:
 
     Raises InputError where it has series already, in another place, or where another workspace has its series there.
     """
+    trust(folder, [asked(url)])
     storage, said = _storage(url), _said(folder)
     if said is not None:
         if said.url != storage.url:
@@ -82,6 +95,13 @@ def _said(folder: Path) -> _Said | None:
     file = folder / FILE
     if not file.exists():
         return None
+    said = _read(file)
+    if asked(said.url) not in trusted(folder):
+        raise InputError(f"{file}: names {said.url}, which nothing is read from or written to yet; {how(folder)}")
+    return said
+
+
+def _read(file: Path) -> _Said:
     try:
         said = tomllib.loads(read_input(file, _MOST_BYTES).decode("utf-8"))
         return _Said(str(said["url"]), str(said["workspace"]))

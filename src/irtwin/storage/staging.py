@@ -12,7 +12,6 @@ from sqlalchemy import update
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage.database import Workspace
-from irtwin.storage.files import inside
 from irtwin.storage.rows import (
     Rows,
     drop_recorded,
@@ -90,7 +89,7 @@ def _bring(source: Workspace, target: Workspace, named: Mapping[str, str], had: 
     series = set() if storage is None else {path for path in whole if is_series(path)}
     if storage is not None:
         lacking = series - (had & storage.paths(FOLDER))
-        storage.put({path: inside(source.folder, path) for path in lacking})
+        storage.put({path: source.file(path) for path in lacking})
     for path in whole - series:
         _link(source, target, path)
     return whole | {path for path, is_good in fetched.items() if is_good}
@@ -106,16 +105,16 @@ def _fetch(source: Workspace, target: Workspace, named: Mapping[str, str]) -> di
     found = {path: is_whole(target.folder, path, named[path]) for path in series}
     for path, is_good in found.items():
         if not is_good:
-            inside(target.folder, path).unlink(missing_ok=True)
+            files.remove(target.file(path))
     return found
 
 
 def _link(source: Workspace, target: Workspace, path: str) -> None:
     """Give a file of one workspace a name in the other, in place of a damaged one."""
-    file = inside(target.folder, path)
+    file = target.file(path)
     file.parent.mkdir(exist_ok=True)
     linked = file.with_name(f".{file.name}.tmp")
     linked.unlink(missing_ok=True)
-    os.link(inside(source.folder, path), linked)
+    os.link(source.file(path), linked)
     files.put_in_place(linked, file)
     linked.unlink(missing_ok=True)  # it was the same file already

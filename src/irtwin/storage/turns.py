@@ -16,6 +16,7 @@ from sqlalchemy import Engine, text
 
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.storage import engine as engines
+from irtwin.storage.files import inside
 
 _KEY = 0x6972746772  # "irtgr": the advisory lock on PostgreSQL, beside that of writers of rows
 _FILE = ".graph.turn"
@@ -49,7 +50,7 @@ def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:
 
 def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
     try:
-        file = held.enter_context((folder / _FILE).open("ab"))
+        file = held.enter_context(inside(folder, _FILE).open("ab"))
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 

@@ -29,7 +29,14 @@ Statement = tuple[Node, Node, Node]  # unlike a triple, it may be about a litera
 
 
 class Contradiction(InputError):
-    """The graph contradicts itself: the rule that says so, and the terms it says it of."""
+    """The graph contradicts itself: the rule that says so, and the terms it says it of.
+
+    `given` are the triples that it follows from, and those of others that were found with it, where the engine tells.
+    """
+
+    def __init__(self, message: str, given: Iterable[Triple] = ()) -> None:
+        super().__init__(message)
+        self.given = frozenset(given)
 
 
 @dataclass(frozen=True)
@@ -133,13 +140,32 @@ class Closure:
     def _why(self, conclusion: Fact) -> Derivation | None:
         if conclusion in self._given or conclusion not in self._round:
             return None
+        for rule, premises in self._derivations(conclusion):
+            return Derivation(rule.name, tuple(map(self._shown, premises)))
+        return None
+
+    def _derivations(self, conclusion: Fact) -> Iterator[tuple[Rule, list[Fact]]]:
+        """Yield the rules that draw a conclusion from what was known before it, each with its premises."""
         found = self._round[conclusion]
         for rule, join, arguments in self._program.concluding(conclusion):
             for values in join(self._facts, self._facts, *arguments):
                 premises = self._program.premises(rule, values)
                 if all(self._round[premise] < found for premise in premises):
-                    return Derivation(rule.name, tuple(map(self._shown, premises)))
-        return None
+                    yield rule, premises
+
+    def _grounds(self, facts: Iterable[Fact]) -> set[Triple]:
+        """Return the given triples that facts follow from, in all ways that they do."""
+        todo, seen, found = list(facts), set[Fact](), set[Triple]()
+        while todo:
+            fact = todo.pop()
+            if fact in seen:
+                continue
+            seen.add(fact)
+            if fact in self._given:
+                found.update(self._triples.intersection(self._terms.triples(fact)))
+            elif fact in self._round:
+                todo += (premise for _, premises in self._derivations(fact) for premise in premises)
+        return found
 
     def _saturate(self, facts: Iterable[Fact]) -> None:
         fresh = self._unknown(facts)
@@ -195,11 +221,12 @@ class Closure:
 
     def _of_values(self, fresh: list[Fact]) -> Iterator[Fact]:
         """Say what is known of values that have just been given another name (dt-type2, dt-diff)."""
-        for subject, predicate, object in fresh:
-            if predicate != self._program.same or subject == object:
-                continue
-            if subject in self._terms.values and object in self._terms.values:
-                raise self._two_values((subject, predicate, object))
+        values = self._terms.values
+        same = [fact for fact in fresh if fact[1] == self._program.same and fact[0] != fact[2]]
+        two_values = [fact for fact in same if fact[0] in values and fact[2] in values]
+        if two_values:
+            raise self._two_values(two_values)
+        for subject, _, object in same:
             for number in {subject, object} & self._terms.values.keys() - self._named_values:
                 for iri in datatypes.datatypes_of(self._terms.values[number]):
                     yield (number, self._program.type, self._terms.number(NamedNode(iri)))
@@ -224,17 +251,21 @@ class Closure:
                 self._facts.add(fact)
 
     def _refuse_ill_typed(self) -> None:
+        ill_typed = set(map(self._terms.number, self._terms.ill_typed))
         for literal in self._terms.ill_typed:
-            raise not_of(self._use(self._terms.number(literal)), literal.datatype.value)
+            use, given = self._use(self._terms.number(literal)), (it for it in self._given if it[2] in ill_typed)
+            raise not_of(use, literal.datatype.value, self._grounds(given))
 
     def _refuse_contradictions(self) -> None:
         for rule, join in self._program.contradictions:
-            self._refuse(rule, join(self._facts, self._facts))
+            self._refuse(rule, list(dict.fromkeys(join(self._facts, self._facts))))
         self._refuse_other_datatypes(self._facts)
 
-    def _refuse(self, rule: Rule, found: Iterable[tuple[Number, ...]]) -> None:
-        for culprits in found:
-            raise contradiction(rule.name, ", ".join(map(self._name, culprits)))
+    def _refuse(self, rule: Rule, found: list[tuple[Number, ...]]) -> None:
+        if found:
+            clashes = chain(*(self._program.clashes(rule, culprits, self._facts) for culprits in found))
+            given = self._grounds(chain(*clashes))
+            raise contradiction(rule.name, ", ".join(map(self._name, found[0])), given)
 
     def _refuse_other_datatypes(self, facts: Facts) -> None:
         """Refuse values that are said to be of a datatype, and are not (dt-not-type)."""
@@ -242,7 +273,8 @@ class Closure:
             if datatypes.is_datatype(self.iri(kind)):
                 for number in members & self._terms.values.keys():
                     if self.iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
-                        raise not_of(self._use(number), self.iri(kind))
+                        of_kind = (number, self._program.type, kind)
+                        raise not_of(self._use(number), self.iri(kind), self._grounds([of_kind]))
 
     def helpers(self) -> set[Number]:
         """Return the predicates that only rules speak: their own, and lists that stand for a chain or a key."""
@@ -257,12 +289,13 @@ class Closure:
         subject, predicate, object = (self._terms.forms[number][0] for number in fact)
         return (subject, predicate, object)
 
-    def _two_values(self, fact: Fact) -> Contradiction:
-        derivation = self._why(fact)
+    def _two_values(self, same: list[Fact]) -> Contradiction:
+        """Return the error of values that are said to be the same, and differ."""
+        derivation, given = self._why(same[0]), self._grounds(same)
         if derivation is None:
-            return contradiction("dt-diff", " is the same as ".join(map(self._name, fact[::2])))
+            return contradiction("dt-diff", " is the same as ".join(map(self._name, same[0][::2])), given)
         premises = (" ".join(map(show, premise)) for premise in derivation.premises)
-        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises))
+        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises), given)
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""
@@ -306,11 +339,11 @@ def show(term: Node, base: str = ID) -> str:
     return str(term)
 
 
-def contradiction(rule: str, what: str) -> Contradiction:
+def contradiction(rule: str, what: str, given: Iterable[Triple] = ()) -> Contradiction:
     """Return the error of a rule that finds a contradiction, and the terms it finds it of."""
-    return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {what}")
+    return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {what}", given)
 
 
-def not_of(use: str, datatype: str) -> Contradiction:
+def not_of(use: str, datatype: str, given: Iterable[Triple] = ()) -> Contradiction:
     """Return the error of a value, in a statement that uses it, that is not of a datatype."""
-    return contradiction("dt-not-type", f"the value is not of {shorten(datatype)} in {use}")
+    return contradiction("dt-not-type", f"the value is not of {shorten(datatype)} in {use}", given)

@@ -8,7 +8,7 @@ from functools import cache
 from pyoxigraph import NamedNode
 
 from irtwin.knowledge.owl_rl import datatypes
-from irtwin.knowledge.owl_rl.rules import Fact, Join, Number, Pattern, Rule, Term, compile_join, read_rules
+from irtwin.knowledge.owl_rl.rules import Fact, Facts, Join, Number, Pattern, Rule, Term, compile_join, read_rules
 from irtwin.knowledge.owl_rl.terms import Terms
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import PREFIXES, XSD
@@ -79,6 +79,11 @@ class Program:
                 bound = self._unified(pattern, conclusion)
                 if bound is not None:
                     yield rule, self._backward(rule, tuple(bound)), list(bound.values())
+
+    def clashes(self, rule: Rule, culprits: Sequence[Number], facts: Facts) -> Iterator[list[Fact]]:
+        """Yield what a rule that finds a contradiction finds it by, each time that it shows these culprits."""
+        for values in self._backward(rule, rule.culprits)(facts, facts, *culprits):
+            yield self.premises(rule, values)
 
     def premises(self, rule: Rule, values: Sequence[Number]) -> list[Fact]:
         """Return the body of a rule with numbers for its variables."""

@@ -29,11 +29,14 @@ from irtwin.resources import KINDS
 from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
 from irtwin.storage.database import DIAGNOSES, MESHES, TARIFF, TWINS, Workspace
+from irtwin.storage.files import inside
 from irtwin.storage.package_tables import package_tables
+from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
 from irtwin.storage.series import FOLDER, fetch_series, moved_out
-from irtwin.storage.series_place import elsewhere, look
+from irtwin.storage.series_place import asked, elsewhere, look
+from irtwin.trust import trust, withdraw
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
@@ -42,6 +45,7 @@ _NAMES = re.compile(
     rf"|(?:rows|{'|'.join((*_FOLDERS, *KINDS))}|reports/[a-z_]+)/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*"
 )
 _AT_ONCE = 5000  # rows
+_LONGEST_ROW = 100 << 20  # bytes: a robot description may have 10 MB, and is escaped
 
 
 def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
@@ -62,7 +66,8 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
                 with engine.writing(place.engine):
                     connection.execute(select(func.count()).select_from(Base.metadata.sorted_tables[0]))
                     contents = dict(_linked(place.folder, held))
-                    contents |= {f"{it.kind}/{it.name}": it.path for it in place.resources.files if it.is_of_workspace}
+                    own = (*place.resources.files, *place.resources.left_aside)
+                    contents |= {f"{it.kind}/{it.name}": it.path for it in own if it.is_of_workspace}
                 contents |= _dump_rows(connection, held)
                 named = named_files(connection)
         lost = [file for file in named if file.path not in contents]
@@ -125,9 +130,18 @@ def restore(
                         graph.replace(_read_quads(archive, held / _GRAPH), "")
         shutil.rmtree(held / "rows", ignore_errors=True)
         (held / _GRAPH).unlink(missing_ok=True)
-        if folder.exists():
-            folder.rmdir()
-        held.rename(folder)
+        _put_in_place(held, folder, series_url)
+
+
+def _put_in_place(held: Path, folder: Path, series_url: str | None) -> None:
+    """Give a workspace its place. What an earlier one there was trusted with is not this one's."""
+    withdraw(held)
+    withdraw(folder)
+    if folder.exists():
+        folder.rmdir()
+    held.rename(folder)
+    if series_url is not None:
+        trust(folder, [asked(series_url)])
 
 
 def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) -> str:
@@ -149,6 +163,7 @@ def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
         (held / name).mkdir(exist_ok=True)
         for file in filter(Path.is_file, sorted((folder / name).glob("[!.]*"))):
             target = held / name / file.name
+            file = inside(folder, f"{name}/{file.name}")  # a link may lead to what is nobody else's
             try:
                 shutil.copyfile(file, target) if name == LIVE else os.link(file, target)
             except FileNotFoundError:  # the journal of a run that is in the database now
@@ -179,22 +194,32 @@ def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> 
             f"{archive}: has no table {table.name}: made by another irtwin version; restore it with that one"
         )
     try:
-        with file.open(encoding="utf-8") as lines:
-            for rows in _in_chunks(_row(table, archive, line) for line in lines):
-                connection.execute(insert(table), rows)
-    except (ValueError, TypeError, SQLAlchemyError) as error:
-        reason = str(error).splitlines()[0]
+        for rows in _in_chunks(_row(table, archive, line) for line in _lines(file)):
+            connection.execute(insert(table), rows)
+    except (ValueError, TypeError, RecursionError, SQLAlchemyError) as error:
+        reason = str(error).splitlines()[0][:500]
         raise InputError(
             f"{archive}: the rows of table {table.name} do not fit ({reason}); use another backup"
         ) from None
 
 
-def _row(table: Table, archive: Path, line: str) -> dict[str, Any]:
+def _lines(file: Path) -> Iterator[bytes]:
+    """Yield the lines of a file; ValueError for one that no row needs."""
+    with file.open("rb") as lines:
+        while line := lines.readline(_LONGEST_ROW + 1):
+            if len(line) > _LONGEST_ROW:
+                raise ValueError(f"one has more than {_LONGEST_ROW >> 20} MB")
+            yield line
+
+
+def _row(table: Table, archive: Path, line: bytes) -> dict[str, Any]:
     row = json.loads(line)
-    if set(row) != set(table.columns.keys()):
+    if not isinstance(row, dict) or set(row) != set(table.columns.keys()):
         raise InputError(f"{archive}: table {table.name} was made by another irtwin version; restore it with that one")
     moments = [column.name for column in table.columns if isinstance(column.type, Moment) and row[column.name]]
-    return {**row, **{name: datetime.fromisoformat(row[name]) for name in moments}}
+    row |= {name: datetime.fromisoformat(row[name]) for name in moments}
+    check_row(table, row)
+    return row
 
 
 def _in_chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
-from pathlib import Path
 
 from markupsafe import Markup
 
@@ -18,13 +17,15 @@ from irtwin.report.explorer import Columns, ReadSeries
 from irtwin.report.questions import Answers, Row, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import folder, shipped
-from irtwin.storage.files import write
+from irtwin.storage.files import InsidePath, write
 
 # Yan 2018, equations (13) to (15)
 SEED_MODELLED, SEED_MEASURED, SEED_ERROR = 559.59, 598.78, 6.54  # J, J, %
 
 
-def render(graph: KnowledgeGraph, robot_iri: str, read_series: ReadSeries, out: Path, draw_scene: DrawScene) -> None:
+def render(
+    graph: KnowledgeGraph, robot_iri: str, read_series: ReadSeries, out: InsidePath, draw_scene: DrawScene
+) -> None:
     """Write the page of a robot's plan and the run that carried it out to `out`.
 
     Every number of ours comes from the questions in `reports/case_study`; samples come from the series that they name.

@@ -7,7 +7,6 @@ import gzip
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
@@ -21,7 +20,7 @@ from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, folder, shipped
-from irtwin.storage.files import write
+from irtwin.storage.files import InsidePath, write
 
 DrawScene = Callable[[Sequence[tuple[str, Columns]], int], Fragment]  # runs with their modelled series, the first shown
 
@@ -30,7 +29,7 @@ def render(
     graph: Graph,
     robot_iri: str,
     read_series: ReadSeries,
-    out: Path,
+    out: InsidePath,
     draw_scene: DrawScene | None = None,
     explain: tables.Explain | None = None,
     resources: Resources | None = None,

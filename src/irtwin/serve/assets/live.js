@@ -149,10 +149,11 @@
   const RUN = `SELECT * WHERE {
     ${iri} irt:has_Information / irt:IR_Name ?name .
     OPTIONAL {
-      { SELECT (MAX(?began) AS ?start) { ?any irt:run_of ${iri} ; a irt:Live_Run ; irt:Start_Time ?began } }
-      ?run irt:run_of ${iri} ; a irt:Live_Run ; irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
+      { SELECT (MAX(?began) AS ?start) { VALUES ?watched { irt:Live_Run irt:Replayed_Run } ?any irt:run_of ${iri} ; a ?watched ; irt:Start_Time ?began } }
+      ?run irt:run_of ${iri} ; irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
       OPTIONAL { ?run irt:Stale_Since ?since ; irt:Stale_Reason ?why }
-      OPTIONAL { ?run irt:Energy_Consumption ?energy ; irt:Energy_From ?from ; irt:Run_Power ?mean }
+      OPTIONAL { ?run irt:Energy_From ?from ; irt:Run_Power ?mean OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }
+      BIND(COALESCE(?measured, ?modelled) AS ?energy)
       OPTIONAL { ?run irt:Energy_Error ?error }
       OPTIONAL { ?run irt:performs ?planned . ?planned irt:Run_Name ?plan OPTIONAL { ?planned irt:Planned_Energy ?expected } } } }`;
   const JOINTS = `SELECT ?label ?energy { ?taken a irt:Joint_Energy ; irt:of_Run ?RUN ; irt:of_Joint ?joint ; irt:Energy ?energy .

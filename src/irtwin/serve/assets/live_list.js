@@ -2,10 +2,11 @@
 // The robots that are or were watched, the newest live run of each: asked of /sparql each second.
 (function () {
   const QUERY = `SELECT ?robot ?name ?stream ?at ?energy ?power (COUNT(DISTINCT ?alarm) AS ?alarms) WHERE {
-    { SELECT ?robot (MAX(?began) AS ?start) { ?any a irt:Live_Run ; irt:run_of ?robot ; irt:Start_Time ?began } GROUP BY ?robot }
-    ?run irt:run_of ?robot ; a irt:Live_Run ; irt:Start_Time ?start ; irt:Stream_State ?stream ; irt:State_Time ?at .
+    { SELECT ?robot (MAX(?began) AS ?start) { VALUES ?watched { irt:Live_Run irt:Replayed_Run } ?any a ?watched ; irt:run_of ?robot ; irt:Start_Time ?began } GROUP BY ?robot }
+    ?run irt:run_of ?robot ; irt:Start_Time ?start ; irt:Stream_State ?stream ; irt:State_Time ?at .
     ?robot irt:has_Information / irt:IR_Name ?name .
-    OPTIONAL { ?run irt:Energy_Consumption ?energy ; irt:Run_Power ?power }
+    OPTIONAL { ?run irt:Run_Power ?power OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }
+    BIND(COALESCE(?measured, ?modelled) AS ?energy)
     OPTIONAL { ?alarm irt:alarm_of_Run ?run ; irt:Alarm_State "active" }
   } GROUP BY ?robot ?name ?stream ?at ?energy ?power ORDER BY ?name`;
   const rows = document.getElementById("robots"), none = document.getElementById("none"), trouble = document.getElementById("trouble");

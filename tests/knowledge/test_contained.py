@@ -1,0 +1,157 @@
+"""A contradiction is contained: what clashes is set aside, alarms and conclusions of all else stay, and it is told."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyoxigraph import Literal, NamedNode, Quad, Triple
+from tests.data_sets import irtwin
+from tests.small_robots import data_set
+
+from irtwin.knowledge.contained import contain
+from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_UPDATE, OWL, RDF, term
+from irtwin.storage.database import Workspace
+from irtwin.workflow import rewriting
+
+
+def node(name: str) -> NamedNode:
+    return NamedNode(f"https://example.org/{name}")
+
+
+def said(subject: str, predicate: str | NamedNode, object: object) -> Triple:
+    return Triple(node(subject), node(predicate) if isinstance(predicate, str) else predicate, object)  # type: ignore[arg-type]
+
+
+TYPE, DISJOINT = NamedNode(RDF + "type"), NamedNode(OWL + "disjointWith")
+ONTOLOGY = {
+    said("mass", TYPE, NamedNode(OWL + "FunctionalProperty")),
+    said("Press", DISJOINT, node("Robot")),
+    said("moves", NamedNode("http://www.w3.org/2000/01/rdf-schema#domain"), node("Robot")),
+}
+INDIVIDUALS = ("a", "b", "c")
+STATEMENTS = [
+    *(said(it, "mass", Literal(value)) for it in INDIVIDUALS for value in (1, 2, 3)),
+    *(said(it, TYPE, node(kind)) for it in INDIVIDUALS for kind in ("Press", "Robot")),
+    *(said(it, "moves", node("x")) for it in INDIVIDUALS),
+    said("a", NamedNode(OWL + "sameAs"), node("b")),
+    said("a", NamedNode(OWL + "differentFrom"), node("b")),
+]
+
+
+def is_sound(statements: set[Triple]) -> bool:
+    try:
+        Closure(ONTOLOGY | statements)
+    except Contradiction:
+        return False
+    return True
+
+
+@settings(max_examples=60)
+@given(st.sets(st.sampled_from(STATEMENTS)))
+def test_what_is_left_is_sound_and_only_what_clashes_is_set_aside(premises: set[Triple]) -> None:
+    if is_sound(premises):
+        return
+    with pytest.raises(Contradiction) as clash:
+        Closure(ONTOLOGY | premises)
+    aside, _ = contain(clash.value, ONTOLOGY, premises, lambda out: Closure(ONTOLOGY | (premises - out)))
+    assert aside.statements
+    assert is_sound(premises - aside.statements)
+    joined = said("a", NamedNode(OWL + "sameAs"), node("b")) in premises
+    for each in aside.statements:  # each has part in a clash among statements about the same individual
+        own = {it for it in premises if joined or it.subject == each.subject}
+        assert not is_sound(own)
+
+
+def test_an_individual_that_is_sound_keeps_all_that_is_said_of_it() -> None:
+    premises = {said("a", "mass", Literal(1)), said("a", "mass", Literal(2)), said("b", "mass", Literal(1))}
+    with pytest.raises(Contradiction) as clash:
+        Closure(ONTOLOGY | premises)
+    aside, _ = contain(clash.value, ONTOLOGY, premises, lambda out: Closure(ONTOLOGY | (premises - out)))
+    assert aside.statements == {said("a", "mass", Literal(1)), said("a", "mass", Literal(2))}
+
+
+def test_many_clashes_of_a_kind_are_found_at_once() -> None:
+    premises = {said(f"run{n}", "mass", Literal(value)) for n in range(50) for value in (n, n + 0.5)}
+    looks = []
+
+    def infer(out: set[Triple]) -> Closure:
+        looks.append(out)
+        return Closure(ONTOLOGY | (premises - out))
+
+    aside, _ = contain(Contradiction("clash"), ONTOLOGY, premises, infer)  # type: ignore[arg-type]
+    assert aside.statements == premises
+    assert len(looks) == 2
+
+
+def test_an_ontology_of_itself_is_not_doubted() -> None:
+    wrong = ONTOLOGY | {said("r", TYPE, node("Robot")), said("r", TYPE, node("Press"))}
+    with pytest.raises(Contradiction, match="cax-dw"):
+        contain(Contradiction("clash"), wrong, set(), lambda out: Closure(wrong - out))
+
+
+# A workspace ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    for seed, name in enumerate(("First", "Second"), start=1):
+        done = irtwin("run", data_set(folder / name, name, seed=seed), "--workspace", folder / "workspace")
+        assert done.status == 0, done.err
+    return folder / "workspace"
+
+
+@pytest.fixture
+def workspace(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "workspace"))
+
+
+def second_payload(workspace: Path) -> str:
+    """Say a second payload of a run of the first robot; return the run."""
+    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+        run = next(str(row["run"]) for row in graph.query("SELECT ?run { ?run irt:Payload ?kg } ORDER BY ?run"))
+        payload = Quad(NamedNode(run), NamedNode(term("Payload")), Literal(5.5), NamedNode(GRAPH_UPDATE))
+        graph.change((), {payload})
+    return run
+
+
+def concluded(workspace: Path) -> set[Quad]:
+    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
+        return {quad for name in graph.graphs(GRAPH_INFERRED) for quad in graph.quads_in(name)}
+
+
+@pytest.mark.slow
+def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(workspace: Path) -> None:
+    before = concluded(workspace)
+    run = second_payload(workspace)
+    done = irtwin("reason", "--workspace", workspace)
+    assert done.status == 3
+    assert done.err.splitlines()[-1].startswith(f"irtwin: {workspace}: statements contradict each other (OWL 2 RL rule")
+    lost = before - concluded(workspace)
+    assert {str(quad.subject.value) for quad in lost} <= {run}  # type: ignore[union-attr]
+    told = irtwin("alarms", "--workspace", workspace)
+    assert told.status == 0
+    assert "contradiction" in told.out and "First" in told.out
+    status = irtwin("status", "--workspace", workspace)
+    assert status.status == 2
+    assert "statements contradict each other" in status.out
+
+
+@pytest.mark.slow
+def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> None:
+    before = concluded(workspace)
+    second_payload(workspace)
+    assert irtwin("reason", "--workspace", workspace).status == 3
+    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+        graph.change(set(graph.quads_in(GRAPH_UPDATE)), ())
+        assert reason(graph).set_aside == ()
+    assert concluded(workspace) == before
+    assert irtwin("status", "--workspace", workspace).status == 0
+    assert "contradiction" not in irtwin("alarms", "--workspace", workspace).out

@@ -1,0 +1,69 @@
+"""A replay is watched like a robot, and no total of consumption counts it, nor what a simulator wrote."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from tests.data_sets import irtwin
+from tests.small_robots import data_set
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.storage.database import Workspace
+
+pytestmark = pytest.mark.slow
+
+CONSUMPTION = ("fleet_totals", "energy_per_robot", "energy_per_day", "energy_per_month", "energy_per_effect",
+               "energy_per_joint", "busiest_days", "fleet_ranking", "standstill_waste")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    done = irtwin("run", data_set(folder / "data", "Arm"), "--workspace", folder / "workspace")
+    assert done.status == 0, done.err
+    return folder
+
+
+def totals(workspace: Path) -> dict[str, str]:
+    return {name: irtwin("query", name, "--workspace", workspace, "--format", "csv").out for name in CONSUMPTION}
+
+
+def test_a_replay_changes_no_total_and_is_said_to_be_one(made: Path, tmp_path: Path) -> None:
+    workspace = Path(shutil.copytree(made / "workspace", tmp_path / "workspace"))
+    before = totals(workspace)
+    assert all(len(answer.splitlines()) > 1 for answer in before.values())
+    log = next((made / "data" / "runs").iterdir())
+    live = irtwin("live", "--replay", log, "--robot", "Arm", "--speed", "100", "--workspace", workspace)
+    assert live.status == 0, live.err
+    assert totals(workspace) == before
+    assert irtwin("reason", "--workspace", workspace).status == 0
+    assert totals(workspace) == before
+    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
+        (run,) = graph.query(
+            "SELECT ?energy ?modelled ?took { ?run a irt:Replayed_Run ; irt:Energy_From ?from "
+            "OPTIONAL { ?run irt:Modelled_Energy ?modelled } OPTIONAL { ?run irt:Energy_Consumption ?took } }"
+        )
+        assert run["took"] is None and run["modelled"] is not None
+    assert "1 replayed" in irtwin("status", "--workspace", workspace).out
+    assert irtwin("run", made / "data", "--workspace", workspace).status == 0  # which keeps it
+    assert "1 replayed" in irtwin("status", "--workspace", workspace).out
+
+
+def test_what_a_simulator_wrote_is_no_consumption(made: Path, tmp_path: Path) -> None:
+    data = Path(shutil.copytree(made / "data", tmp_path / "data"))
+    text = (data / "dataset.toml").read_text(encoding="utf-8")
+    head, *runs = text.split("[[run]]")
+    simulated = [re.sub('role = "[a-z]+"', 'role = "simulated"', run) for run in runs]
+    (data / "dataset.toml").write_text("[[run]]".join([head, *simulated]), encoding="utf-8")
+    done = irtwin("run", data, "--workspace", tmp_path / "workspace")
+    assert done.status == 0, done.err
+    with Workspace.existing(tmp_path / "workspace") as place, KnowledgeGraph.of_workspace(place) as graph:
+        (count,) = graph.query("SELECT (COUNT(?run) AS ?runs) (COUNT(?took) AS ?energies) { ?run a irt:Simulated_Run "
+                               "OPTIONAL { ?run irt:Energy_Consumption ?took } }")  # fmt: skip
+        assert count["runs"] == len(runs) and count["energies"] == 0
+        (total,) = graph.query("SELECT ?runs ?energy { ?t a irt:Robot_Total ; irt:Run_Count ?runs "
+                               "OPTIONAL { ?t irt:Total_Energy ?energy } }")  # fmt: skip
+        assert (total["runs"], total["energy"]) == (0, None)

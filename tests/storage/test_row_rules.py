@@ -1,0 +1,80 @@
+"""Rows that another program changed are told before anything is made of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from sqlalchemy import Table
+from tests import rows
+
+from irtwin.storage.row_rules import check_row
+from irtwin.storage.rows import values
+from irtwin.storage.schema import Base, Individuals, Joint, Robot, Run, Series
+
+SERIES = {
+    "series_id": "a" * 64,
+    "run_id": f"{rows.ROBOT}.work",
+    "kind": "measured",
+    "path": f"series/{'a' * 64}.parquet",
+    "row_count": 5,
+    "columns": "time",
+    "activity_id": None,
+}
+
+
+def row_of(table: type[Base]) -> dict[str, Any]:
+    if table is Series:
+        return dict(SERIES)
+    if table is Individuals:
+        return {"base_iri": "https://plant.example/energy/"}
+    return values({Robot: rows.robot, Joint: lambda: rows.joints()[0], Run: lambda: rows.run("work")}[table]())
+
+
+@pytest.mark.parametrize("table", [Robot, Joint, Run, Series, Individuals])
+def test_what_irtwin_writes_is_taken(table: type[Base]) -> None:
+    check_row(of(table), row_of(table))
+
+
+def test_names_of_any_script_are_taken() -> None:
+    check_row(of(Robot), row_of(Robot) | {"robot_id": "~0123456789abcdef", "name": "焊接机器人"})
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "value"),
+    [
+        (Robot, "robot_id", "../../../x"),
+        (Robot, "robot_id", ""),
+        (Robot, "robot_id", None),
+        (Robot, "robot_id", "a/b"),
+        (Robot, "robot_id", "a" * 300),
+        (Robot, "robot_id", 5),
+        (Robot, "name", "a\0b"),
+        (Robot, "name", "\ud800"),
+        (Robot, "controlled_axes", 10**30),
+        (Robot, "controlled_axes", True),
+        (Robot, "weight_kg", "50"),
+        (Robot, "weight_kg", math.inf),
+        (Robot, "simulated", "yes"),
+        (Joint, "robot_id", ".."),
+        (Run, "run_id", f"{rows.ROBOT}/../x"),
+        (Run, "run_id", "other.work"),
+        (Run, "repeat_of", "../work"),
+        (Run, "kind", "Any_Run"),
+        (Run, "start_time", "yesterday"),
+        (Series, "series_id", "../x"),
+        (Series, "path", "/etc/passwd"),
+        (Series, "path", "series/../../x"),
+        (Series, "path", "series/.x"),
+        (Individuals, "base_iri", "file:///etc/"),
+    ],
+)
+def test_what_irtwin_would_not_write_is_told(table: type[Base], column: str, value: object) -> None:
+    with pytest.raises(ValueError, match=column):
+        check_row(of(table), row_of(table) | {column: value})
+
+
+def of(table: type[Base]) -> Table:
+    assert isinstance(table.__table__, Table)
+    return table.__table__
