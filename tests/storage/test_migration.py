@@ -32,6 +32,7 @@ from irtwin.storage.revisions.versions import (
     r0006_notes_of_robots,
     r0007_scale_of_torque,
     r0008_times_of_runs,
+    r0009_no_consumption,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -136,6 +137,7 @@ def test_each_revision_follows_another() -> None:
     assert r0004_halves_of_the_time.down_revision == r0003_made_and_slower.revision
     assert r0007_scale_of_torque.down_revision == r0006_notes_of_robots.revision
     assert r0008_times_of_runs.down_revision == r0007_scale_of_torque.revision
+    assert r0009_no_consumption.down_revision == r0008_times_of_runs.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -231,6 +233,18 @@ def test_notes_become_rows() -> None:
     expected.add(("tools", 2, "welder"))
     assert {tuple(row) for row in found} == {("Arm_A", *row) for row in expected}
     assert ("supply.voltage", 1, "400") in expected
+
+
+def test_what_a_simulator_wrote_loses_its_consumption() -> None:
+    with create_engine("sqlite://").begin() as connection:
+        connection.execute(text("CREATE TABLE run (run_id VARCHAR, role VARCHAR)"))
+        connection.execute(text("INSERT INTO run VALUES ('Arm_A.1', 'observed'), ('Arm_A.2', 'simulated')"))
+        connection.execute(text("CREATE TABLE run_energy (run_id VARCHAR, energy_consumption_j FLOAT NOT NULL)"))
+        connection.execute(text("INSERT INTO run_energy VALUES ('Arm_A.1', 5.0), ('Arm_A.2', 7.0)"))
+        with Operations.context(MigrationContext.configure(connection)):
+            r0009_no_consumption.upgrade()
+        found = connection.execute(text("SELECT run_id, energy_consumption_j FROM run_energy ORDER BY run_id")).all()
+        assert [*map(tuple, found)] == [("Arm_A.1", 5.0), ("Arm_A.2", None)]
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:
