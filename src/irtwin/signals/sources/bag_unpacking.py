@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     import apsw
 
 _LARGEST_CHUNK = 256_000_000  # bytes; recorders take chunks of a MB or so
-_RECORD = 64  # bytes that a record of ROS 1 counts for: its header is parsed field by field
+_RECORD = 128  # bytes that a record of ROS 1 counts for: its header is parsed field by field
+_ENTRY = 8  # bytes that one of ROS 1's index counts for: it is held as an object
 _LEAST = 10_000  # bytes of a text that SQLite is to take from a bag of fewer: questions are such texts, too
 _STEPS = 10_000  # of SQLite's machine, of which a row takes some twenty, and counts as many bytes
 _REMEDY = "record the run again, or keep its topics alone"
@@ -85,7 +86,7 @@ def _index(plain: Callable[..., None], unpacking: Unpacking) -> Callable[..., No
     def read(reader: Any, *arguments: Any) -> None:
         before = reader.bio.tell()
         plain(reader, *arguments)
-        unpacking.take(reader.bio.tell() - before, "its index", _REMEDY)
+        unpacking.take(_ENTRY * (reader.bio.tell() - before), "its index", _REMEDY)
 
     return read
 
