@@ -102,7 +102,7 @@ def test_files_that_are_no_twin(tmp_path, content):
         load(tmp_path / "none.json")
 
 
-def test_json_in_json_without_end_is_told(tmp_path: Path) -> None:
+def test_json_in_json_without_end_is_told(tmp_path):
     path = tmp_path / "twin.json"
     path.write_text("[" * 200_000)
     with pytest.raises(InputError, match=r"twin\.json: not JSON"):
