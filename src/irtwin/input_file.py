@@ -14,7 +14,7 @@ _ALWAYS, _TIMES = 64_000_000, 10  # bytes that a packed file may unpack to, and 
 class Unpacking:
     """What a packed file unpacks to, counted before it does, for a few kB may hold gigabytes.
 
-    A log shrinks to a fifth or so; one that shrinks more is let pass up to 64 MB.
+    Logs shrink less than tenfold; one that shrinks more is let pass up to 64 MB.
     """
 
     def __init__(self, path: Path, packed: int) -> None:

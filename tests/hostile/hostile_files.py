@@ -1,7 +1,7 @@
 """Small files that ask their reader for much: a name each, and a function that writes it.
 
 `FILES` are logs; the end of a name is that of the file. Each is below 10 MB, a little beyond what is allowed, and made
-in a moment; ten times as much of each took minutes or gigabytes.
+in a moment.
 """
 
 from __future__ import annotations
