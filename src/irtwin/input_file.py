@@ -8,6 +8,29 @@ from pathlib import Path
 
 from irtwin.errors import InputError
 
+_ALWAYS, _TIMES = 64_000_000, 10  # bytes that a packed file may unpack to, and how many times its own size beside
+
+
+class Unpacking:
+    """What a packed file unpacks to, counted before it does, for a few kB may hold gigabytes.
+
+    Logs shrink less than tenfold; one that shrinks more is let pass up to 64 MB.
+    """
+
+    def __init__(self, path: Path, packed: int) -> None:
+        self.path, self.packed = path, packed
+        self.most = _ALWAYS + _TIMES * packed
+        self.left = self.most
+
+    def take(self, size: int, what: str, remedy: str) -> None:
+        """Count some bytes more. Raises InputError, naming the part that is too much."""
+        self.left -= size
+        if self.left < 0:
+            raise InputError(
+                f"{self.path}: {what}: more than the {self.most // 1_000_000} MB that a file of this size may unpack "
+                f"to; {remedy}"
+            )
+
 
 def read_input(path: Path, most: int) -> bytes:
     """Return a file's content. Raises InputError where it cannot be read or has more than `most` bytes."""

@@ -92,6 +92,11 @@ def test_a_folder_whose_name_no_disk_takes(tmp_path):
     assert "not found" in refused_unread(tmp_path / ("x" * 5000))
 
 
+def test_a_table_of_keys_without_end(folder):
+    rewrite(folder, "^role.*$", 'role = "observed"\n' + "\n".join(f"rolle_{k} = 1" for k in range(1001)))
+    assert re.search(r"run has \d+ keys; keep at most 1000 in a table", refused(folder))
+
+
 @pytest.mark.parametrize("year", ["0001", "1899", "2201", "9999"])
 def test_a_run_of_no_age(folder, year):
     rewrite(folder, "^role.*$", f"started = {year}-12-31T23:59:59+14:00")
@@ -134,7 +139,7 @@ ROWS = b"".join(b"%g,0.1,1\n" % (row / 100) for row in range(30))
         (b"\xff\xfetime\n" + ROWS, "line 1: not UTF-8 text"),
         (b"time,q_a\n0,1,\xe9,2\n" + ROWS, "line 2: not UTF-8 text"),
         (b"time,q_joint_1,tau_joint_1\n0,\x00,1\n" + ROWS, "line 2, column q_joint_1"),
-        (b"\x00" * 1000 + b"\n" + ROWS, "missing|values"),
+        (b"\x00" * 1000 + b"\n" + ROWS, "column 1, .* has 1000 characters"),
         (b'time,"q_joint_1,tau_joint_1\n' + ROWS, "not readable as CSV"),
     ],
     ids=range(9),

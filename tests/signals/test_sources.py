@@ -127,5 +127,5 @@ def test_sizes_are_bounded() -> None:
     source.check_size(MOST_VALUES, 1)
     with pytest.raises(InputError, match="has no sample"):
         source.check_size(0, 3)
-    with pytest.raises(InputError, match="a run may have 100,000,000 values: cut it into several"):
+    with pytest.raises(InputError, match="a run may have 125,000,000 values: cut it into several"):
         source.check_size(MOST_VALUES, 2)

@@ -102,6 +102,13 @@ def test_files_that_are_no_twin(tmp_path, content):
         load(tmp_path / "none.json")
 
 
+def test_json_in_json_without_end_is_told(tmp_path):
+    path = tmp_path / "twin.json"
+    path.write_text("[" * 200_000)
+    with pytest.raises(InputError, match=r"twin\.json: not JSON"):
+        load(path)
+
+
 def test_an_effect_of_a_shape_is_written_with_it(tmp_path):
     shaped = ExternalContact(start=-np.inf, stop=4.0, joints=("joint_2",), runs=("swing_1",))
     twin = identify(ROBOT, [MOTION], (*BASELINE, shaped))

@@ -74,6 +74,7 @@ _ELSEWHERE = frozenset(
     ]
 )
 _MOTOR = frozenset(["motor", "mot", "motors", "drive", "rotor", "antrieb", "encoder", "enc"])
+_LONGEST = 12  # parts of a name that may write a unit, and what joins them: rad per s 2 has seven
 _TOKEN = re.compile(r"[^\W\d_]+|\d+")
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
 _CAMEL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")
@@ -144,7 +145,8 @@ def _unit(field: str, text: str | None) -> Unit | None:
 def _unit_within(name: str, field: str) -> tuple[str, Unit] | None:
     """Return a name without the unit of its field that stands in it, as deg_s does, and that unit."""
     parts = re.split(r"([_\s.\-]+)", name)  # texts at even places
-    spans = [(start, stop) for start in range(0, len(parts), 2) for stop in range(start + 1, len(parts) + 1, 2)]
+    starts = range(0, len(parts), 2)
+    spans = [(start, stop) for start in starts for stop in range(start + 1, min(start + _LONGEST, len(parts) + 1), 2)]
     for start, stop in sorted(spans, key=lambda span: span[0] - span[1]):
         text, rest = "".join(parts[start:stop]), "".join(parts[:start] + parts[stop:])
         at_end = stop == len(parts)

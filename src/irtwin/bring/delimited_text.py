@@ -16,7 +16,8 @@ from irtwin.bring.head import LOOKED_AT, Head, head_of, numbers_in
 from irtwin.bring.recording import Recording, as_columns
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
-from irtwin.signals.sources.source import first_line
+from irtwin.signals.sources.csv_source import csv_fault
+from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS
 
 _LARGEST = 1_000_000_000  # bytes
 _DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -44,6 +45,7 @@ def read_text(path: Path) -> Recording:
     text = _decoded(path, read_input(path, _LARGEST)).replace("\r\n", "\n").rstrip()
     lines = text.split("\n", 2 * LOOKED_AT)[: 2 * LOOKED_AT]
     kept = [number for number, line in enumerate(lines) if line.strip()][:LOOKED_AT]
+    _check_lines(path, lines)
     form = _form(path, [lines[number] for number in kept])
     before = kept[form.head.first]
     _check_names(path, form)
@@ -61,6 +63,19 @@ def read_text(path: Path) -> Recording:
         first=before + 1,
         counted="line",
     )
+
+
+def _check_lines(path: Path, lines: Sequence[str]) -> None:
+    """Raise InputError where one of the first lines is longer, or has more values, than a log's."""
+    for number, line in enumerate(lines, start=1):
+        if len(line) > LONGEST_LINE:
+            raise InputError(f"{path}, line {number}: is longer than {LONGEST_LINE // 1_000_000} MB; export it again")
+        values = max(line.count(delimiter) for delimiter in _DELIMITERS if delimiter != " ") + 1
+        if values > MOST_COLUMNS:
+            raise InputError(
+                f"{path}, line {number}: {values} columns; a run has at most {MOST_COLUMNS}: leave out what nobody "
+                "needs"
+            )
 
 
 def _form(path: Path, lines: Sequence[str]) -> Form:
@@ -102,7 +117,12 @@ def _decimal(samples: Sequence[Sequence[str]], delimiter: str) -> str:
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    return line.split() if delimiter == " " else next(csv.reader([line], delimiter=delimiter), [])
+    if delimiter == " ":
+        return line.split(maxsplit=MOST_COLUMNS)
+    try:
+        return next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:  # a cell beyond 128 kB: this delimiter makes no columns of the line
+        return [line]
 
 
 def _decoded(path: Path, content: bytes) -> str:
@@ -140,7 +160,7 @@ def _table(path: Path, body: str, form: Form, names: list[str], before: int) -> 
             ),
         )
     except pa.ArrowException as error:
-        raise InputError(f"{path}: not readable as {form} ({first_line(error)}); export it again") from error
+        raise InputError(f"{path}: not readable as {form} ({csv_fault(error)}); export it again") from error
     if wrong:
         line, has, expected = wrong[0]
         raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,17 +10,19 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet
 
 from irtwin.bring.head import MISSING
 from irtwin.errors import InputError
-from irtwin.input_file import check_file
 from irtwin.robot.description import Robot
 from irtwin.signals.sources.catalogue import registered, source_of
-from irtwin.signals.sources.source import MOST_COLUMNS, MOST_VALUES, first_line
+from irtwin.signals.sources.parquet_file import is_text, open_parquet, read_columns
+from irtwin.signals.sources.source import check_names, check_values
 
 BAGS = (".bag", ".mcap", ".db3")
 SHEETS = (".xlsx", ".xlsm")
+_TRIED = 50  # cells that tell whether a column of text holds numbers or times
+_YEARS = (1677, 2262)  # beyond, nanoseconds since 1970 are no int64
+_BEYOND = "times before 1678 or after 2261"
 
 
 @dataclass(frozen=True)
@@ -72,29 +75,31 @@ def as_columns(path: Path, table: pa.Table, places: tuple[str, int]) -> tuple[di
     one's number. Raises InputError, naming file, place and column.
     """
     names = [name.strip() for name in table.column_names]
-    if len(names) > MOST_COLUMNS or len(names) * table.num_rows > MOST_VALUES:
-        raise InputError(
-            f"{path}: {len(names)} columns of {table.num_rows} rows are too many; cut the log into several"
-        )
-    repeated = next((name for name in names if names.count(name) > 1), None) if len(set(names)) < len(names) else None
-    if repeated is not None:
-        raise InputError(f"{path}: column {repeated} occurs twice; keep one, or give each a name of its own")
+    check_names(path, names)
+    check_values(path, table.num_rows, len(names))
+    _check_once(path, names)
     columns: dict[str, np.ndarray] = {}
     for name, column in zip(names, table.columns, strict=True):
-        values = _values(column)
-        if values is None:
-            values = _parsed(path, name, column.to_pylist(), places)
+        values = _values(path, name, column, places)
         if values is not None:
             columns[name] = values
     return columns, tuple(name for name in names if name not in columns)
 
 
-def _values(column: pa.ChunkedArray) -> np.ndarray | None:
+def _check_once(path: Path, names: Sequence[str]) -> None:
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        raise InputError(f"{path}: column {repeated[0]} occurs twice; keep one, or give each a name of its own")
+
+
+def _values(path: Path, name: str, column: pa.ChunkedArray, places: tuple[str, int]) -> np.ndarray | None:
     kind = column.type
-    if pa.types.is_timestamp(kind):
-        return np.asarray(column.cast(pa.timestamp("ns")).to_numpy()).astype("datetime64[ns]")
-    if pa.types.is_boolean(kind):
-        return None
+    if is_text(kind):
+        return _parsed(path, name, column, places)
+    if pa.types.is_dictionary(kind):
+        return _values(path, name, column.cast(kind.value_type), places)
+    if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
+        return _instants(path, name, column)
     if pa.types.is_integer(kind) and column.null_count == 0:
         return np.asarray(column.to_numpy())  # whole: nanoseconds since 1970 are beyond a float
     if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind):
@@ -104,22 +109,38 @@ def _values(column: pa.ChunkedArray) -> np.ndarray | None:
     return None
 
 
-def _parsed(path: Path, name: str, cells: Sequence[object], places: tuple[str, int]) -> np.ndarray | None:
-    """Return a column of text as times or numbers; None where most of it is neither."""
-    texts = [None if cell is None or str(cell).strip().lower() in MISSING else str(cell).strip() for cell in cells]
-    known = [text for text in texts if text is not None]
-    if not known:
-        return np.full(len(cells), np.nan)
+def _instants(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
+    try:
+        return np.asarray(column.cast(pa.timestamp("ns")).to_numpy()).astype("datetime64[ns]")
+    except pa.ArrowInvalid as error:
+        raise InputError(f"{path}: column {name} has {_BEYOND}; correct it, or leave it out") from error
+
+
+def _parsed(path: Path, name: str, column: pa.ChunkedArray, places: tuple[str, int]) -> np.ndarray | None:
+    """Return a column of text as times or numbers; None where most of it is neither. Each text is read once."""
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    encoded = column.unify_dictionaries().combine_chunks()
+    encoded = encoded.chunk(0) if isinstance(encoded, pa.ChunkedArray) else encoded
+    cells = [text.strip() for text in encoded.dictionary.to_pylist()]
+    texts = np.array([*(None if cell.lower() in MISSING else cell for cell in cells), None], dtype=object)
+    place = pc.fill_null(encoded.indices, len(cells)).to_numpy(zero_copy_only=False).astype(np.int64)
+    known = np.array([text is not None for text in texts])[place]
+    if not known.any():
+        return np.full(len(place), np.nan)
+    first = place[np.flatnonzero(known)[:_TRIED]]
     for parse, missing in ((_number, float("nan")), (_instant, np.datetime64("NaT"))):
-        if sum(parse(text) is not None for text in known[:50]) * 2 <= len(known[:50]):
+        if sum(parse(texts[one]) is not None for one in first) * 2 <= len(first):
             continue
-        values = [missing if text is None else parse(text) for text in texts]
-        if (bad := next((row for row, value in enumerate(values) if value is None), None)) is not None:
+        read = [missing if text is None else parse(text) for text in texts]
+        bad = np.array([value is None for value in read])[place]
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
             raise InputError(
-                f"{path}, {places[0]} {bad + places[1]}, column {name}: {str(texts[bad])[:40]!r} is no "
+                f"{path}, {places[0]} {row + places[1]}, column {name}: {texts[place[row]][:40]!r} is no "
                 f"{'number' if parse is _number else 'time'}; correct it, or leave the cell blank"
             )
-        return np.array(values)
+        return np.asarray(np.array(read)[place])
     return None
 
 
@@ -135,26 +156,31 @@ def _instant(text: str) -> np.datetime64 | None:
     from datetime import UTC, datetime
 
     whole, sign, rest = text.replace(",", ".").partition(".")
-    digits = rest[: next((place for place, sign in enumerate(rest) if not sign.isdigit()), len(rest))]
+    digits = rest[: next((place for place, sign in enumerate(rest) if not sign.isdecimal()), len(rest))]
     try:
         moment = datetime.fromisoformat(whole + rest[len(digits) :])
-    except ValueError:
+        zoned = moment if moment.tzinfo is None else moment.astimezone(UTC).replace(tzinfo=None)
+    except (ValueError, OverflowError):  # before the year 1 in UTC
         return None
-    zoned = moment if moment.tzinfo is None else moment.astimezone(UTC).replace(tzinfo=None)
+    if not _YEARS[0] < zoned.year < _YEARS[1]:
+        return None
     return np.datetime64(zoned, "ns") + np.timedelta64(int((digits + "000000000")[:9]) if sign else 0, "ns")
 
 
 def _parquet(path: Path) -> Recording:
-    check_file(path)
-    try:
-        file = pyarrow.parquet.ParquetFile(path)
-        if file.metadata.num_rows * len(file.schema_arrow) > MOST_VALUES:
-            raise InputError(f"{path}: more than {MOST_VALUES:,} values; cut the log into several")
-        table = file.read()
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: not a readable Parquet file ({first_line(error)}); export the log again") from error
+    with open_parquet(path) as file:
+        schema = file.schema_arrow
+        _check_once(path, schema.names)
+        # what is no one value a row is no signal: it is not read, for one row may hold millions
+        names = [each.name for each in schema if not pa.types.is_nested(each.type) and not _is_binary(each.type)]
+        table = read_columns(path, file, names)
     columns, texts = as_columns(path, table, ("row", 1))
-    return Recording(path, "Parquet", columns, texts)
+    others = [name.strip() for name in schema.names if name not in names]
+    return Recording(path, "Parquet", columns, (*texts, *others))
+
+
+def _is_binary(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_binary(kind) or pa.types.is_large_binary(kind) or pa.types.is_fixed_size_binary(kind))
 
 
 def _of_package(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:

@@ -11,12 +11,15 @@ import pyarrow as pa
 
 from irtwin.bring.head import LOOKED_AT, head_of
 from irtwin.bring.recording import Recording, as_columns
+from irtwin.bring.workbook_parts import check_parts
 from irtwin.errors import InputError
-from irtwin.input_file import check_file
+from irtwin.input_file import Unpacking, check_file
 from irtwin.signals.samples import FEWEST
 from irtwin.signals.sources.source import MOST_COLUMNS, first_line
 
-_LARGEST = 1_000_000_000  # bytes, inflated
+_MOST_ROWS = 1 << 20  # Excel's own limit
+_BYTES = 8  # of a cell, blank ones between others included, and of a row
+_REMEDY = "save the log as CSV, without blank rows and columns"
 
 
 def read_sheet(path: Path) -> Recording:
@@ -29,12 +32,10 @@ def read_sheet(path: Path) -> Recording:
         ) from error
     check_file(path)
     try:
-        with zipfile.ZipFile(path) as packed:
-            if sum(part.file_size for part in packed.infolist()) > _LARGEST:
-                raise InputError(f"{path}: is larger than 1 GB; save the log as CSV")
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        check_parts(path)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
         try:
-            sheets = {sheet.title: _rows(sheet) for sheet in book.worksheets}
+            sheets = _sheets(path, book)
         finally:
             book.close()
     except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, SyntaxError) as error:
@@ -49,13 +50,39 @@ def read_sheet(path: Path) -> Recording:
     return _recording(path, title, rows)
 
 
-def _rows(sheet: Any) -> list[tuple[Any, ...]]:
-    """Return a sheet's rows, without blank ones at its end; rows are of one length."""
+def _sheets(path: Path, book: Any) -> dict[str, list[tuple[Any, ...]]]:
+    """Return the rows of each sheet. Raises InputError where they are too many."""
+    parts = [sheet._worksheet_path for sheet in book.worksheets]
+    if len(set(parts)) < len(parts):
+        raise InputError(f"{path}: two sheets are one and the same part of the file; save it again")
+    unpacking = Unpacking(path, path.stat().st_size)
+    return {sheet.title: _rows(path, sheet, unpacking) for sheet in book.worksheets}
+
+
+def _rows(path: Path, sheet: Any, unpacking: Unpacking) -> list[tuple[Any, ...]]:
+    """Return a sheet's rows, without blank ones at its end; rows are of one length.
+
+    They are counted as they come, for a row may say that it stands far below, and a cell far to the right.
+    """
     sheet.reset_dimensions()  # what a file says of its size may be wrong
-    rows = [row[:MOST_COLUMNS] for row in sheet.iter_rows(values_only=True)]
-    while rows and all(cell is None for cell in rows[-1]):
-        rows.pop()
-    width = max((len(row) for row in rows), default=0)
+    rows: list[tuple[Any, ...]] = []
+    blank = width = 0
+    for number, row in enumerate(sheet.iter_rows(values_only=True), start=1):
+        place = f"sheet {sheet.title[:40]}, row {number}"
+        if number > _MOST_ROWS:
+            raise InputError(f"{path}, {place}: a sheet has at most {_MOST_ROWS:,} rows; {_REMEDY}")
+        if len(row) > MOST_COLUMNS:
+            raise InputError(f"{path}, {place}: {len(row)} columns; a run has at most {MOST_COLUMNS}: {_REMEDY}")
+        held = len(rows) * width
+        if all(cell is None for cell in row):
+            blank += 1
+        else:
+            rows += [
+                (),
+            ] * blank
+            rows.append(row)
+            blank, width = 0, max(width, len(row))
+        unpacking.take(_BYTES * (1 + len(rows) * width - held), place, _REMEDY)
     return [(*row, *[None] * (width - len(row))) for row in rows]
 
 
@@ -73,8 +100,12 @@ def _recording(path: Path, title: str, rows: list[tuple[Any, ...]]) -> Recording
 
 
 def _cells(column: tuple[Any, ...]) -> pa.Array:
-    """Return a column as numbers or times where all its cells are, else as text."""
-    try:
-        return pa.array(column)
-    except pa.ArrowException:
-        return pa.array([None if cell is None else str(cell) for cell in column])
+    """Return a column as numbers or times where all its cells are, else as text: each once, for many may share it."""
+    if not any(isinstance(cell, str) for cell in column):
+        try:
+            return pa.array(column)
+        except (pa.ArrowException, OverflowError):  # of two kinds, or an integer of hundreds of digits
+            pass
+    places: dict[str, int] = {}
+    indices = [None if cell is None else places.setdefault(str(cell), len(places)) for cell in column]
+    return pa.DictionaryArray.from_arrays(pa.array(indices, pa.int32()), pa.array(places, pa.large_string()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime, timedelta
@@ -154,7 +153,7 @@ def read_log(
     run = Run(
         name=file.stem,
         file=file,
-        sha256=hashlib.sha256(file.read_bytes()).hexdigest(),
+        sha256=checksum(file),
         role="observed",
         payload_mass=payload_mass,
         payload_com=payload_com,

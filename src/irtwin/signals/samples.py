@@ -14,7 +14,7 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, REQUIRED, Channel, Signals, by_column, from_columns
 from irtwin.signals.sources.catalogue import source_of
-from irtwin.signals.sources.source import MOST_COLUMNS, Source
+from irtwin.signals.sources.source import Source, check_names
 
 FEWEST = 20  # samples; fewer cannot be filtered
 
@@ -52,8 +52,7 @@ def read_signals(
 def _known(columns: Sequence[str], channels: Mapping[str, Channel], robot: Robot, path: Path) -> list[str]:
     """Return those columns that the log format knows; raise on missing, repeated, foreign ones."""
     names = [name.strip() for name in columns]
-    if len(names) > MOST_COLUMNS:
-        raise InputError(f"{path}: {len(names)} columns; a run has at most {MOST_COLUMNS}")
+    check_names(path, names)
     repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InputError(f"{path}: column {repeated[0]} occurs twice; keep one")

@@ -18,6 +18,7 @@ BAG_FOLDER = "metadata.yaml"  # what a folder that is a ROS 2 bag holds
 _LARGEST = 20_000_000  # bytes
 _GREATEST = 1e300  # of a number
 _DEEPEST = 32  # tables in tables
+_MOST_KEYS = 1000  # of a table: each that nobody knows is held against those that are known
 _KEY = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DOTTED = re.compile(rf"(?:^|[\[{{,])[ \t]*{_KEY}(?:[ \t]*\.[ \t]*{_KEY}){{{_DEEPEST},}}[ \t]*[=\]]", re.MULTILINE)
 _NEAR, _VERY_NEAR = 0.7, 0.8  # share of letters in common of a key and its misspelling (`difflib`)
@@ -125,6 +126,10 @@ def _check_values(value: Any, file: Path, name: str, depth: int) -> None:
         raise InputError(f"{file}: {name} is a number beyond {_GREATEST:g}")
     if isinstance(value, str) and "\0" in value:
         raise InputError(f"{file}: {name} contains a null character")
+    if isinstance(value, dict) and len(value) > _MOST_KEYS:
+        raise InputError(
+            f"{file}: {name[:100] or 'the file'} has {len(value)} keys; keep at most {_MOST_KEYS} in a table"
+        )
     if isinstance(value, dict):
         for key, inner in value.items():
             _check_values(key, file, f"a key of {name}", depth)

@@ -14,12 +14,14 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.input_file import read_input
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.twin.torque_scale import TorqueScale
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 _FORMAT, _VERSION = "irtwin twin", 1
+_LARGEST = 100_000_000  # bytes
 _SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
 _Columns = dict[str, tuple[type | None, ...]]
 _PARAMETER: _Columns = {
@@ -51,9 +53,7 @@ _BASE_PARAMETER: _Columns = {
 def load(path: Path) -> Twin:
     """Read a twin. Raises InputError, naming file and key, where the file is none."""
     try:
-        return from_json(path.read_text(encoding="utf-8"), path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); name a twin that irtwin saved") from error
+        return from_json(read_input(path, _LARGEST).decode(), path)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text; name a twin that irtwin saved") from error
 
@@ -93,7 +93,7 @@ def from_json(text: str, path: Path) -> Twin:
     """Return the twin of JSON text; `path` is where it stood. Raises InputError, naming file and key."""
     try:
         document = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON ({error}); name a twin that irtwin saved") from error
     reader = _Reader(path, document, "")
     if reader.take("format", str) != _FORMAT:

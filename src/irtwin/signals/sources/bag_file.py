@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bz2
 import re
 import struct
 from collections.abc import Iterator, Sequence
@@ -12,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from irtwin.errors import InputError
-from irtwin.input_file import check_file
+from irtwin.input_file import Unpacking, check_file, read_input
+from irtwin.signals.sources.bag_unpacking import counted
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 JOINT_STATE = "sensor_msgs/msg/JointState"
 NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32")
 _LARGEST = 1_000_000_000  # bytes of a bag
-_LARGEST_CHUNK = 256_000_000  # bytes, inflated; recorders take chunks of a MB or so
+_LARGEST_METADATA = 1_000_000  # bytes
 _METADATA = "metadata.yaml"
+_ALIAS = re.compile(r"(?:^|[\s\[{,:-])[&*]\w", re.MULTILINE)  # of YAML: a value that is taken again elsewhere
 _COMPRESSED = re.compile(r"^\s*compression_mode:\s*[\"']?(file|message)\b", re.IGNORECASE | re.MULTILINE)
 _DAMAGE = (
     *(AssertionError, AttributeError, EOFError, LookupError, MemoryError, OSError, OverflowError),
@@ -80,7 +81,7 @@ class BagFile:
 @contextmanager
 def open_bag(path: Path) -> Iterator[BagFile]:
     """Give a bag. Raises InputError where it cannot be read, as long as it is open: it is read on the way."""
-    _check_place(path)
+    unpacking = Unpacking(path, _size(path))
     try:
         import apsw
         from rosbags.rosbag1 import Reader as Reader1
@@ -90,48 +91,30 @@ def open_bag(path: Path) -> Iterator[BagFile]:
         from rosbags.serde import SerdeError
     except ImportError as error:
         raise InputError('bags need the package rosbags; install it with: pip install "irtwin[ros]"') from error
-    _bound_compression()
+    kind = Reader1 if path.suffix.lower() == ".bag" else Reader2
     try:
-        with (Reader1 if path.suffix.lower() == ".bag" else Reader2)(path) as reader:
+        with counted(unpacking), kind(path) as reader:
             yield BagFile(path, reader)
     except (ReaderError1, ReaderError2, SerdeError, apsw.Error, *_DAMAGE) as error:
         said = f"{type(error).__name__}: {error}".strip().partition("\n")[0][:200]
         raise InputError(f"{path}: not a readable bag, or damaged ({said}); record or convert it again") from error
 
 
-def _check_place(path: Path) -> None:
-    if not path.is_dir():
-        size = check_file(path)
-    else:
-        if not (path / _METADATA).is_file():
-            raise InputError(f"{path}: is a folder without {_METADATA}, so no bag of ROS 2; name the bag's folder")
-        check_file(path / _METADATA)
-        with (path / _METADATA).open(encoding="utf-8", errors="replace") as file:
-            mode = _COMPRESSED.search(file.read(1_000_000))
-        if mode is not None:
-            raise InputError(
-                f"{path}: its {mode[1].lower()}s are compressed one by one; unpack it with `ros2 bag convert`"
-            )
-        size = sum(file.stat().st_size for file in path.iterdir() if file.is_file())
+def _size(path: Path) -> int:
+    """Return how many bytes a bag has. Raises InputError where it is none that can be read."""
+    size = _folder_size(path) if path.is_dir() else check_file(path)
     if size > _LARGEST:
         raise InputError(f"{path}: is larger than {_LARGEST // 1_000_000} MB; keep the topics of the run alone")
+    return size
 
 
-def _bound_compression() -> None:
-    """Have rosbags inflate no chunk without bound: it takes a chunk whole, and a few kB may hold gigabytes."""
-    from backports import zstd
-    from lz4.frame import LZ4FrameDecompressor
-    from rosbags.rosbag1 import reader as ros1
-    from rosbags.rosbag2 import storage_mcap as mcap
-
-    def bounded(kind: Any) -> Any:
-        def inflate(data: bytes, size: int = _LARGEST_CHUNK) -> bytes:
-            made: bytes = kind().decompress(data, min(size, _LARGEST_CHUNK) + 1)
-            if len(made) > _LARGEST_CHUNK:
-                raise ValueError(f"a chunk of more than {_LARGEST_CHUNK // 1_000_000} MB")
-            return made
-
-        return inflate
-
-    ros1.decompressors.update(bz2=bounded(bz2.BZ2Decompressor), lz4=bounded(LZ4FrameDecompressor))
-    mcap.DECOMPRESSORS.update(lz4=bounded(LZ4FrameDecompressor), zstd=bounded(zstd.ZstdDecompressor))
+def _folder_size(path: Path) -> int:
+    metadata = path / _METADATA
+    if not metadata.is_file():
+        raise InputError(f"{path}: is a folder without {_METADATA}, so no bag of ROS 2; name the bag's folder")
+    text = read_input(metadata, _LARGEST_METADATA).decode(errors="replace")
+    if (mode := _COMPRESSED.search(text)) is not None:
+        raise InputError(f"{path}: its {mode[1].lower()}s are compressed one by one; unpack it with `ros2 bag convert`")
+    if _ALIAS.search(text):
+        raise InputError(f"{metadata}: repeats a part of itself, as no recorder writes it; record the run again")
+    return sum(check_file(file) for file in path.iterdir() if not file.is_dir())

@@ -12,7 +12,7 @@ import pyarrow.csv
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
-from irtwin.signals.sources.source import MOST_COLUMNS, Source, first_line
+from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS, Source, first_line
 
 _LARGEST = 1_000_000_000  # bytes; held in memory while it is read
 _OTHERS = {b";": "semicolons", b"\t": "tabs", b"|": "bars"}
@@ -70,9 +70,9 @@ class CsvSource(Source):
             )
             return _Parsed(table, list(table.column_names), wrong, text.count(b"\n") + 1)
         except (pa.ArrowException, UnicodeDecodeError) as error:
-            too_long = "straddling" in str(error)  # Arrow's word for a line longer than the block it reads at once
-            reason = "a line is longer than 1 MB" if too_long else first_line(error)
-            raise InputError(f"{self.path}: not readable as CSV ({reason}); separate columns by commas") from error
+            raise InputError(
+                f"{self.path}: not readable as CSV ({csv_fault(error)}); separate columns by commas"
+            ) from error
 
     def _text(self) -> bytes:
         text = read_input(self.path, _LARGEST).rstrip()
@@ -103,3 +103,9 @@ class CsvSource(Source):
                 raise InputError(
                     f"{self.path}, line {number}: not UTF-8 text (byte {error.start + 1}); save the run as UTF-8"
                 ) from error
+
+
+def csv_fault(error: Exception) -> str:
+    """Return what is wrong with a text that Arrow does not read."""
+    too_long = "straddling" in str(error)  # Arrow's word for a line longer than the block it reads at once
+    return f"a line is longer than {LONGEST_LINE // 1_000_000} MB" if too_long else first_line(error)

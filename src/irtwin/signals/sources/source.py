@@ -13,7 +13,9 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 
 MOST_COLUMNS = 10_000
-MOST_VALUES = 100_000_000  # of the columns that are read: 0.8 GB
+MOST_VALUES = 125_000_000  # of the columns that are read: 1 GB
+LONGEST_NAME = 500  # characters of a column's name
+LONGEST_LINE = 1_000_000  # bytes of a line of text
 
 
 class Source(ABC):
@@ -54,11 +56,27 @@ class Source(ABC):
         """Raise InputError where there is no sample, or there are more values than the memory is to hold."""
         if rows == 0:
             raise InputError(f"{self.path}: has no sample; an empty run cannot be used")
-        if rows * columns > MOST_VALUES:
-            raise InputError(
-                f"{self.path}: {rows} samples of {columns} columns; a run may have {MOST_VALUES:,} values: "
-                "cut it into several"
-            )
+        check_values(self.path, rows, columns)
+
+
+def check_names(path: Path, names: Sequence[str]) -> None:
+    """Raise InputError where columns are too many, or one has no name but a text."""
+    if len(names) > MOST_COLUMNS:
+        raise InputError(f"{path}: {len(names)} columns; a run has at most {MOST_COLUMNS}: leave out what nobody needs")
+    long = next((number for number, name in enumerate(names, start=1) if len(name) > LONGEST_NAME), None)
+    if long is not None:
+        raise InputError(
+            f"{path}: the name of column {long}, {names[long - 1][:40]!r}..., has {len(names[long - 1])} characters; "
+            f"give it one of at most {LONGEST_NAME}"
+        )
+
+
+def check_values(path: Path, rows: int, columns: int) -> None:
+    """Raise InputError where there are more values than the memory is to hold."""
+    if rows * columns > MOST_VALUES:
+        raise InputError(
+            f"{path}: {rows} samples of {columns} columns; a run may have {MOST_VALUES:,} values: cut it into several"
+        )
 
 
 def first_line(error: Exception) -> str:
