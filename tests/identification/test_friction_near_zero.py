@@ -74,7 +74,9 @@ def test_joints_have_laws_of_their_own() -> None:
 
 
 def test_without_torque_friction_turns_at_once() -> None:
-    known = replace(ROBOT, joints=tuple(replace(one, friction_width=0.01, friction_exponent=2.0) for one in ROBOT.joints))
+    known = replace(
+        ROBOT, joints=tuple(replace(one, friction_width=0.01, friction_exponent=2.0) for one in ROBOT.joints)
+    )
     robot = with_friction_near_zero(known, [replace(measured(None, 1.0, 1), torque=None)], EFFECTS)
     assert [joint.friction_width for joint in robot.joints] == [None, None]
 
