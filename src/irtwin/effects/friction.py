@@ -53,7 +53,10 @@ def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class CoulombFriction(JointEffect):
-    """Fc s, s the sign of dq by `direction`. At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none."""
+    """Fc s, s the sign of dq by `direction`.
+
+    At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none.
+    """
 
     id: ClassVar[str] = "coulomb_friction"
     family: ClassVar[str] = "friction"
