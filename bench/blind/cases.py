@@ -28,6 +28,7 @@ from plant.arm import Payload
 from plant.effects import POWER as POWER_EFFECTS
 from plant.effects import SENSED, TRANSMISSION, Effect
 from plant.fleet import Fleet, Traces
+from plant.friction import LAWS, NearZero
 from plant.logger import coloured, power, torque, winding_rise
 from plant.machine import Machine, build, read_drawings
 
@@ -44,8 +45,14 @@ SEEDS = {
     "test_5": 49_000_000,
     "test_6": 55_000_000,
     "local": 84_000_000,  # development
+    "laws": 90_000_000,  # development
+    "test_7": 96_000_000,
 }
 OF_THEIR_OWN = {"local": (LOCAL, (1.0, 3.0))}  # effects and levels of splits that do not draw from all
+# Splits that draw how dry friction turns at zero speed, the rate of the logs, and whether these name their repeats.
+DRAWN_LAWS = ("laws", "test_7")
+NARROWEST, WIDEST = 1e-3, 0.03  # rad/s, widths of that turn
+INTERVALS = (0.004, 0.008, 0.02)  # s
 LEVELS = (0.1, 0.3, 1.0, 3.0)
 SECONDS = 8.0
 SLIGHT_IN_DIRTY_NULL, SLIGHT_ELSEWHERE = 0.15, 0.05  # floors that each leaves
@@ -71,6 +78,9 @@ class Plan:
     level: float
     scope: str  # missing or changed
     reference: str = "reference"  # or simulated
+    law: str | None = None  # of dry friction about zero speed; None: the plant's own, sharp
+    interval: float | None = None  # s, of the log; None: the robot's own
+    tells_repeats: bool = True
 
 
 def plans(split: str, count: int) -> list[Plan]:
@@ -96,9 +106,11 @@ def plans(split: str, count: int) -> list[Plan]:
         scope = "changed" if kind == "simulated" or rng.random() < 0.4 else "missing"
         reference = "simulated" if kind == "simulated" else "reference"
         robot = str(rng.choice(ROBOTS))
-        made.append(
-            Plan(f"case_{number:04d}", SEEDS[split] + number + 1, robot, kind, effects, level, scope, reference)
-        )
+        plan = Plan(f"case_{number:04d}", SEEDS[split] + number + 1, robot, kind, effects, level, scope, reference)
+        if split in DRAWN_LAWS:
+            law, interval = str(rng.choice(sorted(LAWS))), float(rng.choice(INTERVALS))
+            plan = replace(plan, law=law, interval=interval, tells_repeats=bool(rng.random() < 0.5))
+        made.append(plan)
     return made
 
 
@@ -119,7 +131,7 @@ class Case:
         soft = bool(TRANSMISSION & set(plan.effects))
         drawings = replace(drawings, step=0.0005 if soft else 0.002)
         self.machine: Machine = build(drawings, plan.seed)
-        self.step, self.interval = drawings.step, drawings.log_interval
+        self.step, self.interval = drawings.step, plan.interval or drawings.log_interval
         self.stride = round(self.interval / self.step)
         self.seconds = SECONDS
         self._runs()
@@ -129,10 +141,17 @@ class Case:
             warmth = rng.uniform(25, 45) + 0 * warmth
         warmth = warmth + rng.uniform(-2, 2, n)
         jitter = 1 + drawings.tolerance.friction_per_run * np.clip(rng.standard_normal((runs, 2, n)), -2, 2)
-        self.fleet = Fleet(self.machine, self.motions, self.payloads, warmth, jitter, self.step)
+        self.near_zero = self._near_zero(n)
+        self.fleet = Fleet(self.machine, self.motions, self.payloads, warmth, jitter, self.step, self.near_zero)
         self.noise = np.random.default_rng([plan.seed, 9])
         self.known = self._known()
         self.slight: tuple[Effect, ...] = ()
+
+    def _near_zero(self, joints: int) -> NearZero | None:
+        if self.plan.law is None:
+            return None
+        rng = np.random.default_rng([self.plan.seed, 11])
+        return NearZero(self.plan.law, np.exp(rng.uniform(np.log(NARROWEST), np.log(WIDEST), joints)))
 
     def _warmth(self, runs: int) -> np.ndarray:
         half = np.sort(self.rng.uniform(24, 46, runs // 2))
@@ -218,7 +237,7 @@ class Case:
         arm = self.machine.drawings.arm(Payload())
         self.basis = Basis(
             arm, *(x[:: self.stride] for x in (traces.q, traces.dq, traces.ddq)), payload=told, known=known,
-            weights=1 / sensors.torque_noise, interval=self.interval,
+            weights=1 / sensors.torque_noise, interval=self.interval, near_zero=self.near_zero,
         )  # fmt: skip
         noisy_torque, noisy_power = self.noisy(seen, drawn)
         least = 0.2 * sensors.torque_noise  # of a joint that hardly moves
@@ -309,6 +328,7 @@ def _label(plan: Plan, case: Case, placed: list[Effect], gaps: list[float]) -> d
         "kind": plan.kind,
         "scope": plan.scope,
         "level": plan.level,
+        **({"law": plan.law, "interval": plan.interval, "tells_repeats": plan.tells_repeats} if plan.law else {}),
         "floor": dict(zip(names, case.floor.tolist(), strict=True)),
         "power_floor": case.power_floor,
         "effects": [
@@ -368,7 +388,7 @@ def _describe(case: Case) -> str:
     for index, (role, payload, repeat) in enumerate(zip(case.roles, case.payloads, case.repeats, strict=True)):
         lines += ["[[run]]", f'file = "runs/{_run_name(index)}.parquet"', f'role = "{role}"']
         lines += [f"payload_mass = {payload.mass}", f"payload_com = {list(payload.com)}"]
-        if repeat is not None:
+        if repeat is not None and case.plan.tells_repeats:
             lines.append(f'repeat_of = "runs/{_run_name(repeat)}.parquet"')
         lines.append("")
     return "\n".join(lines)

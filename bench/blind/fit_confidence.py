@@ -21,7 +21,7 @@ from scipy.special import expit
 from blind.compare import answers
 from blind.score import calibration, calibration_of_true_confidences, ranked
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.isolation.confidence import confidence
+from irtwin.gap.isolation.confidence import as_large_as, confidence
 from irtwin.gap.thresholds import DEFAULT, Confidence
 
 FITTED = ("constant", "per_t", "per_closed", "per_gain", "per_share", "per_count", "unexplained")
@@ -38,7 +38,7 @@ class Named:
     gain: float
     closed: float
     share: float
-    count: int
+    count: float
     unexplained: bool
     right: bool
 
@@ -61,7 +61,10 @@ def named(diagnoses: Mapping[str, Any], labels: Mapping[str, Any]) -> Iterator[N
                 evidence["gain_on_groups_left_out"],
                 evidence["closed_where_it_acts"],
                 min(evidence["gain_on_groups_left_out"] / most, 1.0),
-                len(causes),
+                as_large_as(
+                    evidence["gain_on_groups_left_out"],
+                    [other["evidence"]["gain_on_groups_left_out"] for other in causes],
+                ),
                 _left_open(diagnoses[case]),
                 cause["effect"] in true,
             )

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from plant.arm import Arm
+from plant.friction import NearZero
 
 BAND = 10.0  # Hz, above it a twin's filter leaves little
 STRIDE = 4
@@ -89,8 +90,10 @@ class Basis:
         known: np.ndarray,
         weights: np.ndarray,
         interval: float,
+        near_zero: NearZero | None = None,
     ) -> None:
         """`payload`: (R, 10) parameters told, `known`: (R,) mask of their runs, `weights`: (n,) 1 / noise."""
+        dry = np.tanh(dq / 0.01) if near_zero is None else np.sign(dq) * near_zero.share(dq)
         self.interval = interval
         steps, runs, n = q.shape
         moving = np.abs(low_pass(dq, interval)[::STRIDE]) > SLOW  # at rest friction may hold anything
@@ -102,7 +105,7 @@ class Basis:
         links = np.concatenate([links, carried], axis=2).reshape(steps, runs, n, -1)
         links = low_pass(links, interval)[::STRIDE]
         own = np.zeros((*links.shape[:3], 4 * n))
-        columns = np.stack([np.tanh(dq / 0.01), dq, np.ones_like(q), ddq], axis=-1)
+        columns = np.stack([dry, dq, np.ones_like(q), ddq], axis=-1)
         columns = low_pass(columns, interval)[::STRIDE]
         for joint in range(n):
             own[:, :, joint, 4 * joint : 4 * joint + 4] = columns[:, :, joint]

@@ -9,6 +9,7 @@ import numpy as np
 
 from plant.arm import Payload
 from plant.effects import LEVEL, PASSIVE, Effect, State
+from plant.friction import NearZero
 from plant.machine import Machine
 from plant.motion import Motion
 
@@ -42,8 +43,13 @@ class Fleet:
         warmth: np.ndarray,
         jitter: np.ndarray,
         step: float,
+        near_zero: NearZero | None = None,
     ) -> None:
-        """`warmth`: (R, n) degC at the start; `jitter`: (R, 2, n) factors of Coulomb and viscous friction."""
+        """`warmth`: (R, n) degC at the start; `jitter`: (R, 2, n) factors of Coulomb and viscous friction.
+
+        near_zero: how dry friction turns at zero speed; None: at once.
+        """
+        self.near_zero = near_zero
         self.machine, self.payloads, self.warmth, self.jitter, self.step = machine, payloads, warmth, jitter, step
         settle = round(SETTLE / step)
         held = [motion.held(settle) for motion in motions]
@@ -127,6 +133,8 @@ class Fleet:
             for law, shape, mask in levels:
                 level = level + mask * law(state, shape)
             level = np.maximum(level, 0.05 * coulomb)
+            if self.near_zero is not None:
+                level = level * np.maximum(self.near_zero.share(motor_dq), 1e-6)
             old = z
             z = (z + step * motor_dq) / (1 + step * bristle_stiffness * np.abs(motor_dq) / level)
             bristles = bristle_stiffness * z + bristle_damping * np.exp(-((motor_dq / 0.1) ** 2)) * (z - old) / step

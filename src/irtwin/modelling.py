@@ -17,13 +17,14 @@ from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap import predict as predicted
 from irtwin.gap.isolation.torque_scale import torque_scale_of
+from irtwin.identification.cutoff import cutoff_for
 from irtwin.planning.admission import check_motion
 from irtwin.planning.plan import Plan, Task, nominal_twin
 from irtwin.planning.plan import plan as make_plan
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, columns_of
-from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.conditioning import condition
 from irtwin.signals.csv_text import csv_text
 from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
@@ -53,7 +54,7 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     """
     given = checked(data_set if isinstance(data_set, DataSet) else read_data_set(Path(data_set))).data_set
     own = own_runs(given.runs)
-    cutoff = choose_cutoff(own)
+    cutoff = cutoff_for(given.robot, own)
     motions = [condition(run, given.robot, cutoff) for run in own]
     twin = fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
     return replace(twin, torque_scale=torque_scale_of(twin, given, motions))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irtwin.gap.isolation.confidence import confidence, of_family, of_rivals, where_runs_are_few
+from irtwin.gap.isolation.confidence import as_large_as, confidence, of_family, of_rivals, where_runs_are_few
 from irtwin.gap.thresholds import DEFAULT
 
 PLENTY = {"t": 8.0, "gain": 0.5, "closed": 0.9, "share": 1.0, "count": 1, "weights": DEFAULT.confidence}
@@ -75,3 +75,16 @@ def test_what_does_not_repeat_is_no_certain_error() -> None:
 @pytest.mark.parametrize("halves, left", [((True, True), 0.9), ((True, False), 0.45), ((False, False), 0.45)])
 def test_what_one_half_does_not_show_is_not_sure(halves, left) -> None:
     assert where_runs_are_few(0.9, None, None, halves, DEFAULT.confidence) == pytest.approx(left)
+
+
+def test_crumbs_do_not_unsay_the_cause_that_explains_nearly_everything() -> None:
+    gains = [1.0, *[0.005] * 5]
+    assert as_large_as(1.0, gains) == pytest.approx(1.025)
+    assert as_large_as(0.005, gains) == pytest.approx(6.0)
+
+
+@given(gains=st.lists(st.floats(1e-6, 1e3), min_size=1, max_size=8))
+def test_a_cause_stands_beside_as_many_as_gain_as_much(gains) -> None:
+    counts = [as_large_as(gain, gains) for gain in gains]
+    assert all(1 <= count <= len(gains) + 1e-9 for count in counts)
+    assert counts[gains.index(min(gains))] == pytest.approx(len(gains))

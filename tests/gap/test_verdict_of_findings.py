@@ -10,7 +10,6 @@ import pytest
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
-from irtwin.gap.data.noise_floor import OUT_OF_BAND, REPEATS, Floor
 from irtwin.gap.document import document
 from irtwin.gap.isolation import verdict
 from irtwin.gap.isolation.closing import Closing
@@ -35,7 +34,7 @@ VARIANT = SimpleNamespace(effect=catalogue()["coulomb_friction"])
 CAUSE = SimpleNamespace(rivals=(), scope="missing", joints=("j1",), variants=(VARIANT,))
 
 
-def left(before, after, causes=(), source=REPEATS, closing=MUCH, **more):
+def left(before, after, causes=(), closing=MUCH, **more):
     """before, after: RMS of each joint, in floors; `closing`: what the causes close; `more` as left_open."""
     system = SimpleNamespace(both=False)
     floor = np.ones(len(before))
@@ -48,7 +47,7 @@ def left(before, after, causes=(), source=REPEATS, closing=MUCH, **more):
         fitted=(np.array(before), np.array(after)),
         closing=lambda some: closing,
     )
-    return left_open([finding], Floor(floor, None, source), DEFAULT, **more)
+    return left_open([finding], DEFAULT, **more)
 
 
 def finding(*classes, matters=True, least=0.1, effect="stribeck_friction"):
@@ -107,10 +106,6 @@ def test_a_small_rest_is_what_differs_between_runs(after):
     assert left([2.0, 2.0], after) is None
 
 
-def test_without_repeats_nothing_is_left_open():
-    assert left([5.0, 1.0], [5.0, 1.0], source=OUT_OF_BAND) is None
-
-
 LITTLE = Closing(share=0.2, interval=(-0.1, 0.5), floors=0.6, size=0.4)
 
 
@@ -123,7 +118,6 @@ LITTLE = Closing(share=0.2, interval=(-0.1, 0.5), floors=0.6, size=0.4)
         ({"spread": 0.8, "alike": False}, None),
         ({"spread": 0.8, "causes": [CAUSE]}, None),  # something that matters is named
         ({"spread": 0.8, "causes": [CAUSE], "closing": LITTLE}, MUCH_IS_LEFT),
-        ({"spread": 0.8, "source": OUT_OF_BAND}, None),
     ],
 )
 def test_without_a_cause_more_than_reference_runs_leave_over_one_another_is_left_open(monkeypatch, said, why):

@@ -28,14 +28,35 @@ from irtwin.signals.motion import Motion
 _MOST_LOST = 0.6  # of a load, in gears: those that lose half when driven back hold by themselves
 
 
-def direction(dq: np.ndarray) -> np.ndarray:
+def sharp_sign(dq: np.ndarray) -> np.ndarray:
     """Return the sign of speeds, zero at standstill."""
     return np.where(np.abs(dq) < STANDSTILL, 0.0, np.sign(dq))
 
 
+def turn(dq: np.ndarray, width: float, exponent: float) -> np.ndarray:
+    """Return u/(1 + |u|^p)^(1/p), u = dq/width: the sign of dry friction that turns over a speed, not at once.
+
+    Exponent 2 is the usual regularised sign; near 1 the tails are as long as an arctangent's, above 3 nearly a ramp.
+    """
+    u = dq / width
+    return np.asarray(u / (1 + np.abs(u) ** exponent) ** (1 / exponent))
+
+
+def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:
+    """Return (N, n), by speeds, the sign that dry friction has in each joint: as sharp as the joint's is."""
+    found = sharp_sign(dq)
+    for place, joint in enumerate(robot.joints):
+        if joint.friction_width is not None and joint.friction_exponent is not None:
+            found[:, place] = turn(dq[:, place], joint.friction_width, joint.friction_exponent)
+    return found
+
+
 @dataclass(frozen=True)
 class CoulombFriction(JointEffect):
-    """Fc sign(dq). At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none."""
+    """Fc s, s the sign of dq by `direction`.
+
+    At standstill friction holds what it has to, up to Fc either way: undecided, predicted as none.
+    """
 
     id: ClassVar[str] = "coulomb_friction"
     family: ClassVar[str] = "friction"
@@ -46,8 +67,8 @@ class CoulombFriction(JointEffect):
         return (Term("Fc", force_unit(joint), joint=joint.name, spread=15.0, lowest=0.0),)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return sign(dq)."""
-        return (direction(motion.dq),)
+        """Return s."""
+        return (direction(robot, motion.dq),)
 
     def undecided(self, motion: Motion) -> np.ndarray:
         """Return where a joint stands still, as filtered or as logged: it may stick for a moment as it turns back."""
@@ -97,7 +118,7 @@ class StribeckFriction(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return s exp(-(|dq|/vs)^d)."""
-        return (direction(motion.dq) * np.exp(-((np.abs(motion.dq) / self.vs) ** self.d)),)
+        return (direction(robot, motion.dq) * np.exp(-((np.abs(motion.dq) / self.vs) ** self.d)),)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
@@ -136,7 +157,7 @@ class NonlinearViscousFriction(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return s |dq|^d."""
-        return (direction(motion.dq) * np.abs(motion.dq) ** self.d,)
+        return (direction(robot, motion.dq) * np.abs(motion.dq) ** self.d,)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
@@ -161,7 +182,7 @@ class AsymmetricFriction(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return |s| and |dq|."""
-        return np.abs(direction(motion.dq)), np.abs(motion.dq)
+        return np.abs(direction(robot, motion.dq)), np.abs(motion.dq)
 
 
 @dataclass(frozen=True)
@@ -184,7 +205,7 @@ class LoadDependentFriction(JointEffect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return |tau| s while tau dq is positive, and while it is not."""
         assert predicted is not None
-        column = np.abs(predicted.torque) * direction(motion.dq)
+        column = np.abs(predicted.torque) * direction(robot, motion.dq)
         drives = predicted.torque * motion.dq > 0
         return np.where(drives, column, 0.0), np.where(drives, 0.0, column)
 
@@ -300,14 +321,14 @@ class PreslidingHysteresis(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return z - s, at the acting joints."""
-        column = np.zeros_like(motion.dq)
+        column, slides = np.zeros_like(motion.dq), direction(robot, motion.dq)
         for joint in (robot.index(each.name) for each in self.acting(robot)):
-            signs = direction(motion.dq[:, joint])
-            column[:, joint] = self._lag(motion.q[:, joint], signs)
+            signs = sharp_sign(motion.dq[:, joint])
+            column[:, joint] = signs + self._lag(motion.q[:, joint], signs) - slides[:, joint]
         return (column,)
 
     def _lag(self, q: np.ndarray, signs: np.ndarray) -> np.ndarray:
-        """Return z - s (N,): minus twice the new direction at a reversal, decaying with the way from it."""
+        """Return z - sign(dq) (N,): minus twice the new direction at a reversal, decaying with the way from it."""
         moving = np.flatnonzero(signs)
         turns = moving[1:][np.diff(signs[moving]) != 0]
         lag = np.zeros(len(q))
@@ -340,7 +361,7 @@ class PositionDependentFriction(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return s cos q and s sin q."""
-        signs = direction(motion.dq)
+        signs = direction(robot, motion.dq)
         return signs * np.cos(motion.q), signs * np.sin(motion.q)
 
     def parameters(

@@ -59,7 +59,7 @@ class LocalEffect(JointEffect):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return the law along the motion."""
-        return (self.law(motion.q, direction(motion.dq)),)
+        return (self.law(motion.q, direction(robot, motion.dq)),)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

@@ -19,7 +19,7 @@ from irtwin.effects.effect import (
     quantity,
     size,
 )
-from irtwin.effects.friction import direction
+from irtwin.effects.friction import sharp_sign
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -106,7 +106,7 @@ class JointCoupling(Effect):
         places = [robot.index(joint.name) for joint in self.pair(robot)]
         columns = np.zeros((*motion.dq.shape, 3 if places else 0))
         if places:
-            rubs = direction(motion.dq[:, places].sum(axis=1))
+            rubs = sharp_sign(motion.dq[:, places].sum(axis=1))
             for joint, other in (places, places[::-1]):
                 columns[:, joint] = np.column_stack([motion.ddq[:, other], motion.dq[:, other], rubs])
         return columns

@@ -18,7 +18,7 @@ from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
-from irtwin.gap.data.noise_floor import Floor, noise_floor
+from irtwin.gap.data.noise_floor import REPEATS, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.document.curves import Curves
@@ -113,9 +113,10 @@ class Diagnosis:
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         weights = self.thresholds.confidence
+        # what the weight of a gap left open was fitted to; above the band one is left open by most real robots
+        unexplained = self.left_open is not None and self.floor.source == REPEATS
         written = tuple(
-            writing.cause(robot, *one, [*gains, *fallen], weights, self.scale, unexplained=self.left_open is not None)
-            for one in named
+            writing.cause(robot, *one, [*gains, *fallen], weights, self.scale, unexplained=unexplained) for one in named
         )
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
         causes = apart.causes(written, weights)
@@ -240,7 +241,6 @@ def diagnose(
     left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
     open_because = left_open(
         findings,
-        floor,
         thresholds,
         unmatched=refusals.unmatched,
         alike=case.alike,

@@ -18,7 +18,7 @@ from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.confidence import confidence, of_rivals, where_runs_are_few
+from irtwin.gap.isolation.confidence import as_large_as, confidence, of_rivals, where_runs_are_few
 from irtwin.gap.isolation.confidence import of_family as confidence_of_family
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
@@ -90,7 +90,7 @@ def cause(
     `unexplained`: the gap stays so, however sure its causes are.
     """
     closed, share = finding.closed(one), min(one.gain / max(gains), 1.0)
-    sure = confidence(one.t, one.gain, closed, share, len(gains), weights, unexplained=unexplained)
+    sure = confidence(one.t, one.gain, closed, share, as_large_as(one.gain, gains), weights, unexplained=unexplained)
     return document.Cause(
         id=name,
         effect=one.effect,

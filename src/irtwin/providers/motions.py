@@ -8,9 +8,10 @@ from weakref import WeakKeyDictionary
 
 from sqlalchemy import select
 
+from irtwin.identification.cutoff import cutoff_for
 from irtwin.providers.records import load_robot, load_run
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.conditioning import condition
 from irtwin.signals.log import own_runs
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -64,7 +65,7 @@ def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
         ).all()
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     own = own_runs(list(runs.values()))
-    cutoff = choose_cutoff(own)
+    cutoff = cutoff_for(robot, own)
     motions = {run_id: condition(run, robot, cutoff) for run_id, run in runs.items()}
     own_names = {run.name for run in own}
     return RobotMotions(

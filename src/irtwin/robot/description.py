@@ -16,6 +16,8 @@ class Joint:
     """A moving joint. Lengths and angles in m or rad by `kind`; None where nobody said.
 
     `rotor_inertia` (kg m^2), `torque_constant` (N m/A) are reflected to the joint; `winding_resistance` in ohm.
+    `friction_width` (rad/s or m/s) and `friction_exponent`: over which speed, and how, dry friction turns at zero
+    (`effects.friction.turn`); None: at once.
     """
 
     name: str
@@ -29,6 +31,8 @@ class Joint:
     rotor_inertia: float | None = None
     torque_constant: float | None = None
     winding_resistance: float | None = None
+    friction_width: float | None = None
+    friction_exponent: float | None = None
 
     @property
     def unit(self) -> str:

@@ -22,7 +22,10 @@ from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 _FORMAT, _VERSION = "irtwin twin", 1
 _LARGEST = 100_000_000  # bytes
-_SHEET = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
+_SHEET = (
+    *("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration"),
+    *("friction_width", "friction_exponent"),
+)
 _Columns = dict[str, tuple[type | None, ...]]
 _PARAMETER: _Columns = {
     "effect": (str,),

@@ -25,6 +25,7 @@ from irtwin.identification.fits import (
     free_terms,
     real_terms,
 )
+from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
 from irtwin.identification.uncertainty import half_widths, normal_covariance
@@ -65,6 +66,7 @@ def identify(
     measured = [motion for motion in motions if motion.torque is not None or motion.power is not None]
     if not with_torque and not with_power:
         raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
+    robot = with_friction_near_zero(robot, with_torque, effects)
     stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
     base: tuple[BaseParameter, ...] = ()

@@ -17,9 +17,11 @@ from irtwin.gap.data.baseline import baseline
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
+from irtwin.identification.cutoff import cutoff_for
+from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
@@ -132,10 +134,11 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     Raises InputError where `baseline` and `admit` do.
     """
     begun = baseline(data_set, withhold, twin, thresholds.given_twin)
-    cutoff = choose_cutoff(data_set.runs)
+    cutoff = cutoff_for(begun.robot, data_set.runs)
     given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
+    robot = with_friction_near_zero(robot, list(motions.values()), begun.effects)
     return Case(
         robot,
         begun.effects,

@@ -9,13 +9,13 @@ from irtwin.gap.thresholds import Confidence
 
 
 def confidence(
-    t: float, gain: float, closed: float, share: float, count: int, weights: Confidence, *, unexplained: bool
+    t: float, gain: float, closed: float, share: float, count: float, weights: Confidence, *, unexplained: bool
 ) -> float:
     """Return the chance that a cause is right.
 
     t: of its gain, between groups of runs; gain: of weighted squares, a row; closed: the part of the gap that all
     causes close where it acts, 0 to 1; share: its gain over that of the largest cause, above 0 to 1; count: of all
-    causes; `unexplained`: what all leave together is a gap without a cause.
+    causes, as `as_large_as` counts them; `unexplained`: what all leave together is a gap without a cause.
     """
     logit = weights.constant + weights.per_t * min(max(t, 0.0), weights.most_t) + weights.per_closed * closed
     logit += (
@@ -24,6 +24,14 @@ def confidence(
         + weights.per_count * math.log(count)
     )
     return 1 / (1 + math.exp(-logit - weights.unexplained * unexplained))
+
+
+def as_large_as(gain: float, gains: Sequence[float]) -> float:
+    """Return how many causes there are beside which one of this gain stands: lesser ones count in part.
+
+    So crumbs do not unsay the cause that explains nearly everything, while it unsays them.
+    """
+    return sum(min(one / gain, 1.0) if gain > 0 else 1.0 for one in gains)
 
 
 def where_runs_are_few(

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.data.noise_floor import REPEATS, Floor
 from irtwin.gap.document import document
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
@@ -27,7 +26,6 @@ MUCH_IS_LEFT, IMPOSSIBLE_NUMBER, DOES_NOT_REPEAT, UNSURE = (
 
 def left_open(
     findings: Sequence[Finding],
-    floor: Floor,
     limits: Thresholds,
     *,
     unmatched: bool = False,
@@ -46,14 +44,13 @@ def left_open(
     located = [one for one in differing if not any(one is each for each in explained)]
     named = any(branch.closing.matters(limits.matters) for finding in findings for branch in branches(finding))
     nameless = bool(located) and located[0] is differing[0] and not named
-    if floor.source == REPEATS:
-        excesses = (_largest(finding, explained, located) for finding in findings)
-        before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
-        much = max(limits.verdict.excess, (1 - limits.verdict.closed) * before)
-        if alike and not named:
-            much = min(much, _spread(findings, much))
-        if after > much and not (nameless and beside <= much):
-            return MUCH_IS_LEFT
+    excesses = (_largest(finding, explained, located) for finding in findings)
+    before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
+    much = max(limits.verdict.excess, (1 - limits.verdict.closed) * before)
+    if alike and not named:
+        much = min(much, _spread(findings, much))
+    if after > much and not (nameless and beside <= much):
+        return MUCH_IS_LEFT
     return DOES_NOT_REPEAT if nameless else None
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.friction import direction
+from irtwin.effects.friction import sharp_sign
 from irtwin.effects.local import LocalEffect
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.screening.remainder import Remainder
@@ -89,7 +89,7 @@ class _Passed:
             np.concatenate([values[:, joint] for values in each])
             for each in zip(*((m.motion.q, m.motion.dq, m.motion.ddq, m.residual) for m in left), strict=True)
         )
-        moving = np.isfinite(residual) & (direction(dq) != 0)
+        moving = np.isfinite(residual) & (sharp_sign(dq) != 0)
         if not moving.any():
             return None
         q, dq, ddq, residual = q[moving], dq[moving], ddq[moving], residual[moving]

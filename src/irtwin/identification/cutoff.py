@@ -1,0 +1,79 @@
+"""The cutoff of the filter by what the sensors resolve: the one with which a fitted twin tells other data best.
+
+An encoder of coarse steps makes noise of the acceleration. A filter lets the less of it pass, the lower its cutoff;
+too low a cutoff takes the motion away too. Torque that took no part in the fit says which of both weighs more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from irtwin.effects.catalogue import EXCITED
+from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
+from irtwin.identification.fits import fit_torque
+from irtwin.robot.description import Robot
+from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
+
+_MOST_SAMPLES = 40_000  # of all runs that are looked at: enough to tell one cutoff from its half
+_FEWEST_PERIODS = 20  # of the cutoff in what is fitted, and in what is held out
+_BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, in the mean: less is chance
+
+
+def cutoff_for(robot: Robot, runs: Sequence[Run]) -> float:
+    """Return the cutoff, Hz, for runs that are to be treated alike.
+
+    It is ten times the band of the motion (`choose_cutoff`), or that halved as long as the torque of what is held out
+    is told better so. Without torque nothing tells it.
+    """
+    cutoff = choose_cutoff(runs)
+    measured = [run for run in runs if run.signals.torque is not None]
+    if not measured:
+        return cutoff
+    share = max(_MOST_SAMPLES // len(measured), 1)
+    looked_at = [replace(run, signals=run.signals.rows(slice(share))) for run in measured]
+    halved = 1 if len(looked_at) > 1 else 2
+    seconds = min(float(run.signals.time[-1] - run.signals.time[0]) for run in looked_at) / halved
+    try:
+        error = _held_out(robot, looked_at, cutoff)
+        while cutoff / 2 * seconds >= _FEWEST_PERIODS:
+            lower = _held_out(robot, looked_at, cutoff / 2)
+            if lower > error + np.log(1 - _BETTER):
+                break
+            cutoff, error = cutoff / 2, lower
+    except InputError:  # too short or too still to be cut in two: the fit of all of it says what is wrong, if anything
+        pass
+    return cutoff
+
+
+def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float) -> float:
+    """Return the mean over joints of the logarithm of the squares left in torque as logged, by a fit to the rest."""
+    stack = Stack(robot, EXCITED)
+    motions = [condition(run, robot, cutoff) for run in runs]
+    logged = {run.name: run.signals for run in runs}
+    squares, count = np.zeros(len(robot.joints)), np.zeros(len(robot.joints))
+    for fitted, judged in _halves(motions):
+        values = fit_torque(stack, fitted)[1].values
+        for motion in judged:
+            torque = make_interp_spline(logged[motion.run].time, logged[motion.run].torque, k=1)(motion.time)
+            decided = ~stack.undecided(motion)
+            squares += np.sum((torque - stack.shown_torque(motion, values)) ** 2, axis=0, where=decided)
+            count += decided.sum(axis=0)
+    told = (squares > 0) & (count > 0)
+    return float(np.mean(np.log(squares[told] / count[told]))) if told.any() else 0.0
+
+
+def _halves(motions: Sequence[Motion]) -> list[tuple[list[Motion], list[Motion]]]:
+    """Return what is fitted and what is judged, both ways: every second run, or the halves of the only one."""
+    if len(motions) > 1:
+        one, other = list(motions[::2]), list(motions[1::2])
+    else:
+        half = len(motions[0].time) // 2
+        one, other = [motions[0].part(0, half)], [motions[0].part(half, len(motions[0].time))]
+    return [(one, other), (other, one)]

@@ -1,0 +1,109 @@
+"""How dry friction turns at zero speed, in each joint: at once, or over some speed. Nobody states it, so it is fitted.
+
+A twin whose friction turns at once leaves, of a joint whose friction does not, what looks like friction that sticks
+less, thins or has changed. The turn is a nuisance: it is found before anything is asked of the data, from all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from irtwin.effects.effect import Effect
+from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
+from irtwin.effects.stack import Stack
+from irtwin.identification.accumulate import Block, Rows, accumulate
+from irtwin.identification.estimators import combine
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+
+Turn = tuple[float, float]  # width, rad/s or m/s, and exponent of `effects.friction.turn`
+
+_COARSE = [(width, exponent) for width in (1.5e-3, 3e-3, 6e-3, 0.012, 0.024) for exponent in (1.25, 2.0, 4.0, 10.0)]
+_FINER = [(width, exponent) for width in (0.65, 0.8, 1.0, 1.25, 1.5) for exponent in (0.75, 1.0, 1.35)]  # times these
+_WIDEST, _LEAST_EXPONENT = 0.03, 1.25  # a wider turn, or longer tails, are friction that a joint is known by
+_NOTHING = 1e-9  # of the largest column: less is not shown
+
+
+def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> Robot:
+    """Return the robot with the turn of each joint's dry friction, as its torque shows it beside some effects.
+
+    A joint whose torque shows none, or in which it makes no sure difference, has friction that turns at once.
+    """
+    measured = [motion for motion in motions if motion.torque is not None]
+    plain = replace(robot, joints=tuple(replace(j, friction_width=None, friction_exponent=None) for j in robot.joints))
+    if not measured:
+        return plain
+    beside = [
+        effect
+        for effect in Stack(plain, effects).effects
+        if effect.signal == "torque" and effect.id != CoulombFriction.id and not effect.needs and not effect.memory
+    ]
+    stack = Stack(plain, beside)
+    found: list[Turn | None] = [None] * len(robot.joints)
+    for _ in range(2):
+        tried = [_COARSE if one is None else _around(one) for one in found]
+        blocks, pattern = _reduced(stack, measured, tried)
+        found = [_best(blocks, pattern, joint, shapes) for joint, shapes in enumerate(tried)]
+    return replace(
+        plain,
+        joints=tuple(
+            joint if one is None else replace(joint, friction_width=one[0], friction_exponent=one[1])
+            for joint, one in zip(plain.joints, found, strict=True)
+        ),
+    )
+
+
+def _around(found: Turn) -> list[Turn]:
+    width, exponent = found
+    near = [(min(width * a, _WIDEST), max(exponent * b, _LEAST_EXPONENT)) for a, b in _FINER]
+    return list(dict.fromkeys(near))
+
+
+def _reduced(
+    stack: Stack, motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+) -> tuple[list[Block], np.ndarray]:
+    """Reduce the equations of torque: beside the stack's columns, each joint's dry friction, sharp and by each turn."""
+    counts = [1 + len(shapes) for shapes in tried]
+    of_friction = np.repeat(np.eye(len(counts), dtype=bool), counts, axis=1)
+    pattern = np.concatenate([stack.pattern, of_friction], axis=1)
+    sticking = CoulombFriction()
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.torque is not None
+        own = stack.columns_by_joint(motion)
+        columns = [[some, *_friction(motion.dq[:, joint], tried[joint])] for joint, some in enumerate(own)]
+        undecided = stack.undecided(motion) | sticking.undecided(motion)
+        return Rows(columns, stack.shift_torque(motion, own), motion.torque, undecided)
+
+    return accumulate(motions, equations, pattern), pattern
+
+
+def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
+    yield sharp_sign(dq)[:, None]
+    for width, exponent in shapes:
+        yield turn(dq, width, exponent)[:, None]
+
+
+def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn]) -> Turn | None:
+    """Return the turn that leaves least of a joint's torque; None where it is not sure to leave less than none."""
+    own = int(pattern[joint].sum()) - len(shapes) - 1
+    factors = [block.factors[joint] for block in blocks if block.rows[joint]]
+    if not factors:
+        return None
+    whole = combine(factors, pattern[joint])[:, np.append(pattern[joint], True)]
+    left = [_left(whole, factors, [*range(own), own + k]) for k in range(len(shapes) + 1)]
+    best = min(range(1, len(left)), key=lambda k: float(left[k].sum()))
+    return shapes[best - 1] if left[best].sum() < left[0].sum() else None
+
+
+def _left(whole: np.ndarray, factors: Sequence[np.ndarray], columns: Sequence[int]) -> np.ndarray:
+    """Return the squares that some columns leave in each block."""
+    used = whole[:, columns]
+    size = np.linalg.norm(used, axis=0)
+    shown = size > _NOTHING * size.max(initial=0.0)
+    values = np.zeros(len(columns))
+    values[shown] = np.linalg.lstsq(used[:, shown] / size[shown], whole[:, -1], rcond=_NOTHING)[0] / size[shown]
+    return np.array([np.sum((factor[:, -1] - factor[:, columns] @ values) ** 2) for factor in factors])

@@ -1,0 +1,77 @@
+"""The cutoff by what sensors resolve: a coarse encoder lowers it, a fine one leaves it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.synthetic import arm, as_run, measure, swing
+
+from irtwin.identification.cutoff import cutoff_for
+from irtwin.robot.description import Robot
+from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.log import Run
+from irtwin.twin.identify import identify
+
+ROBOT = arm(2)
+
+
+def runs(step: float, count: int = 2) -> list[Run]:
+    """Logs of an encoder of so many rad a step, whose samples come late by up to two hundredths of an interval."""
+    rng = np.random.default_rng(0)
+    found = []
+    for seed in range(1, count + 1):
+        motion = measure(ROBOT, swing(ROBOT, seed, rate=200.0), noise=0.5, seed=seed)
+        late = motion.dq * rng.uniform(0, 0.02 / 200.0, motion.q.shape)
+        found.append(as_run(motion, q=np.round((motion.q - late) / step) * step))
+    return found
+
+
+def test_a_fine_encoder_leaves_ten_times_the_band() -> None:
+    fine = runs(1e-6)
+    assert cutoff_for(ROBOT, fine) == choose_cutoff(fine)
+
+
+def with_steps(run: Run) -> Run:
+    """Have a run's positions jump now and then, as those of a bus that loses packets do: the speed is widely spread."""
+    rng = np.random.default_rng(1)
+    q = run.signals.q.copy()
+    for k in rng.integers(10, len(q) - 10, 60):
+        q[k : k + 4] = q[k]
+    return replace(run, signals=replace(run.signals, q=q))
+
+
+def of_others(robot: Robot, fitted: list[Run], judged: Run, cutoff: float) -> np.ndarray:
+    """Return the RMS, N m a joint, that a fit leaves in the torque of another run as it was logged."""
+    twin = identify(robot, [condition(run, robot, cutoff) for run in fitted])
+    motion = condition(judged, robot, cutoff)
+    values = np.array([twin.value(effect.id, term) for effect, term in twin.stack.torque_terms])
+    torque = judged.signals.torque
+    assert torque is not None
+    return np.asarray(np.sqrt(np.mean((torque - twin.stack.shown_torque(motion, values)) ** 2, axis=0)))
+
+
+@pytest.mark.slow
+def test_a_lower_cutoff_is_taken_where_it_tells_another_run_better() -> None:
+    coarse = [with_steps(run) for run in runs(5e-4, 3)]
+    highest, found = choose_cutoff(coarse), cutoff_for(ROBOT, coarse)
+    assert found < highest / 2
+    left = of_others(ROBOT, coarse[:2], coarse[2], found)
+    assert np.all(left < of_others(ROBOT, coarse[:2], coarse[2], highest))
+
+
+def test_one_run_is_cut_in_halves() -> None:
+    (coarse,) = (with_steps(run) for run in runs(5e-4, 1))
+    assert cutoff_for(ROBOT, [coarse]) < choose_cutoff([coarse])
+
+
+def test_without_torque_nothing_tells_it() -> None:
+    silent = [replace(run, signals=replace(run.signals, torque=None)) for run in runs(5e-4)]
+    assert cutoff_for(ROBOT, silent) == choose_cutoff(silent)
+
+
+def test_what_cannot_be_cut_in_two_keeps_ten_times_the_band() -> None:
+    (run,) = runs(1e-6, 1)
+    short = replace(run, signals=run.signals.rows(slice(40)))
+    assert cutoff_for(ROBOT, [short]) == choose_cutoff([short])
