@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
 from sqlalchemy import select
 
-from irtwin.asking import WORKSPACE, contradictions
+from irtwin.asking import BEHIND, WORKSPACE, contradictions_of, in_words, standing
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -65,8 +65,7 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
             found.parts["series"] = [storage.url]
         found.parts["robots"] = _robots(place) or ["none"]
         with found.noting():
-            found.parts["graph"] = [_graph(place, graph_url)]
-            found.faults.extend(contradictions(place.folder, graph_url) if place.knows_robots() else ())
+            _look_at_graph(found, place, graph_url)
         extensions = place.resources.extensions
         found.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
         with found.noting():
@@ -106,15 +105,21 @@ def _robots(place: Workspace) -> list[str]:
     return lines
 
 
-def _graph(place: Workspace, url: str | None) -> str:
-    if url is not None:
-        with KnowledgeGraph(url, place.folder, place.resources) as graph:
-            return _size(graph)
-    place.check_graph()
-    if not (place.graph_folder / "CURRENT").is_file():
-        return "none yet"
-    with Snapshot(place.graph_folder) as snapshot:
-        return _size(snapshot.graph)
+def _look_at_graph(found: Status, place: Workspace, url: str | None) -> None:
+    with ExitStack() as held:
+        if url is not None:
+            graph = held.enter_context(KnowledgeGraph(url, place.folder, place.resources))
+        else:
+            place.check_graph()
+            if not (place.graph_folder / "CURRENT").is_file():
+                found.parts["graph"] = ["none yet"]
+                return
+            graph = held.enter_context(Snapshot(place.graph_folder)).graph
+        found.parts["graph"] = [_size(graph)]
+        stands = standing(graph, place.folder)
+        if stands is not None:
+            (found.faults if stands == BEHIND else found.parts["graph"]).append(in_words(stands, place.folder))
+        found.faults.extend(contradictions_of(graph) if place.knows_robots() else ())
 
 
 def _size(graph: KnowledgeGraph) -> str:

@@ -6,16 +6,19 @@ import errno
 import os
 import sys
 import traceback
+import warnings
 from io import TextIOWrapper
+from typing import Any
 
 import click
 
 from irtwin import __version__
 from irtwin.cli import alarms, bring, fleet, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
-from irtwin.errors import InputError
+from irtwin.errors import GraphBehind, InputError
 
 _LONGEST = 2000  # characters of an error
+_python_warns = warnings.showwarning
 
 
 def main() -> None:
@@ -24,6 +27,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 is no reason to stop
+    warnings.showwarning = _warn
     try:
         cli.main(prog_name="irtwin", standalone_mode=False)
         sys.stdout.flush()
@@ -45,6 +49,14 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("irtwin: stopped", err=True)
         sys.exit(130)
+
+
+def _warn(message: Warning | str, category: type[Warning], *where: Any) -> None:
+    """Say in one line what people are to know, and any other warning as Python does."""
+    if issubclass(category, GraphBehind):
+        say(f"irtwin: {message}")
+    else:
+        _python_warns(message, category, *where)
 
 
 def _check_system() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -87,6 +87,21 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
             broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
             if broken is not None:
                 raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
+
+
+@contextmanager
+def before_writing(engine: Engine, do: Callable[[], None]) -> Iterator[None]:
+    """Have something done before rows change, within the turn of each writer by this engine."""
+
+    def begun(connection: Connection) -> None:
+        if _writes(connection):
+            do()
+
+    event.listen(engine, "begin", begun)
+    try:
+        yield
+    finally:
+        event.remove(engine, "begin", begun)
 
 
 @contextmanager
@@ -216,8 +231,11 @@ def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
 
 def _begin_sqlite(connection: Connection) -> None:
     # A writer that begins as a reader could find, too late, that another one wrote meanwhile.
-    writes = connection.get_execution_options().get("writes", False)
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if _writes(connection) else "BEGIN")
+
+
+def _writes(connection: Connection) -> bool:
+    return bool(connection.get_execution_options().get("writes", False))
 
 
 def _locked(error: OperationalError) -> bool:
