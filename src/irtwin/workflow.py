@@ -191,6 +191,18 @@ def reason_again(
         conclude(graph, announce, engine)
 
 
+def catch_up(
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> None:
+    """Bring a graph up to date that a command which was broken off left behind the database; no other is changed."""
+    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url, announce):
+        pass
+
+
 def backup(
     archive: Path, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
 ) -> None:
@@ -238,9 +250,7 @@ def _check_effects(data_set: DataSet) -> None:
 
 
 @contextmanager
-def rewriting(
-    place: Workspace, url: str | None, announce: Announce = lambda line: None
-) -> Iterator[KnowledgeGraph]:
+def rewriting(place: Workspace, url: str | None, announce: Announce = lambda line: None) -> Iterator[KnowledgeGraph]:
     """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server; bring up to date one left behind.
 
     Who reads the folder meanwhile sees what was there before, if anything was; who wants to rewrite it too waits.

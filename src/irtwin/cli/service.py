@@ -92,6 +92,7 @@ def live(
     from irtwin.live.watch import watch
     from irtwin.report.extensions import check
     from irtwin.resources import resources_of
+    from irtwin.workflow import catch_up
 
     if sum(source is not None for source in (port, replay, rtde)) > 1:
         raise click.UsageError("Give one of --port, --replay and --rtde.")
@@ -102,6 +103,7 @@ def live(
     if performs is not None and robot is None:
         raise click.UsageError("--performs goes with --replay or --rtde; lines of a stream say it by themselves.")
     check(resources_of(workspace))
+    catch_up(workspace, database=database, graph_url=graph_url, announce=say)  # while it watches, nobody else can
     watch(
         workspace,
         database=database,

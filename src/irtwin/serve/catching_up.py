@@ -59,4 +59,3 @@ async def _caught_up(source: Source, database: str | None) -> str:
         return ""
     last = lines.decode(errors="replace").strip().rpartition("\n")[2]
     return last.removeprefix("irtwin: ") or f"`irtwin reason` ended with status {process.returncode}"
-

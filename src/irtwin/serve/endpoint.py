@@ -125,9 +125,7 @@ class Endpoint:
                     answer.break_off()
             await sending
 
-    async def _ask(
-        self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float
-    ) -> str:
+    async def _ask(self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float) -> str:
         """Ask a worker; return the answer's media type."""
         asked = {
             "text": operation.text,

@@ -56,7 +56,7 @@ async def respond(asking: Asking, known: Resources, request: Request) -> Respons
 
 def _page(iri: str, answers: Answers, base: str, standing: str | None) -> str:
     found = individual.individual(iri, answers, base)
-    said = {"found": found, "most": individual.MOST_VALUES, "base": base, "standing": standing}
+    said = {"found": found, "most": individual.MOST_VALUES, "base": base, "graph_stands": standing}
     return page.render("individual/page.html.jinja", answers, {"individual": iri}, **said)
 
 

@@ -168,7 +168,7 @@ class PlantPages:
             "file": TARIFF,
             "excel": sheet.excel_is_there(),
             "base": self._asking.base,
-            "standing": noted(request),
+            "graph_stands": noted(request),
         }
 
     def _individual(self, kind: str, tail: str) -> str:
