@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import CanonicalizationAlgorithm, Dataset, NamedNode, Quad
-from tests import data_sets, killed_writers, sparql_servers
-from tests.killed_writers import broken_off, killed, take_in
 
 from irtwin.asking import BEHIND, UPDATING, ask, standing
 from irtwin.errors import GraphBehind, InputError
@@ -22,6 +20,8 @@ from irtwin.status import status
 from irtwin.storage import turns
 from irtwin.storage.database import Workspace
 from irtwin.workflow import conclude, map_rows, rewriting
+from tests import data_sets, killed_writers, sparql_servers
+from tests.killed_writers import broken_off, killed, take_in
 
 pytestmark = pytest.mark.slow
 

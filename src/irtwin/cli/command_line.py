@@ -51,12 +51,12 @@ def main() -> None:
         sys.exit(130)
 
 
-def _warn(message: Warning | str, category: type[Warning], *where: Any) -> None:
+def _warn(message: Warning | str, category: type[Warning], *where: Any, **how: Any) -> None:
     """Say in one line what people are to know, and any other warning as Python does."""
     if issubclass(category, GraphBehind):
         say(f"irtwin: {message}")
     else:
-        _python_warns(message, category, *where)
+        _python_warns(message, category, *where, **how)
 
 
 def _check_system() -> None:

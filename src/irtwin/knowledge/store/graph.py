@@ -185,7 +185,7 @@ class KnowledgeGraph:
             self.change([changes.BEHIND], ())
 
     def rows_change(self) -> None:
-        """Have a graph that is `rewritten` say that it is behind before rows change elsewhere; the disk holds it then."""
+        """Have a graph that is `rewritten` say, on the disk, that it is behind: rows are about to change."""
         if self._says_first:
             self._say_behind()
             self.flush()
