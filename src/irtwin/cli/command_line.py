@@ -18,6 +18,11 @@ from irtwin.cli.options import add_speech, say, speech
 from irtwin.errors import GraphBehind, InputError
 
 _LONGEST = 2000  # characters of an error
+_NO_ROOM, _NO_RIGHT = "free some space and try again", "ask its owner for the right, or choose another place"
+_ASIDE = {  # what the system refuses, and what to do
+    **dict.fromkeys((errno.ENOSPC, errno.EFBIG, errno.EDQUOT), _NO_ROOM),
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _NO_RIGHT),
+}
 _python_warns = warnings.showwarning
 
 
@@ -37,10 +42,10 @@ def main() -> None:
         say(f"irtwin: {error}"[:_LONGEST])
         sys.exit(2)
     except OSError as error:
-        if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+        if error.errno not in (errno.EPIPE, *_ASIDE):
             raise
         if error.errno != errno.EPIPE:  # else who read the answer has left, and needs no word
-            say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; free some space and try again")
+            say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; {_ASIDE[error.errno]}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python flushes once more at its end
         sys.exit(2)
     except click.ClickException as error:

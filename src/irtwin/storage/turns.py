@@ -67,7 +67,7 @@ def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
     try:
         file = held.enter_context(inside(folder, _FILE).open("ab"))
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); {engines.TO_WRITE}") from None
 
     def taken() -> bool:
         try:
