@@ -13,12 +13,12 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from tests import rows
+from tests.killed_writers import broken_off, take_in
 
 from irtwin.storage import engine
 from irtwin.storage.database import Workspace
 from irtwin.storage.read_only import connecting, may_only_be_read
-from tests import rows
-from tests.killed_writers import broken_off, take_in
 
 OTHER = 65534
 COMMANDS = """

@@ -54,7 +54,8 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
     """Write a workspace into an archive, whole or not at all, while others may write.
 
     Rows and files are those of one moment: files are linked while the writers' lock is held, rows read from a snapshot
-    taken then. Who may only read the workspace cannot hold that lock: files that go meanwhile are told. The graph is that of a moment just after; what it lacks or has more is set right by the next mapping.
+    taken then. Who may only read cannot hold that lock, and is told of files that go meanwhile. The graph is that of a
+    moment just after; what it lacks or has more is set right by the next mapping.
     Raises InputError where a file that the database names is missing or altered, or graph or database are damaged.
     """
     engine.check(place.engine, math.inf)  # a large one was not looked through at opening
