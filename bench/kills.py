@@ -74,8 +74,6 @@ def prepared(folder: Path) -> dict[str, Command]:
     third = data_sets.write(folder / "third", robot, runs)
     assert data_sets.irtwin("run", first, "--workspace", base).status == 0
     assert data_sets.irtwin("backup", folder / "kept.zip", "--workspace", base).status == 0
-    shutil.copytree(base, folder / "diagnosed")
-    assert data_sets.irtwin("diagnose", third, "--workspace", folder / "diagnosed").status == 0
     (folder / "none").mkdir()
     watched(first, folder / "watched")
     (folder / "fleet").mkdir()
@@ -100,7 +98,6 @@ def prepared(folder: Path) -> dict[str, Command]:
         "diagnose": Command(lambda place: ["diagnose", third, "--json", folder / "d.json", "--workspace", place], base),
         "restore": Command(lambda place: ["restore", folder / "kept.zip", "--workspace", place], folder / "none"),
         "repair": Command(lambda place: ["repair", "--workspace", place], base),
-        "adopt": Command(lambda place: ["adopt", "Third", "--workspace", place], folder / "diagnosed"),
         "fleet": Command(
             lambda place: ["fleet", "run", folder / "fleet", "--out", place, "--batch", 1, "--workers", 1],
             folder / "none",
