@@ -19,6 +19,8 @@ from irtwin.providers.records import find_robot
 from irtwin.status import status
 from irtwin.storage import turns
 from irtwin.storage.database import Workspace
+from irtwin.storage.journal import Header, Journal
+from irtwin.storage.schema import LIVE
 from irtwin.workflow import conclude, map_rows, rewriting
 from tests import data_sets, killed_writers, sparql_servers
 from tests.killed_writers import broken_off, killed, take_in
@@ -154,3 +156,12 @@ def test_what_fails_before_it_changes_anything_leaves_the_graph_whole(before: Pa
     with pytest.raises(InputError, match="no robot"), Workspace(folder) as place, rewriting(place, None):
         find_robot(place, "Nobody")
     assert answered(folder)[1] is None
+
+
+def test_runs_that_a_killed_live_left_are_told(before: Path, tmp_path: Path) -> None:
+    shutil.copytree(before, tmp_path / "workspace")
+    journal = Journal(tmp_path / "workspace" / LIVE, Header("A.live_1", "A", 0.0, ("time",)))
+    assert not status(tmp_path / "workspace").faults  # it is watched just now
+    journal.close()
+    (fault,) = status(tmp_path / "workspace").faults
+    assert fault.startswith("A.live_1 is in the graph as it was when `irtwin live` was killed; the next `irtwin live`")

@@ -21,9 +21,10 @@ from irtwin.report.extensions import check
 from irtwin.resources import Resource
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import shown
+from irtwin.storage.journal import left_behind
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
-from irtwin.storage.schema import Base, Robot, Run, Twin
+from irtwin.storage.schema import LIVE, Base, Robot, Run, Twin
 from irtwin.storage.series_place import elsewhere
 from irtwin.trust import how, trusted
 from irtwin.upkeep import asked, lost_files
@@ -76,6 +77,11 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
         with found.noting():
             check(place.resources)
             check_mappings(place.resources, place.engine)
+        found.faults.extend(
+            f"{journal.stem} is in the graph as it was when `irtwin live` was killed; the next `irtwin live` takes in "
+            "its samples, which are on the disk"
+            for journal in left_behind(place.folder / LIVE)
+        )
         with found.noting():
             found.faults.extend(lost_files(place))
     return found

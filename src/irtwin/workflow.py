@@ -149,6 +149,7 @@ def diagnose(
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)
+            validate(graph)
     return found
 
 
@@ -166,6 +167,7 @@ def adopt(
             map_rows(place, graph)
             populate_others(place, graph, lambda line: None)  # live runs by the new twin
             reason(graph)
+            validate(graph)
             next_experiment(place, graph, robot_id)
         return write_report(place, graph_url, robot_id)
 
