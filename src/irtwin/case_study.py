@@ -85,12 +85,10 @@ def unpack(workspace: Path) -> Path:
 
 
 def identify(data_set: Path, workspace: Path) -> None:
-    """Take a data set in, with the twin that is identified from it."""
+    """Take a data set in, with the twin that is identified from it; nothing is concluded before the plan is there."""
     with Workspace(workspace) as place, workflow.rewriting(place, None) as graph:
         workflow.take_in(place, read_data_set(data_set))
         graph.load_ontology()
-        workflow.map_rows(place, graph)
-        workflow.conclude(graph, lambda line: None)
 
 
 def plan_process(workspace: Path) -> tuple[Plan, plans.Kept]:
