@@ -1,9 +1,10 @@
 """Commands killed at random moments: `python bench/kills.py [KILLS] [COMMAND ...]`; 30 kills of each by default.
 
 `migrate` has no place here: there is no such command. A workspace is migrated when it is opened, and
-`tests/storage/test_migration.py` kills that. After each kill a query must answer as before or as after, and the command
-done again must lead to the state of a workspace where nothing was killed: the same answers, as many triples, every file
-that the database names and no other.
+`tests/storage/test_migration.py` kills that. After each kill a query must answer as before or as after, or say that the
+graph is behind; the graph, once it has caught up, must be what its database makes of it; and the command done again
+must lead to the state of a workspace where nothing was killed: the same answers, as many triples, every file that the
+database names and no other.
 """
 
 from __future__ import annotations
@@ -20,17 +21,23 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
+from pyoxigraph import CanonicalizationAlgorithm, Dataset, Quad
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests import data_sets, small_robots, synthetic
 
-from irtwin import asking
+from irtwin import asking, workflow
+from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.questions.queries import to_csv
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_CHANGED
+from irtwin.knowledge.vocabulary import GRAPH_CHANGED, GRAPH_SOURCE
+from irtwin.providers.records import ingest
+from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import named_files
 from irtwin.storage.series import is_whole
 
+ROBOTS = 20  # that are watched at once
 QUESTION = "energy_per_run"
 State = dict[str, object]
 
@@ -44,6 +51,7 @@ class Command:
     fed: bytes = b""
     # what a killed one may rightly leave more of: journals that became runs, and their energies
     grows: tuple[str, ...] = field(default=())
+    workspaces: Callable[[Path], list[Path]] = lambda place: [place]  # that it makes, or works on
 
 
 def main(kills: int, names: list[str], seed: int = 1) -> int:
@@ -67,18 +75,46 @@ def prepared(folder: Path) -> dict[str, Command]:
     assert data_sets.irtwin("run", first, "--workspace", base).status == 0
     assert data_sets.irtwin("backup", folder / "kept.zip", "--workspace", base).status == 0
     (folder / "none").mkdir()
+    watched(first, folder / "watched")
+    (folder / "fleet").mkdir()
+    for data_set in (first, second):
+        shutil.copytree(data_set, folder / "fleet" / data_set.name)
     lines = (
         {"robot": "First", "time": 1.7e9 + 0.01 * k, "position": [0.1, 0.2 + 1e-4 * k], "effort": [1.0, 2.0]}
         for k in range(20_000)
     )
     fed = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
+    of_many = (
+        {"robot": f"R{number}", "time": 1.7e9 + 0.01 * k, "position": [0.1, 0.2 + 1e-4 * k], "effort": [1.0, 2.0]}
+        for k in range(2_000)
+        for number in range(ROBOTS)
+    )
+    fed_of_many = b"".join(json.dumps(line).encode() + b"\n" for line in of_many)
+    grows = ("triples", "runs", "answers")
     return {
         "run": Command(lambda place: ["run", second, "--workspace", place], base),
-        "live": Command(lambda place: ["live", "--workspace", place], base, fed, ("triples", "runs", "answers")),
+        "live": Command(lambda place: ["live", "--workspace", place], base, fed, grows),
+        "live of 20": Command(lambda place: ["live", "--workspace", place], folder / "watched", fed_of_many, grows),
         "diagnose": Command(lambda place: ["diagnose", third, "--json", folder / "d.json", "--workspace", place], base),
         "restore": Command(lambda place: ["restore", folder / "kept.zip", "--workspace", place], folder / "none"),
         "repair": Command(lambda place: ["repair", "--workspace", place], base),
+        "fleet": Command(
+            lambda place: ["fleet", "run", folder / "fleet", "--out", place, "--batch", 1, "--workers", 1],
+            folder / "none",
+            workspaces=lambda place: sorted(batch / "workspace" for batch in place.glob("[!.]*") if batch.is_dir()),
+        ),
     }
+
+
+def watched(data_set: Path, place: Path) -> None:
+    """Make a workspace of many robots that have no twin."""
+    known = read_data_set(data_set)
+    with Workspace(place) as workspace, workflow.rewriting(workspace, None) as graph:
+        for number in range(ROBOTS):
+            ingest(workspace, replace(known, robot=replace(known.robot, name=f"R{number}")))
+        graph.load_ontology()
+        workflow.map_rows(workspace, graph)
+        workflow.conclude(graph, lambda line: None)
 
 
 def killed_often(kind: str, command: Command, kills: int, moments: random.Random, place: Path) -> int:
@@ -86,8 +122,8 @@ def killed_often(kind: str, command: Command, kills: int, moments: random.Random
     began = time.perf_counter()
     done = call(command.arguments(place), command.fed)
     assert done.returncode == 0, done.stderr.decode()
-    length, clean = time.perf_counter() - began, state(place)
-    before = None if kind == "restore" else state_of_base(command.base)
+    length, clean = time.perf_counter() - began, states(command, place)
+    before = None if command.base.name == "none" else state_of_base(command.base)
     said: list[str] = []
     killed = 0
     for _ in range(kills):
@@ -101,22 +137,66 @@ def killed_often(kind: str, command: Command, kills: int, moments: random.Random
     return len(said)
 
 
-def faults(command: Command, place: Path, before: State | None, clean: State) -> list[str]:
+def faults(command: Command, place: Path, before: State | None, clean: list[State]) -> list[str]:
     found = []
-    if before is not None or any(place.glob("*")):
-        asked = call(["query", QUESTION, "--workspace", place, "--format", "csv"])
-        answers = [of["answers"] for of in (before, clean) if of is not None]
-        if asked.returncode != 0:
-            found.append(f"no answer: {asked.stderr.decode()[-300:]}")
-        elif not command.grows and asked.stdout not in answers and before is not None:
-            found.append("another answer")
-    if before is not None or not any(place.glob("*")):
+    for workspace, of in zip(command.workspaces(place), clean, strict=False):
+        if (workspace / "graph/CURRENT").exists():
+            found += faults_of_answer(command, workspace, [before, of])
+    if command.base.name != "none" or command.workspaces(place) != [place] or not any(place.glob("*")):
         done = call(command.arguments(place), command.fed)
         if done.returncode != 0:
             return [*found, f"not done again: {done.stderr.decode()[-300:]}"]
-    after = state(place)
-    different = [key for key in clean if after[key] != clean[key] and key not in command.grows]
-    return found + [f"{key} is {str(after[key])[:100]}, not {str(clean[key])[:100]}" for key in different]
+    for after, of in zip(states(command, place), clean, strict=True):
+        different = [key for key in of if after[key] != of[key] and key not in command.grows]
+        found += [f"{key} is {str(after[key])[:100]}, not {str(of[key])[:100]}" for key in different]
+    return found
+
+
+def faults_of_answer(command: Command, workspace: Path, states: list[State | None]) -> list[str]:
+    """Ask a workspace that a kill left, then let its graph catch up, and hold it against its database."""
+    asked = call(["query", QUESTION, "--workspace", workspace, "--format", "csv"])
+    if asked.returncode != 0:
+        return [f"no answer: {asked.stderr.decode()[-300:]}"]
+    if command.grows:
+        return []
+    found = []
+    is_behind = b"behind the database" in asked.stderr
+    if not is_behind and None not in states and asked.stdout not in [of["answers"] for of in states if of]:
+        found.append("another answer, and not a word of it")
+    if is_behind:
+        workflow.catch_up(workspace)
+        if (differ := len(quads(workspace) ^ made_anew(workspace))) > 0:
+            found.append(f"{differ} quads differ from what the database makes")
+    return found
+
+
+def quads(workspace: Path) -> set[Quad]:
+    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
+        return compared(graph)
+
+
+def made_anew(workspace: Path) -> set[Quad]:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Workspace.existing(workspace) as place,
+        KnowledgeGraph(None, workspace, place.resources, place.base) as graph,
+    ):
+        graph.load_ontology()
+        refresh(graph, place.engine, graph.resources.paths("mappings"), Path(folder) / "rows.db")
+        workflow.conclude(graph, lambda line: None)
+        return compared(graph)
+
+
+def compared(graph: KnowledgeGraph) -> set[Quad]:
+    """Return what a graph says, but for notes, names that are drawn, and how blank nodes are called."""
+    apart = (GRAPH_CHANGED, f"{GRAPH_SOURCE}version")
+    found = Dataset(quad for quad in graph.quads() if str(quad.graph_name)[1:-1] not in apart)
+    found.canonicalize(CanonicalizationAlgorithm.UNSTABLE)
+    return set(found)
+
+
+def states(command: Command, place: Path) -> list[State]:
+    return [state(workspace) for workspace in command.workspaces(place)]
 
 
 @cache

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from irtwin.errors import InputError
+from irtwin.errors import GraphBehind, InputError
 from irtwin.knowledge.questions import queries
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from irtwin.knowledge.explain.explanation import Explanation
 
 WORKSPACE = Path("irtwin-workspace")
+BEHIND, UPDATING = "behind", "updating"  # the standing of a graph that is not whole
 
 
 def ask(
@@ -60,11 +62,13 @@ def questions(workspace: Path | str = WORKSPACE) -> Table:
 def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
     """Give a workspace's graph, or a server's, as it stands.
 
-    Raises InputError where there is none, or for a fault in what extends the workspace.
+    One that is behind the database is told by the warning GraphBehind. Raises InputError where there is none, or for a
+    fault in what extends the workspace.
     """
     checked(workspace)
     if url is not None:
         with KnowledgeGraph(url, workspace) as graph:
+            _warn(graph, workspace)
             yield graph
         return
     folder = workspace / "graph"
@@ -75,13 +79,46 @@ def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
             place.check_graph()
         raise InputError(f"{workspace}: no graph here; run `irtwin run DATASET --workspace {workspace}` first")
     with Snapshot(folder) as snapshot:
+        _warn(snapshot.graph, workspace)
         yield snapshot.graph
+
+
+def standing(graph: KnowledgeGraph, workspace: Path) -> str | None:
+    """Return BEHIND, or UPDATING where a process is at work on it; None of a graph that is whole."""
+    if not graph.is_behind:
+        return None
+    from irtwin.storage.turns import is_rewritten  # takes a while to import
+
+    if is_rewritten(workspace):
+        return UPDATING
+    return BEHIND if graph.is_behind else None  # a server's may have become whole meanwhile
+
+
+def in_words(standing: str, workspace: Path) -> str:
+    """Return the line that says so to people."""
+    if standing == UPDATING:
+        return f"{workspace}: the graph is being updated just now: answers may lack something; ask again in a moment"
+    return (
+        f"{workspace}: the graph is behind the database, as a command was broken off or failed: answers may lack "
+        f"something, or hold what is over; `irtwin reason --workspace {workspace}` catches up"
+    )
+
+
+def _warn(graph: KnowledgeGraph, workspace: Path) -> None:
+    found = standing(graph, workspace)
+    if found is not None:
+        warnings.warn(GraphBehind(in_words(found, workspace)), stacklevel=5)  # whoever asks a question
 
 
 def contradictions(workspace: Path, url: str | None) -> list[str]:
     """Return, in words, which statements of a graph contradict each other. Raises InputError as `open_graph`."""
     with open_graph(workspace, url) as graph:
-        return [row["why"] for row in graph.query("SELECT DISTINCT ?why { ?of irt:Contradiction ?why } ORDER BY ?why")]
+        return contradictions_of(graph)
+
+
+def contradictions_of(graph: KnowledgeGraph) -> list[str]:
+    """Return, in words, which statements of a graph contradict each other."""
+    return [row["why"] for row in graph.query("SELECT DISTINCT ?why { ?of irt:Contradiction ?why } ORDER BY ?why")]
 
 
 def checked(workspace: Path) -> Resources:

@@ -17,3 +17,7 @@ class WorkspaceFault(InputError):
     Its disk is full, its server or storage is away, another process writes, or it is damaged. Once that is mended, the
     same input may do.
     """
+
+
+class GraphBehind(UserWarning):
+    """The graph that answers lacks some of what the database holds, or of what follows from it: one line says why."""

@@ -63,7 +63,7 @@ def improve(
         for run in logged.runs:
             check_run_name(place, robot_id, run.name)
         runs = sound(logged, announce).runs
-        with rewriting(place, graph_url) as graph:
+        with rewriting(place, graph_url, announce) as graph:
             graph.load_ontology()
             limit = _limit(graph)
             with staged(place, robot_id) as apart:

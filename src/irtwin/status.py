@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
 from sqlalchemy import select
 
-from irtwin.asking import WORKSPACE, contradictions
+from irtwin.asking import BEHIND, WORKSPACE, contradictions_of, in_words, standing
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -21,9 +21,10 @@ from irtwin.report.extensions import check
 from irtwin.resources import Resource
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import shown
+from irtwin.storage.journal import left_behind
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
-from irtwin.storage.schema import Base, Robot, Run, Twin
+from irtwin.storage.schema import LIVE, Base, Robot, Run, Twin
 from irtwin.storage.series_place import elsewhere
 from irtwin.trust import how, trusted
 from irtwin.upkeep import asked, lost_files
@@ -65,8 +66,7 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
             found.parts["series"] = [storage.url]
         found.parts["robots"] = _robots(place) or ["none"]
         with found.noting():
-            found.parts["graph"] = [_graph(place, graph_url)]
-            found.faults.extend(contradictions(place.folder, graph_url) if place.knows_robots() else ())
+            _look_at_graph(found, place, graph_url)
         extensions = place.resources.extensions
         found.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
         with found.noting():
@@ -77,6 +77,11 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
         with found.noting():
             check(place.resources)
             check_mappings(place.resources, place.engine)
+        found.faults.extend(
+            f"{journal.stem} is in the graph as it was when `irtwin live` was killed; the next `irtwin live` takes in "
+            "its samples, which are on the disk"
+            for journal in left_behind(place.folder / LIVE)
+        )
         with found.noting():
             found.faults.extend(lost_files(place))
     return found
@@ -106,15 +111,21 @@ def _robots(place: Workspace) -> list[str]:
     return lines
 
 
-def _graph(place: Workspace, url: str | None) -> str:
-    if url is not None:
-        with KnowledgeGraph(url, place.folder, place.resources) as graph:
-            return _size(graph)
-    place.check_graph()
-    if not (place.graph_folder / "CURRENT").is_file():
-        return "none yet"
-    with Snapshot(place.graph_folder) as snapshot:
-        return _size(snapshot.graph)
+def _look_at_graph(found: Status, place: Workspace, url: str | None) -> None:
+    with ExitStack() as held:
+        if url is not None:
+            graph = held.enter_context(KnowledgeGraph(url, place.folder, place.resources))
+        else:
+            place.check_graph()
+            if not (place.graph_folder / "CURRENT").is_file():
+                found.parts["graph"] = ["none yet"]
+                return
+            graph = held.enter_context(Snapshot(place.graph_folder)).graph
+        found.parts["graph"] = [_size(graph)]
+        stands = standing(graph, place.folder)
+        if stands is not None:
+            (found.faults if stands == BEHIND else found.parts["graph"]).append(in_words(stands, place.folder))
+        found.faults.extend(contradictions_of(graph) if place.knows_robots() else ())
 
 
 def _size(graph: KnowledgeGraph) -> str:

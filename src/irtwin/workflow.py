@@ -43,6 +43,7 @@ from irtwin.report.gap.page import render_alone
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
+from irtwin.storage.engine import before_writing
 from irtwin.storage.files import check_place, write
 from irtwin.storage.staging import staged
 from irtwin.storage.turns import rewriting_alone
@@ -76,7 +77,7 @@ def run(
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
     with Workspace(Path(workspace), database, base=base, series_url=series_url) as place:
-        with rewriting(place, graph_url) as graph:
+        with rewriting(place, graph_url, announce) as graph:
             robot_id = take_in(place, data_set, announce)
             graph.load_ontology()
             map_rows(place, graph)
@@ -140,7 +141,7 @@ def diagnose(
         announce("Storing the diagnosis")
         robot_id = identifier(data_set.robot.name)
         closed = None if found.twin is None else to_json(found.twin)
-        with Workspace(kept_in, database) as place, rewriting(place, graph_url) as graph:
+        with Workspace(kept_in, database) as place, rewriting(place, graph_url, announce) as graph:
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set)
@@ -148,6 +149,7 @@ def diagnose(
             graph.load_ontology()
             map_rows(place, graph)
             reason(graph)
+            validate(graph)
     return found
 
 
@@ -165,6 +167,7 @@ def adopt(
             map_rows(place, graph)
             populate_others(place, graph, lambda line: None)  # live runs by the new twin
             reason(graph)
+            validate(graph)
             next_experiment(place, graph, robot_id)
         return write_report(place, graph_url, robot_id)
 
@@ -183,10 +186,23 @@ def reason_again(
     They stay until the graph changes, or the native engine is asked again. Raises InputError where the engine cannot
     run, Contradiction where the graph contradicts itself.
     """
-    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url) as graph:
+    announce = _clocked(announce)
+    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url, announce) as graph:
         graph.load_ontology()
         map_rows(place, graph)
-        conclude(graph, _clocked(announce), engine)
+        conclude(graph, announce, engine)
+
+
+def catch_up(
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> None:
+    """Bring a graph up to date that a command which was broken off left behind the database; no other is changed."""
+    with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url, announce):
+        pass
 
 
 def backup(
@@ -236,10 +252,11 @@ def _check_effects(data_set: DataSet) -> None:
 
 
 @contextmanager
-def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
-    """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server.
+def rewriting(place: Workspace, url: str | None, announce: Announce = lambda line: None) -> Iterator[KnowledgeGraph]:
+    """Open the workspace's graph to rewrite it: in its folder, or on a SPARQL server; bring up to date one left behind.
 
     Who reads the folder meanwhile sees what was there before, if anything was; who wants to rewrite it too waits.
+    Where the block fails after a change, the graph says that it is behind.
     Raises InputError for a fault in what extends the workspace, before anything is written, or after too long a wait.
     """
     check_extensions(place.resources)
@@ -248,9 +265,29 @@ def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
     with ExitStack() as held:
         held.enter_context(rewriting_alone(place.engine, place.folder))
         graph = held.enter_context(KnowledgeGraph.of_workspace(place, url))
+        if graph.is_behind:
+            _catch_up(place, graph, announce)
         if url is None and graph.graphs():
             held.enter_context(kept(place.graph_folder))
+        held.enter_context(_told(place, graph))
         yield graph
+
+
+@contextmanager
+def _told(place: Workspace, graph: KnowledgeGraph) -> Iterator[None]:
+    """Have the graph say that it is behind from the first change of it, or of rows, until the block ends well."""
+    with graph.rewritten(), before_writing(place.engine, graph.rows_change):
+        yield
+
+
+def _catch_up(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
+    """Do what the command that left the graph behind had not done, from the rows that it left."""
+    announce("Catching up: the graph is behind the database, as a command was broken off or failed")
+    with _told(place, graph):
+        graph.load_ontology()
+        map_rows(place, graph)
+        populate_others(place, graph, announce)
+        conclude(graph, announce)
 
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:

@@ -243,3 +243,35 @@ def test_binding_restricts_a_variable_that_need_not_be_asked_for(graph: Knowledg
 def test_binding_that_is_no_iri_is_a_bug(graph: KnowledgeGraph) -> None:
     with pytest.raises(ValueError, match="IRI"):
         graph.query("SELECT * { ?robot ?p ?o }", {"robot": "x> } INSERT"})
+
+
+def test_a_graph_says_that_it_is_behind_from_the_first_change_until_the_last_was_made() -> None:
+    graph = KnowledgeGraph()
+    with graph.rewritten():
+        assert not graph.is_behind
+        graph.replace([quad("x", 2.0, A)], A)
+        assert graph.is_behind
+    assert not graph.is_behind
+    with graph.rewritten():
+        graph.replace([quad("x", 2.0, A)], A)  # as it was
+        assert not graph.is_behind
+        graph.rows_change()
+        assert graph.is_behind
+    assert not graph.is_behind and total(graph) == 2.0
+    graph.change([], [quad("y", 2.0, A)])
+    graph.rows_change()  # of a live run, which shows by itself what becomes of its rows
+    assert not graph.is_behind
+
+
+def test_it_goes_on_to_say_so_where_that_fails_until_a_later_one_ends_well() -> None:
+    graph = KnowledgeGraph()
+    with pytest.raises(KeyError), graph.rewritten():
+        graph.replace([quad("x", 2.0, A)], A)
+        raise KeyError
+    assert graph.is_behind
+    with graph.rewritten():
+        assert graph.is_behind
+    assert not graph.is_behind
+    with pytest.raises(KeyError), graph.rewritten():
+        raise KeyError
+    assert not graph.is_behind

@@ -5,9 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import random
 import shutil
+import sqlite3
 import subprocess
 import sys
+import time
+from contextlib import closing
 from datetime import timedelta
 from importlib import import_module
 from pathlib import Path
@@ -257,6 +261,39 @@ def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Pa
             assert migration.revision(connection) == BEFORE
     with Workspace(tmp_path / "place") as place:
         assert "sample_rate_hz" in columns(place)
+
+
+@pytest.mark.nightly
+def test_killed_ten_times_at_any_moment_it_leaves_old_or_new_tables(tmp_path: Path, later: Path) -> None:
+    with Workspace(tmp_path / "old") as place:
+        older(place)
+        before = columns(place)
+    moments, command = random.Random(3), [sys.executable, "-c", OPEN, later, tmp_path / "place"]
+    shutil.copytree(tmp_path / "old", tmp_path / "place")
+    began = time.perf_counter()
+    assert subprocess.run(command, check=False).returncode == 0
+    length, killed = time.perf_counter() - began, 0
+    with Workspace(tmp_path / "place") as place:
+        after, rows = columns(place), said(place)
+    for _ in range(10):
+        shutil.rmtree(tmp_path / "place")
+        shutil.copytree(tmp_path / "old", tmp_path / "place")
+        with subprocess.Popen(command) as process:
+            try:
+                process.wait(moments.uniform(0.5, 1.0) * length)  # it imports for the first half
+            except subprocess.TimeoutExpired:
+                process.kill()
+                killed += 1
+        with closing(sqlite3.connect(tmp_path / "place/irtwin.db")) as connection:
+            assert {row[1] for row in connection.execute("PRAGMA table_info(run)")} in (before, after)
+        with Workspace(tmp_path / "place") as place:
+            assert (columns(place), said(place)) == (after, rows)
+    print(f"{killed} of 10 killed")
+
+
+def said(place: Workspace) -> list[tuple[object, ...]]:
+    with place.engine.connect() as connection:
+        return [tuple(row) for row in connection.execute(text("SELECT * FROM run ORDER BY run_id"))]
 
 
 def test_a_workspace_of_a_newer_irtwin_is_refused(tmp_path: Path) -> None:

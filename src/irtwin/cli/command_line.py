@@ -6,16 +6,24 @@ import errno
 import os
 import sys
 import traceback
+import warnings
 from io import TextIOWrapper
+from typing import Any
 
 import click
 
 from irtwin import __version__
 from irtwin.cli import alarms, bring, fleet, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
-from irtwin.errors import InputError
+from irtwin.errors import GraphBehind, InputError
 
 _LONGEST = 2000  # characters of an error
+_NO_ROOM, _NO_RIGHT = "free some space and try again", "ask its owner for the right, or choose another place"
+_ASIDE = {  # what the system refuses, and what to do
+    **dict.fromkeys((errno.ENOSPC, errno.EFBIG, errno.EDQUOT), _NO_ROOM),
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _NO_RIGHT),
+}
+_python_warns = warnings.showwarning
 
 
 def main() -> None:
@@ -24,6 +32,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 is no reason to stop
+    warnings.showwarning = _warn
     try:
         cli.main(prog_name="irtwin", standalone_mode=False)
         sys.stdout.flush()
@@ -33,10 +42,10 @@ def main() -> None:
         say(f"irtwin: {error}"[:_LONGEST])
         sys.exit(2)
     except OSError as error:
-        if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+        if error.errno not in (errno.EPIPE, *_ASIDE):
             raise
         if error.errno != errno.EPIPE:  # else who read the answer has left, and needs no word
-            say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; free some space and try again")
+            say(f"irtwin: {error.filename or 'the output'}: {error.strerror}; {_ASIDE[error.errno]}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python flushes once more at its end
         sys.exit(2)
     except click.ClickException as error:
@@ -45,6 +54,14 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("irtwin: stopped", err=True)
         sys.exit(130)
+
+
+def _warn(message: Warning | str, category: type[Warning], *where: Any, **how: Any) -> None:
+    """Say in one line what people are to know, and any other warning as Python does."""
+    if issubclass(category, GraphBehind):
+        say(f"irtwin: {message}")
+    else:
+        _python_warns(message, category, *where, **how)
 
 
 def _check_system() -> None:

@@ -36,9 +36,12 @@ def serve(
     are shown where `plant.toml` in the workspace says price_per_kwh, currency and co2_kg_per_kwh. The endpoint is
     read-only unless you give a token for updates, in a file or in the environment variable IRTWIN_TOKEN.
 
+    Where a command was broken off and left the graph behind the database, answers have the header `Irtwin-Graph:
+    behind` (`updating` while a command is at work on it) and pages a banner. The server catches up by itself.
+
     With --graph the pages and the endpoint ask the server that keeps the graph. Functions of series are not there
-    then, and a query that is cancelled may go on at that server, up to its own limit. --database is only read at the
-    start: the graph must know of robots if the database does.
+    then, and a query that is cancelled may go on at that server, up to its own limit. --database is read at the
+    start, as the graph must know of robots if the database does, and to catch up.
     """
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
@@ -92,6 +95,7 @@ def live(
     from irtwin.live.watch import watch
     from irtwin.report.extensions import check
     from irtwin.resources import resources_of
+    from irtwin.workflow import catch_up
 
     if sum(source is not None for source in (port, replay, rtde)) > 1:
         raise click.UsageError("Give one of --port, --replay and --rtde.")
@@ -102,6 +106,7 @@ def live(
     if performs is not None and robot is None:
         raise click.UsageError("--performs goes with --replay or --rtde; lines of a stream say it by themselves.")
     check(resources_of(workspace))
+    catch_up(workspace, database=database, graph_url=graph_url, announce=say)  # while it watches, nobody else can
     watch(
         workspace,
         database=database,

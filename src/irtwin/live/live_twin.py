@@ -293,9 +293,9 @@ class LiveTwin:
             for run in ended:
                 with self._showing:
                     run.over = True
-                run.journal.close()
                 counts = {"superseded_states": run.superseded, "waited_s": self.waited}
                 self._close(run.journal.path, *read_journal(run.journal.path), counts, run.shown)
+                run.journal.close()  # last: till then it is nobody's who crashed
             self._refresh()
 
     def _close(

@@ -13,8 +13,9 @@ from starlette.requests import Request
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.table import to_python
 from irtwin.report.questions import Answer, Answers, Question, Row
-from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
+from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
 Bindings = Mapping[str, str | Literal]
@@ -34,29 +35,41 @@ class Asking:
     async def answers(self, request: Request, questions: Mapping[str, Question], bindings: Bindings) -> Answers:
         """Answer a page's questions; `bindings` gives variables an IRI or a literal. Raises Refusal."""
         texts = {name: bound(question.text, bindings) for name, question in questions.items()}
-        bodies = await self._all(client(request), [(text, _JSON) for text in texts.values()])
+        bodies = await self._told(request, [(text, _JSON) for text in texts.values()])
         rows = await asyncio.to_thread(lambda: [_rows(body) for _, body in bodies])
         return {name: Answer(questions[name], found) for name, found in zip(texts, rows, strict=True)}
 
     async def holds(self, request: Request, pattern: str, bindings: Bindings) -> bool:
         """Whether the graph has what a pattern asks for."""
-        ((_, body),) = await self._all(client(request), [(bound(f"ASK {{ {pattern} }}", bindings), _JSON)])
+        ((_, body),) = await self._told(request, [(bound(f"ASK {{ {pattern} }}", bindings), _JSON)])
         found = parse_query_results(body, QueryResultsFormat.JSON)
         assert isinstance(found, QueryBoolean)
         return bool(found)
 
     async def written(self, request: Request, text: str, accept: str) -> tuple[str, bytes]:
         """Return an answer as it is sent, and its media type."""
-        (answer,) = await self._all(client(request), [(text, accept)])
-        return answer
+        ((head, body),) = await self._told(request, [(text, accept)])
+        return head.media_type, body
 
-    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[str, bytes]]:
+    async def standing(self) -> str | None:
+        """Return how the graph stands, as `irtwin.asking` has it. Raises Refusal."""
+        ((head, _),) = await self._all("", [("ASK {}", _JSON)])
+        return head.standing
+
+    async def _told(self, request: Request, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
+        """Return answers for a client, who is told how the graph stands."""
+        answers = await self._all(client(request), asked)
+        for head, _ in answers:
+            note(request, head.standing)
+        return answers
+
+    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
         for _ in range(_TRIES):
             with suppress(NotBegun):
                 return await self._of_one_worker(client, asked)
         raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
 
-    async def _of_one_worker(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[str, bytes]]:
+    async def _of_one_worker(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
         async with self._pool.worker(client) as worker:
             deadline = time.monotonic() + self._limits.seconds
             try:
@@ -68,15 +81,15 @@ class Asking:
                     503, f"the page's queries were cancelled after {seconds:g} s: the graph is large"
                 ) from None
 
-    async def _body(self, worker: Worker, text: str, accept: str) -> tuple[str, bytes]:
+    async def _body(self, worker: Worker, text: str, accept: str) -> tuple[Head, bytes]:
         about = {"text": text, "default_graphs": (), "named_graphs": (), "base": self.base, "accept": accept}
-        media_type = await worker.ask({**about, "at_once": self._updates.just_now})
+        head = await worker.ask({**about, "at_once": self._updates.just_now})
         body = bytearray()
         async for piece in worker.pieces():
             body += piece
             if len(body) > _MOST:
                 raise Refusal(503, "there is more of this than a page shows: ask /sparql for a part of it")
-        return media_type, bytes(body)
+        return head, bytes(body)
 
 
 def client(request: Request) -> str:

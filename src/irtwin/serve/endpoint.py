@@ -15,6 +15,7 @@ from irtwin.serve import description, negotiation, page
 from irtwin.serve.answer import Answer, Answers
 from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
+from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
 _METHODS = "GET, HEAD, POST, OPTIONS"
@@ -88,7 +89,7 @@ class Endpoint:
         accept = request.headers.get("accept", "")
         if negotiation.wants_page(accept):
             return page.response()
-        graphs = await self._named_graphs(_address(request), _client(request))
+        graphs = await self._named_graphs(request)
         return description.response(accept, _address(request), graphs, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
@@ -106,9 +107,8 @@ class Endpoint:
         with self._answers.new() as answer, ExitStack() as held:
             async with self._pool.worker(_client(request)) as worker:
                 deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
-                media_type = await self._ask(
-                    worker, operation, _address(request), request.headers.get("accept", ""), deadline
-                )
+                accept = request.headers.get("accept", "")
+                media_type = await self._ask(worker, operation, request, accept, deadline)
                 sending = asyncio.create_task(_send(answer, media_type, send))
                 held.callback(sending.cancel)
                 try:
@@ -125,27 +125,30 @@ class Endpoint:
                     answer.break_off()
             await sending
 
-    async def _ask(self, worker: Worker, operation: Operation, base: str, accept: str, deadline: float) -> str:
-        request = {
+    async def _ask(self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float) -> str:
+        """Ask a worker; return the answer's media type."""
+        asked = {
             "text": operation.text,
             "default_graphs": operation.default_graphs,
             "named_graphs": operation.named_graphs,
-            "base": base,
+            "base": _address(request),
             "accept": accept,
             "at_once": self._updates.just_now,
         }
         try:
             async with asyncio.timeout_at(deadline):
-                return await worker.ask(request)
+                head = await worker.ask(asked)
         except TimeoutError:
             seconds = self._limits.seconds
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
+        note(request, head.standing)
+        return head.media_type
 
-    async def _named_graphs(self, base: str, client: str) -> list[str]:
-        async with self._pool.worker(client) as worker:
+    async def _named_graphs(self, request: Request) -> list[str]:
+        async with self._pool.worker(_client(request)) as worker:
             deadline = time.monotonic() + self._limits.seconds
             try:
-                await self._ask(worker, Operation("query", description.NAMED_GRAPHS), base, "text/csv", deadline)
+                await self._ask(worker, Operation("query", description.NAMED_GRAPHS), request, "text/csv", deadline)
             except NotBegun:
                 raise Refusal(503, "the graph cannot be read just now", {"Retry-After": "2"}) from None
             body = b"".join([piece async for piece in worker.pieces()])

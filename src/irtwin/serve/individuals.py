@@ -20,6 +20,7 @@ from irtwin.serve import negotiation, ontology
 from irtwin.serve.asking import Asking
 from irtwin.serve.plant_pages import html
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.standing import noted
 
 _FORMS = {
     "ttl": "text/turtle", "jsonld": "application/ld+json", "nt": "application/n-triples", "rdf": "application/rdf+xml",
@@ -48,16 +49,15 @@ async def respond(asking: Asking, known: Resources, request: Request) -> Respons
         raise Refusal(404, f"the graph knows nothing of {iri}{others}")
     if negotiation.wants_page(accept):
         answers = await asking.answers(request, page.questions("individual"), {"individual": iri})
-        return await html(lambda: _page(iri, answers, asking.base))
+        return await html(lambda: _page(iri, answers, asking.base, noted(request)))
     media_type, body = await asking.written(request, f"DESCRIBE {NamedNode(iri)}", accept)
     return Response(body, media_type=media_type, headers={"Vary": "Accept", "Cache-Control": "no-cache"})
 
 
-def _page(iri: str, answers: Answers, base: str) -> str:
-    found, bindings = individual.individual(iri, answers, base), {"individual": iri}
-    return page.render(
-        "individual/page.html.jinja", answers, bindings, found=found, most=individual.MOST_VALUES, base=base
-    )
+def _page(iri: str, answers: Answers, base: str, standing: str | None) -> str:
+    found = individual.individual(iri, answers, base)
+    said = {"found": found, "most": individual.MOST_VALUES, "base": base, "graph_stands": standing}
+    return page.render("individual/page.html.jinja", answers, {"individual": iri}, **said)
 
 
 def _iri(request: Request, base: str) -> str:

@@ -21,6 +21,7 @@ from irtwin.report.questions import Answers, Question
 from irtwin.serve.asking import Asking, Bindings
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
+from irtwin.serve.standing import noted
 from irtwin.storage.database import TARIFF
 
 POLICY = (
@@ -53,7 +54,7 @@ class PlantPages:
 
     async def _plant(self, request: Request) -> Response:
         answers = await self._asking.answers(request, page.questions(), {})
-        said = {**self._beside(), "number": page_number(request.query_params.get("page"))}
+        said = {**self._beside(request), "number": page_number(request.query_params.get("page"))}
 
         def drawn() -> str:
             found = overview.overview(answers, said["tariff"])
@@ -64,7 +65,7 @@ class PlantPages:
     async def _robot(self, request: Request) -> Response:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
-        said = {**self._beside(), "report": self._reports.of_robot(self._links.tail(iri))}
+        said = {**self._beside(request), "report": self._reports.of_robot(self._links.tail(iri))}
         said["number"] = page_number(request.query_params.get("page"))
         return await html(
             lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **robot.of_robot(answers), **said)
@@ -74,18 +75,19 @@ class PlantPages:
         iri = self._individual("run", request.path_params["name"])
         answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
         (run,) = answers["run"].rows
-        said = {**self._beside(), "report": self._reports.of_robot(self._links.tail(run["robot"]))}
+        said = {**self._beside(request), "report": self._reports.of_robot(self._links.tail(run["robot"]))}
         return await html(
             lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said)
         )
 
     async def _compare(self, request: Request) -> Response:
-        said, trouble = self._beside(), ""
+        trouble = ""
         try:
             found, answers = await self._compared(request)
         except InputError as error:
             found, trouble = None, str(error)
             answers = await self._choice(request)
+        said = self._beside(request)
         bindings = {"robot": self._individual("robot", request.query_params.get("robot", ""))}
         said |= {"asked": dict(request.query_params), "query": request.url.query, "found": found}
         said |= {"trouble": trouble} if trouble else {}
@@ -93,7 +95,7 @@ class PlantPages:
 
     async def _robots_table(self, request: Request) -> Response:
         answers = await self._asking.answers(request, page.questions(), {})
-        tariff = self._beside()["tariff"]
+        tariff = self._beside(request)["tariff"]
         return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff), tariff))
 
     async def _made_table(self, request: Request) -> Response:
@@ -150,8 +152,11 @@ class PlantPages:
             raise Refusal(404, f"the graph knows no {about} {bindings[about]}")
         return answers
 
-    def _beside(self) -> dict[str, Any]:
-        """Return what each page says beside its answers: base, tariff as it is now, or what is wrong with its file."""
+    def _beside(self, request: Request) -> dict[str, Any]:
+        """Return what each page says beside its answers.
+
+        That is base, tariff as it is now, or what is wrong with its file, and how the graph stands that answered.
+        """
         tariff, trouble = Tariff(), ""
         try:
             tariff = read_tariff(self._workspace)
@@ -163,6 +168,7 @@ class PlantPages:
             "file": TARIFF,
             "excel": sheet.excel_is_there(),
             "base": self._asking.base,
+            "graph_stands": noted(request),
         }
 
     def _individual(self, kind: str, tail: str) -> str:

@@ -34,6 +34,14 @@ class Limits:
     waiting: int = 64  # queries
 
 
+@dataclass(frozen=True)
+class Head:
+    """What is known of an answer before its bytes: their media type, and how the graph stands (`irtwin.asking`)."""
+
+    media_type: str
+    standing: str | None
+
+
 class NotBegun(Exception):
     """A worker that was lost before it began with a query: another one may take it."""
 
@@ -72,8 +80,8 @@ class Worker:
         """Whether the process is there."""
         return self._process.returncode is None
 
-    async def ask(self, request: dict[str, Any]) -> str:
-        """Send a query; return the media type of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun."""
+    async def ask(self, request: dict[str, Any]) -> Head:
+        """Send a query; return the head of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun."""
         self.idle = False
         self._write(request)
         try:
@@ -86,7 +94,7 @@ class Worker:
         if "status" in head:
             self.idle = True
             raise Refusal(head["status"], head["message"])
-        return str(head["media_type"])
+        return Head(**head)
 
     async def pieces(self) -> AsyncIterator[bytes]:
         """Give the answer's bytes as they come; Refusal where they end too early."""

@@ -27,6 +27,7 @@ from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.report.plant.tariff import read_tariff
 from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
+from irtwin.serve.catching_up import catch_up
 from irtwin.serve.connections import Connection
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
@@ -36,6 +37,7 @@ from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
 from irtwin.serve.source import Source
+from irtwin.serve.standing import Standing
 from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
 
@@ -64,7 +66,9 @@ def serve(
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
-    app = application(source, host, token=token, limits=limits, base=base, opened=lambda: announce(address))
+    app = application(
+        source, host, token=token, limits=limits, base=base, opened=lambda: announce(address), database=database
+    )
     config = uvicorn.Config(
         app,
         http=Connection,
@@ -151,10 +155,11 @@ def application(
     limits: Limits,
     base: str = ID,
     opened: Callable[[], None] = lambda: None,
+    database: str | None = None,
 ) -> Starlette:
     """Return the ASGI application; its workers live between its start-up and its shutdown.
 
-    base: what the IRIs of the graph's individuals begin with.
+    base: what the IRIs of the graph's individuals begin with; database: the URL of the workspace's, for `catch_up`.
     """
     pool = Pool(source, 1 + max(2, os.cpu_count() or 2), limits)
     updates = Updates(source, token, limits)
@@ -169,7 +174,10 @@ def application(
         try:
             await pool.open()
             opened()
+            catching_up = asyncio.create_task(catch_up(asking, source, database))
             yield
+            catching_up.cancel()
+            await asyncio.gather(catching_up, return_exceptions=True)
         finally:
             live.samples.close()
             await pool.close()
@@ -186,7 +194,7 @@ def application(
             Route("/assets/{name}", page.asset, methods=["GET"]),
             *individuals.routes(asking, resources),
         ],
-        middleware=[Middleware(Guard, local=_is_loopback(host))],
+        middleware=[Middleware(Guard, local=_is_loopback(host)), Middleware(Standing)],
         exception_handlers={Refusal: _refused},
         lifespan=lifespan,
     )

@@ -16,6 +16,7 @@ from typing import IO, Any, cast
 
 from pyoxigraph import QueryBoolean, QueryResultsFormat, QuerySolutions, RdfFormat, serialize
 
+from irtwin.asking import standing
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
@@ -38,6 +39,7 @@ class _Sink:
 
     def __init__(self, out: IO[bytes], most_bytes: int):
         self.media_type = ""
+        self.standing: str | None = None  # of the graph that answers
         self.begun = False
         self.small: bytes | None = None  # the whole answer, where it may be kept
         self._out = out
@@ -64,7 +66,7 @@ class _Sink:
 
     def _send(self) -> None:
         if not self.begun:
-            _frame(self._out, b"H", json.dumps({"media_type": self.media_type}).encode())
+            _frame(self._out, b"H", json.dumps({"media_type": self.media_type, "standing": self.standing}).encode())
             self.begun = True
         _frame(self._out, b"D", bytes(self._held))
         self._held.clear()
@@ -87,6 +89,7 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
             try:
                 graph = current(request["at_once"])
                 _frame(out, b"B", b"")
+                sink.standing = standing(graph, source.workspace)
                 _answer_once(graph, request, sink)
             except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
                 if sink.begun:

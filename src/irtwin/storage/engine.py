@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, Operati
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError, WorkspaceFault
+from irtwin.storage.read_only import connecting, may_only_be_read
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
@@ -27,6 +28,7 @@ _OF_SERVER = {  # by the beginning of PostgreSQL's state
     "25006": "the server takes no changes now; try again later",
     "53": "the server is out of memory, disk or connections; ask who runs it",
 }
+TO_WRITE = "ask its owner for the right, or work on a copy, by `irtwin backup` and `irtwin restore`"
 BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
 _NO_LOCK = "55P03"  # PostgreSQL's state of a lock that was not had in time
 _WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
@@ -42,7 +44,7 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
     if must_exist and address.get_backend_name() == "sqlite" and not Path(address.database or "").is_file():
         raise InputError(f"{address.database}: there is no such SQLite database; give the path of an existing one")
     try:
-        engine = create_engine(address)
+        engine = create_engine(address, **_reading(address))
     except (ModuleNotFoundError, NoSuchModuleError) as error:
         raise InputError(
             f"{shown(address)}: no driver for this database ({error}); for PostgreSQL install irtwin[postgresql]"
@@ -62,6 +64,19 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
     return engine
 
 
+def _reading(address: URL) -> dict[str, Any]:
+    """Return how an SQLite database is opened that this user may only read; nothing of any other."""
+    file = Path(address.database or "")
+    if address.get_backend_name() != "sqlite" or not may_only_be_read(file):
+        return {}
+    return {"creator": connecting(file), "execution_options": {"read_only": True}}
+
+
+def is_read_only(engine: Engine) -> bool:
+    """Whether this user may only read the database: known of SQLite alone."""
+    return bool(engine.get_execution_options().get("read_only", False))
+
+
 def shown(url: URL) -> str:
     """Return a URL as messages may show it: without a password, which may stand among its parameters too."""
     secret = {name: "***" for name in url.query if any(word in name.lower() for word in _SECRETS)}
@@ -73,8 +88,11 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
     """Give a session that is the only writer, in one transaction, committed at the end.
 
     `restructuring`: SQLite changes a table by making another in its place; what refers to it is looked at afterwards.
-    Raises WorkspaceFault where another writer holds the database for longer than BUSY_TIMEOUT.
+    Raises WorkspaceFault where another writer holds the database for longer than BUSY_TIMEOUT, or this user may not
+    write.
     """
+    if is_read_only(engine):
+        raise WorkspaceFault(f"{engine.url.database}: cannot be written, as this user may only read it: {TO_WRITE}")
     with (
         engine.connect().execution_options(writes=True) as connection,
         _free_keys(connection, restructuring),
@@ -87,6 +105,21 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
             broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
             if broken is not None:
                 raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
+
+
+@contextmanager
+def before_writing(engine: Engine, do: Callable[[], None]) -> Iterator[None]:
+    """Have something done before rows change, within the turn of each writer by this engine."""
+
+    def begun(connection: Connection) -> None:
+        if _writes(connection):
+            do()
+
+    event.listen(engine, "begin", begun)
+    try:
+        yield
+    finally:
+        event.remove(engine, "begin", begun)
 
 
 @contextmanager
@@ -125,7 +158,7 @@ def _free_keys(connection: Connection, restructuring: bool) -> Iterator[None]:
 
 def use_write_ahead_log(engine: Engine) -> None:
     """Let an SQLite database's readers go on while one writes; kept in the file, other databases do so anyway."""
-    if engine.dialect.name != "sqlite":
+    if engine.dialect.name != "sqlite" or is_read_only(engine):
         return
     deadline = time.monotonic() + BUSY_TIMEOUT
     while True:
@@ -216,8 +249,11 @@ def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
 
 def _begin_sqlite(connection: Connection) -> None:
     # A writer that begins as a reader could find, too late, that another one wrote meanwhile.
-    writes = connection.get_execution_options().get("writes", False)
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if _writes(connection) else "BEGIN")
+
+
+def _writes(connection: Connection) -> bool:
+    return bool(connection.get_execution_options().get("writes", False))
 
 
 def _locked(error: OperationalError) -> bool:

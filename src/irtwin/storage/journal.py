@@ -106,7 +106,7 @@ def left_behind(folder: Path) -> Iterator[InsidePath]:
     for path in _all(folder):
         with path.open("rb") as file:
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # several may look at once
             except BlockingIOError:
                 continue
         yield path

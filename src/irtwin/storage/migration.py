@@ -60,6 +60,11 @@ def migrate(engine: Engine) -> None:
             f"{engines.shown(engine.url)}: its tables are of revision {current}, this irtwin knows none after "
             f"{newest()}; install the irtwin that made them, or a newer one"
         )
+    if engines.is_read_only(engine):
+        raise InputError(
+            f"{engine.url.database}: its tables are of an older irtwin, and this user may only read it: "
+            "who may write it brings them up to date by `irtwin status`"
+        )
     if newest() != (current or min(known())):
         _keep_copy(engine, current or min(known()))
     with engines.writing(engine, restructuring=True) as session:

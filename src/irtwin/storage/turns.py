@@ -30,16 +30,31 @@ def rewriting_alone(engine: Engine, folder: Path) -> Iterator[None]:
     Raises WorkspaceFault where another one does so for longer than `engine.BUSY_TIMEOUT`.
     """
     with ExitStack() as held:
-        taken = _on_server(engine, held) if engine.dialect.name == "postgresql" else _in_folder(folder, held)
+        turns = [_on_server(engine, held)] if engine.dialect.name == "postgresql" else []
         give_up = time.monotonic() + engines.BUSY_TIMEOUT
-        while not taken():
-            if time.monotonic() > give_up:
-                raise WorkspaceFault(
-                    f"{folder}: another process has been rewriting the graph for {engines.BUSY_TIMEOUT:g} s; "
-                    "try again later, or stop `irtwin live`"
-                )
-            time.sleep(_AGAIN)
+        for taken in (*turns, _in_folder(folder, held)):  # who reads the graph looks into the folder alone
+            while not taken():
+                if time.monotonic() > give_up:
+                    raise WorkspaceFault(
+                        f"{folder}: another process has been rewriting the graph for {engines.BUSY_TIMEOUT:g} s; "
+                        "try again later, or stop `irtwin live`"
+                    )
+                time.sleep(_AGAIN)
         yield
+
+
+def is_rewritten(folder: Path) -> bool:
+    """Whether some process rewrites the graph of the workspace in `folder` just now."""
+    try:
+        file = inside(folder, _FILE).open("rb")
+    except FileNotFoundError:
+        return False
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
 
 
 def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:
@@ -52,7 +67,7 @@ def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
     try:
         file = held.enter_context(inside(folder, _FILE).open("ab"))
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); {engines.TO_WRITE}") from None
 
     def taken() -> bool:
         try:

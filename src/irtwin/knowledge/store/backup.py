@@ -5,12 +5,14 @@ The database goes as rows, so that a backup of an SQLite workspace may be restor
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import re
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -52,18 +54,20 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
     """Write a workspace into an archive, whole or not at all, while others may write.
 
     Rows and files are those of one moment: files are linked while the writers' lock is held, rows read from a snapshot
-    taken then. The graph is that of a moment just after; what it lacks or has more is set right by the next mapping.
+    taken then. Who may only read cannot hold that lock, and is told of files that go meanwhile. The graph is that of a
+    moment just after; what it lacks or has more is set right by the next mapping.
     Raises InputError where a file that the database names is missing or altered, or graph or database are damaged.
     """
     engine.check(place.engine, math.inf)  # a large one was not looked through at opening
-    with files.working_folder(place.folder, ".backup-") as held:
+    reads_only = engine.is_read_only(place.engine)
+    with files.working_folder(archive.absolute().parent if reads_only else place.folder, ".backup-") as held:
         storage = elsewhere(place.folder)
         if storage is not None:  # before writers have to wait: the network may be slow
             fetch_series(storage, held, storage.paths(FOLDER))
         with place.engine.connect() as connection:
             connection.execution_options(**snapshot_options(place.engine))
             with connection.begin():
-                with engine.writing(place.engine):
+                with nullcontext() if reads_only else engine.writing(place.engine):
                     connection.execute(select(func.count()).select_from(Base.metadata.sorted_tables[0]))
                     contents = dict(_linked(place.folder, held))
                     own = (*place.resources.files, *place.resources.left_aside)
@@ -165,12 +169,21 @@ def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
             target = held / name / file.name
             file = inside(folder, f"{name}/{file.name}")  # a link may lead to what is nobody else's
             try:
-                shutil.copyfile(file, target) if name == LIVE else os.link(file, target)
+                shutil.copyfile(file, target) if name == LIVE else _link(file, target)
             except FileNotFoundError:  # the journal of a run that is in the database now
                 continue
             yield f"{name}/{file.name}", target
     if (folder / TARIFF).is_file():
         yield TARIFF, shutil.copyfile(folder / TARIFF, held / TARIFF)
+
+
+def _link(file: Path, target: Path) -> None:
+    try:
+        os.link(file, target)
+    except OSError as error:
+        if error.errno not in (errno.EXDEV, errno.EPERM, errno.EACCES):
+            raise
+        shutil.copyfile(file, target)  # it is another user's, or lies on another disk
 
 
 def _dump_rows(connection: Connection, held: Path) -> Iterator[tuple[str, Path]]:

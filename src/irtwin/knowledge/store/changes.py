@@ -3,6 +3,8 @@
 The individuals that a change speaks of are noted in the same transaction, once for who infers and once for who
 validates; each strikes out its own notes. Where a change cannot tell its individuals, what was inferred loses the name
 of what it was made of, and everything is done anew.
+
+`BEHIND` stands in the graph from before rows or graph begin to change until all that follows from them is in it.
 """
 
 from __future__ import annotations
@@ -12,10 +14,12 @@ from collections.abc import Iterable
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Store
 
 from irtwin.knowledge.vocabulary import (
+    GRAPH,
     GRAPH_CHANGED,
     GRAPH_INFERRED,
     GRAPH_OWL_RL,
     GRAPH_REASONED,
+    GRAPH_SOURCE,
     GRAPH_VALIDATION,
     PROV,
     RDF,
@@ -31,6 +35,8 @@ _REASONED = NamedNode(GRAPH_REASONED)
 _INFLUENCED_BY = NamedNode(PROV + "wasInfluencedBy")
 _READERS = (GRAPH_INFERRED, GRAPH_VALIDATION)
 _TYPE = NamedNode(RDF + "type")
+
+BEHIND = Quad(NamedNode(GRAPH), _INFLUENCED_BY, NamedNode(GRAPH_SOURCE), _CHANGED)
 
 
 def notes(store: Store, quads: Iterable[Quad]) -> set[Quad]:

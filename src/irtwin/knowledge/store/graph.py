@@ -73,6 +73,7 @@ class KnowledgeGraph:
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         self._resources = resources
         self._base = base
+        self._says_first = False  # whether the next change has it say first that it is behind
         self.asserted_since = 0
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
@@ -104,6 +105,7 @@ class KnowledgeGraph:
         graph._store = Store.read_only(str(path))
         graph._workspace, graph._resources, graph._base = workspace or path.parent, resources, None
         graph._reading = Reading(graph._store)
+        graph._says_first = False
         graph.asserted_since = 0
         return graph
 
@@ -162,9 +164,41 @@ class KnowledgeGraph:
             in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
         )
 
+    @property
+    @telling
+    def is_behind(self) -> bool:
+        """Whether somebody began to change the graph, or the rows that it is made of, and has not ended that."""
+        return changes.BEHIND in self._holding([changes.BEHIND.triple])
+
+    @contextmanager
+    def rewritten(self) -> Iterator[None]:
+        """Have the graph say that it is behind, from its first change in the block on, until the block ends well.
+
+        It goes on to say so where the block fails, or the process is killed.
+        """
+        self._says_first = True
+        try:
+            yield
+        finally:
+            self._says_first = False
+        if self.is_behind:
+            self.change([changes.BEHIND], ())
+
+    def rows_change(self) -> None:
+        """Have a graph that is `rewritten` say, on the disk, that it is behind: rows are about to change."""
+        if self._says_first:
+            self._say_behind()
+            self.flush()
+
+    def _say_behind(self) -> None:
+        if self._says_first:
+            self._says_first = False
+            self.change((), [changes.BEHIND])
+
     @contextmanager
     def _writing(self) -> Iterator[Any]:
         """Give the store to write to, and forget what was read of it: all writing goes this way."""
+        self._say_behind()
         try:
             yield self._store
         finally:

@@ -33,6 +33,7 @@
 
   const shown = irtwinAnswer(find("answer"), { prefixes, headings });
   const say = (text, bad) => { find("said").textContent = text; find("said").className = bad ? "banner" : ""; };
+  const STANDS = { behind: "is behind the database", updating: "is being updated just now" };
   let asking = null;
 
   async function ask() {
@@ -48,7 +49,8 @@
       if (body.length > MOST) throw new Error("There is more of this than a page holds: add a LIMIT, or ask the endpoint for CSV.");
       const json = answer.headers.get("Content-Type").includes("json");
       const what = json ? shown.results(JSON.parse(body), () => csv(text)) : shown.triples(body);
-      say(`${what}, in ${((performance.now() - began) / 1000).toFixed(2)} s.`);
+      const stands = STANDS[answer.headers.get("Irtwin-Graph")];
+      say(`${what}, in ${((performance.now() - began) / 1000).toFixed(2)} s.${stands ? ` The graph ${stands}: the answer may lack something.` : ""}`, stands);
     } catch (error) {
       if (mine !== asking) return; // another was asked meanwhile
       shown.clear();

@@ -1,0 +1,60 @@
+"""A graph that was left behind is served with a word of it, and brought up to date meanwhile."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from tests.endpoint import CLIENT, Server, serving
+from tests.killed_writers import broken_off, take_in
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+
+pytestmark = pytest.mark.slow
+ROBOT = "/irtwin/id/robot/A"
+
+
+@pytest.fixture(scope="module")
+def left_behind(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace with a robot in its database that its graph does not know."""
+    folder = tmp_path_factory.mktemp("left")
+    take_in(folder, "A")
+    broken_off(folder, "B")
+    return folder
+
+
+def get(server: Server, path: str, accept: str = "text/html") -> httpx.Response:
+    return CLIENT.get(server.url + path, headers={"Accept": accept})
+
+
+def wait(server: Server, standing: str | None) -> None:
+    while server.ask("ASK {}").headers.get("irtwin-graph") != standing:
+        time.sleep(0.1)
+
+
+def test_it_catches_up_by_itself(left_behind: Path, tmp_path: Path) -> None:
+    shutil.copytree(left_behind, tmp_path / "workspace")
+    with serving(tmp_path / "workspace/graph") as server:
+        wait(server, None)
+        assert get(server, "/irtwin/id/robot/B", "text/turtle").status_code == 200
+        assert "irtwin-graph" not in get(server, "/").headers
+
+
+def test_where_it_cannot_it_says_why_once_and_all_that_answers_says_that_it_is_behind(
+    left_behind: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(left_behind, tmp_path / "workspace")
+    graph = tmp_path / "workspace/graph"
+    with KnowledgeGraph(graph), serving(graph) as server:
+        assert server.process.stderr is not None
+        said = server.process.stderr.readline()
+        assert "behind the database, and cannot catch up: " in said and "it is open already" in said
+        for path in ("/", ROBOT.removeprefix("/irtwin/id"), ROBOT):
+            page = get(server, path)
+            assert page.headers["irtwin-graph"] == "behind" and "The graph is behind the database." in page.text
+        for path, accept in ((ROBOT, "text/turtle"), ("/sparql?query=ASK{}", "*/*"), ("/sparql", "text/turtle")):
+            assert get(server, path, accept).headers["irtwin-graph"] == "behind"
+        assert "irtwin-graph" not in get(server, "/questions").headers

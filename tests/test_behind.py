@@ -1,0 +1,167 @@
+"""A writer is killed: what the graph answers is whole, or it says that it is behind until it has caught up."""
+
+from __future__ import annotations
+
+import multiprocessing
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pyoxigraph import CanonicalizationAlgorithm, Dataset, NamedNode, Quad
+
+from irtwin.asking import BEHIND, UPDATING, ask, standing
+from irtwin.errors import GraphBehind, InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.vocabulary import GRAPH_CHANGED, GRAPH_REASONED, GRAPH_SOURCE
+from irtwin.providers.records import find_robot
+from irtwin.status import status
+from irtwin.storage import turns
+from irtwin.storage.database import Workspace
+from irtwin.storage.journal import Header, Journal
+from irtwin.storage.schema import LIVE
+from irtwin.workflow import conclude, map_rows, rewriting
+from tests import data_sets, killed_writers, sparql_servers
+from tests.killed_writers import broken_off, killed, take_in
+
+pytestmark = pytest.mark.slow
+
+FORKS = multiprocessing.get_context("forkserver")
+FORKS.set_forkserver_preload([killed_writers.__name__])
+NOT_COMPARED = (GRAPH_CHANGED, f"{GRAPH_SOURCE}version")  # notes, and a name that is drawn
+
+
+def said(graph: KnowledgeGraph) -> set[Quad]:
+    found = Dataset(quad for quad in graph.quads() if quad.graph_name.value not in NOT_COMPARED)  # type: ignore[union-attr]
+    found.canonicalize(CanonicalizationAlgorithm.UNSTABLE)  # blank nodes have no names of their own
+    return set(found)
+
+
+def answered(folder: Path) -> tuple[set[Quad], str | None]:
+    with Snapshot(folder / "graph") as snapshot:
+        return said(snapshot.graph), standing(snapshot.graph, folder)
+
+
+def made_anew(folder: Path, tmp_path: Path, database: str | None = None) -> set[Quad]:
+    """Return what a graph says that is made of the same database in one go."""
+    with Workspace(folder, database) as place, KnowledgeGraph(workspace=folder, base=place.base) as graph:
+        graph.load_ontology()
+        place.mapped_rows.rename(tmp_path / "kept")
+        map_rows(place, graph)
+        (tmp_path / "kept").rename(place.mapped_rows)
+        conclude(graph, lambda line: None)
+        return said(graph)
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("before")
+    take_in(folder, "A")
+    return folder
+
+
+def killed_at(moment: int, before: Path, folder: Path) -> bool:
+    """Have a process take in another robot and be killed; return whether it was, or ended before."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(before, folder)
+    process = FORKS.Process(target=killed, args=(moment, folder, "B"))
+    process.start()
+    process.join(120)
+    assert process.exitcode in (0, -9)
+    return process.exitcode == -9
+
+
+def hold(before: Path, tmp_path: Path, moments: list[int]) -> list[str | None]:
+    """Kill at each moment, and look; return how the graph stood."""
+    whole = [answered(before)[0]]
+    assert not killed_at(-1, before, tmp_path / "whole")
+    whole.append(answered(tmp_path / "whole")[0])
+    stood = []
+    for moment in moments:
+        folder = tmp_path / "killed"
+        if not killed_at(moment, before, folder):
+            break
+        answer, stands = answered(folder)
+        assert stands == BEHIND or answer in whole
+        stood.append(stands)
+        with Workspace(folder) as place, rewriting(place, None):
+            pass
+        answer, stands = answered(folder)
+        assert stands is None
+        assert answer == made_anew(folder, tmp_path)
+    return stood
+
+
+def test_a_killed_writer_leaves_a_graph_that_is_whole_or_says_that_it_is_behind(before: Path, tmp_path: Path) -> None:
+    assert BEHIND in hold(before, tmp_path, [2, 5, 8])
+
+
+@pytest.mark.nightly
+def test_whichever_write_it_was_killed_at(before: Path, tmp_path: Path) -> None:
+    stood = hold(before, tmp_path, list(range(100)))
+    print(stood)
+    assert stood[0] is None and 5 < stood.count(BEHIND) < 100
+
+
+def without_notes(quads: set[Quad]) -> set[Quad]:
+    """Leave out of what the conclusions were made: a server's graph is reasoned over as one part."""
+    return {quad for quad in quads if quad.graph_name != NamedNode(GRAPH_REASONED)}
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("moment", [2, 6, 10])
+def test_on_servers_as_well(tmp_path: Path, new_postgresql_database: Callable[[], str], moment: int) -> None:
+    database = new_postgresql_database()
+    with sparql_servers.oxigraph() as server:
+        take_in(tmp_path, "A", database, server.url)
+        process = FORKS.Process(target=killed, args=(moment, tmp_path, "B", database, server.url))
+        process.start()
+        process.join(120)
+        assert process.exitcode == -9
+        with KnowledgeGraph(server.url, tmp_path) as graph:
+            assert standing(graph, tmp_path) == BEHIND
+            with Workspace(tmp_path, database) as place, rewriting(place, server.url):
+                pass
+            assert standing(graph, tmp_path) is None
+            assert without_notes(said(graph)) == without_notes(made_anew(tmp_path, tmp_path, database))
+
+
+def test_a_writer_at_work_is_told_apart(before: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "workspace"
+    shutil.copytree(before, folder)
+    broken_off(folder, "B")
+    assert answered(folder)[1] == BEHIND
+    with Workspace(folder) as place, turns.rewriting_alone(place.engine, folder):
+        assert answered(folder)[1] == UPDATING
+
+
+def test_who_asks_is_warned(before: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "workspace"
+    shutil.copytree(before, folder)
+    broken_off(folder, "B")
+    with pytest.warns(GraphBehind, match=r"behind the database, .*; `irtwin reason --workspace \S+` catches up"):
+        ask("ASK {}", folder)
+    (fault,) = status(folder).faults
+    assert "behind the database" in fault
+    done = data_sets.irtwin("query", "ASK {}", "--workspace", folder)
+    assert done.status == 0 and done.err.startswith(f"irtwin: {folder}: the graph is behind the database")
+    assert data_sets.irtwin("reason", "--workspace", folder, "--quiet").status == 0
+    assert not status(folder).faults and not data_sets.irtwin("query", "ASK {}", "--workspace", folder).err
+
+
+def test_what_fails_before_it_changes_anything_leaves_the_graph_whole(before: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "workspace"
+    shutil.copytree(before, folder)
+    with pytest.raises(InputError, match="no robot"), Workspace(folder) as place, rewriting(place, None):
+        find_robot(place, "Nobody")
+    assert answered(folder)[1] is None
+
+
+def test_runs_that_a_killed_live_left_are_told(before: Path, tmp_path: Path) -> None:
+    shutil.copytree(before, tmp_path / "workspace")
+    journal = Journal(tmp_path / "workspace" / LIVE, Header("A.live_1", "A", 0.0, ("time",)))
+    assert not status(tmp_path / "workspace").faults  # it is watched just now
+    journal.close()
+    (fault,) = status(tmp_path / "workspace").faults
+    assert fault.startswith("A.live_1 is in the graph as it was when `irtwin live` was killed; the next `irtwin live`")
