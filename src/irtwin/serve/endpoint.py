@@ -15,6 +15,7 @@ from irtwin.serve import description, negotiation, page
 from irtwin.serve.answer import Answer, Answers
 from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
+from irtwin.serve.shares import client
 from irtwin.serve.updates import Updates
 
 _METHODS = "GET, HEAD, POST, OPTIONS"
@@ -88,7 +89,7 @@ class Endpoint:
         accept = request.headers.get("accept", "")
         if negotiation.wants_page(accept):
             return page.response()
-        graphs = await self._named_graphs(_address(request), _client(request))
+        graphs = await self._named_graphs(_address(request), client(request))
         return description.response(accept, _address(request), graphs, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
@@ -104,7 +105,7 @@ class Endpoint:
     async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
         """Take the answer off the worker as fast as it makes it; the client may take its time."""
         with self._answers.new() as answer, ExitStack() as held:
-            async with self._pool.worker(_client(request)) as worker:
+            async with self._pool.worker(client(request)) as worker:
                 deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
                 media_type = await self._ask(
                     worker, operation, _address(request), request.headers.get("accept", ""), deadline
@@ -177,11 +178,6 @@ async def _left(receive: Receive) -> None:
 def _address(request: Request) -> str:
     """Return the endpoint's address as the client wrote it, which relative IRIs are below."""
     return str(request.url.replace(query=""))
-
-
-def _client(request: Request) -> str:
-    """Return the address that a client asks from; clients of one machine, or behind one proxy, share it."""
-    return request.client.host if request.client is not None else ""
 
 
 def _with_charset(media_type: str) -> str:

@@ -243,8 +243,15 @@
   }
 
   for (const place of ["by-joint", "by-effect", "gaps"]) bars(place, []);
-  const events = new EventSource(here + "/events");
-  events.onmessage = take;
+  function follow() {
+    const events = new EventSource(here + "/events");
+    events.onmessage = take;
+    events.onerror = () => { // a browser comes again by itself, but not once it was refused
+      if (events.readyState === EventSource.CLOSED) setTimeout(follow, 5000);
+    };
+  }
+
+  follow();
   build().catch((error) => { find("drawing").textContent = error.message; });
   poll();
   requestAnimationFrame(frame);
