@@ -48,15 +48,15 @@ JOINTS = [f"joint_a{number}" for number in range(1, 7)]
 SHOWN = "SELECT ?robot ?time { ?run irt:State_Time ?time ; irt:run_of ?robot }"
 
 
-def send(port: int, robots: int, seconds: float) -> None:
+def send(port: int, robots: int, seconds: float, rate: float = RATE) -> None:
     """Send every robot's states in turn, each with the time at which it is made; print how many."""
     links = [socket.create_connection(("127.0.0.1", port)) for _ in range(robots)]
     for link in links:  # else the system holds a line back for up to 40 ms (Nagle)
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    count = int(seconds * RATE)
+    count = int(seconds * rate)
     begin = time.time()
     for number in range(count):
-        time.sleep(max(0.0, begin + number / RATE - time.time()))
+        time.sleep(max(0.0, begin + number / rate - time.time()))
         for robot, link in enumerate(links):
             at = time.time()
             values = [math.sin(at + joint) for joint in range(6)]
@@ -195,7 +195,7 @@ def main(robots: int, seconds: float, on_server: bool, with_twin: bool) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["send"]:
-        send(int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))
+        send(int(sys.argv[2]), int(sys.argv[3]), *map(float, sys.argv[4:]))
     else:
         numbers = [float(argument) for argument in sys.argv[1:] if not argument.startswith("--")]
         robots, seconds = numbers or (1, 20)

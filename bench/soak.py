@@ -181,9 +181,9 @@ def soak(workspace: Path, seconds: float, clients: int) -> Outcome:
 
 
 @contextmanager
-def serving(workspace: Path) -> Iterator[tuple[str, psutil.Process]]:
+def serving(workspace: Path, *where: str) -> Iterator[tuple[str, psutil.Process]]:
     """Run `irtwin serve` on a free port; it must end as it should."""
-    command = [sys.executable, "-m", "irtwin", "serve", "--port", "0", "--workspace", str(workspace)]
+    command = [sys.executable, "-m", "irtwin", "serve", "--port", "0", "--workspace", str(workspace), *where]
     server = subprocess.Popen([*command, "--timeout", str(TIME_LIMIT)], stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:

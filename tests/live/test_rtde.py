@@ -42,7 +42,7 @@ class Follower:
     def follow(self, client: Rtde) -> None:
         ends = threading.Timer(20.0, self.done.set)
         ends.start()
-        client.follow(self._take, self.refused.append, self.done, self.said.append)
+        client.follow(self._take, lambda error: self.refused.append(str(error)), self.done, self.said.append)
         ends.cancel()
         assert len(self.states) >= self._count, self.said
 

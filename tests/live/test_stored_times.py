@@ -30,8 +30,8 @@ def times(tmp_path_factory: pytest.TempPathFactory) -> StoredTimes:
     ],
 )
 def test_a_time_is_that_of_the_run_that_covers_it(times: StoredTimes, time: float, run: str | None) -> None:
-    assert times.run_at("r", time) == run
+    assert times.run_in("r", time, time) == run
 
 
 def test_another_robots_runs_do_not_count(times: StoredTimes) -> None:
-    assert times.run_at("s", 10.0) is None
+    assert times.run_in("s", 10.0, 99.0) is None

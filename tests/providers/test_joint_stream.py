@@ -87,7 +87,7 @@ def test_a_bad_line_stops_nothing() -> None:
     taken: list[State] = []
     refused: list[str] = []
     stream = io.BytesIO(line(time=1) + b"\n\nnonsense\n" + b"x" * (3 * LONGEST_LINE) + b"\n" + line(time=2))
-    feed(lines_of(stream), READER, taken.append, refused.append)
+    feed(lines_of(stream), READER, taken.append, lambda error: refused.append(str(error)))
     assert [state.time for state in taken] == [1.0, 2.0]
     assert refused == ["a line is not JSON", f"a line is longer than {LONGEST_LINE} bytes"]
 
@@ -116,7 +116,9 @@ def test_an_http_request_ends_its_connection_before_its_body_is_read() -> None:
     refused: list[str] = []
     body = line() + b"\n" + line(time=6.5) + b"\n"
     head = f"POST / HTTP/1.1\r\nOrigin: http://evil.example\r\nContent-Length: {len(body)}\r\n\r\n".encode()
-    with listening(0, lambda lines: feed(lines, READER, taken.append, refused.append)) as port:
+    with listening(
+        0, lambda lines: feed(lines, READER, taken.append, lambda error: refused.append(str(error)))
+    ) as port:
         with socket.create_connection(("127.0.0.1", port)) as browser:
             browser.sendall(head + body)
             with suppress(ConnectionResetError):

@@ -34,7 +34,7 @@ def test_lines_go_to_the_pages_of_their_robot(tmp_path: Path) -> None:
         (tmp_path / "live").mkdir()
         async with await asyncio.start_unix_server(send, tmp_path / "live" / SOCKET):
             samples = Samples(tmp_path)
-            pages = [samples.page("a"), samples.page("b"), samples.page("b")]
+            pages = [samples.page("a", "10.0.0.1"), samples.page("b", "10.0.0.1"), samples.page("b", "10.0.0.1")]
             found = await asyncio.wait_for(asyncio.gather(*(taken(page, 3) for page in pages)), 30)
             samples.close()
         assert [[one["time"] for one in each] for each in found] == [[0, 1, 2]] * 3
@@ -48,7 +48,7 @@ def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest
 
     async def play() -> None:
         samples = Samples(tmp_path)
-        page = samples.page("a")
+        page = samples.page("a", "10.0.0.1")
         reading = asyncio.create_task(taken(page, 1))
         await asyncio.sleep(0.1)
         (tmp_path / "live").mkdir()
@@ -73,7 +73,7 @@ def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_page_that_takes_nothing_is_let_go() -> None:
-    page = Page("a")
+    page = Page("a", "10.0.0.1")
     for _ in range(401):
         page.put(b"{}\n")
     assert page.lost
@@ -89,12 +89,34 @@ def test_more_pages_than_may_look_on_are_refused(tmp_path: Path, monkeypatch: py
 
     async def play() -> None:
         samples = Samples(tmp_path)
-        first = samples.page("a")
-        samples.page("a")
+        first = samples.page("a", "10.0.0.1")
+        samples.page("a", "10.0.0.1")
         with pytest.raises(Refusal, match="2 pages look on already"):
-            samples.page("a")
+            samples.page("a", "10.0.0.1")
         samples.leave(first)
-        samples.page("a")
+        samples.page("a", "10.0.0.1")
+        samples.close()
+
+    asyncio.run(play())
+
+
+def test_another_client_takes_the_newest_page_of_the_one_that_has_most(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(room, "MOST", 3)
+
+    async def play() -> None:
+        samples = Samples(tmp_path)
+        theirs = [samples.page("a", "10.0.0.1") for _ in range(3)]
+        other = samples.page("a", "10.0.0.2")
+        assert [page.lost for page in (*theirs, other)] == [False, False, True, False]
+        with pytest.raises(Refusal, match="3 pages look on already"):
+            samples.page("a", "10.0.0.1")
+        with pytest.raises(Refusal, match="3 pages look on already"):  # one of two would be no fairer
+            samples.page("a", "10.0.0.2")
+        samples.leave(theirs[2])
+        assert not samples.page("a", "10.0.0.3").lost
+        assert theirs[1].lost
         samples.close()
 
     asyncio.run(play())
@@ -104,7 +126,7 @@ def test_a_page_without_samples_gets_a_word_now_and_then(monkeypatch: pytest.Mon
     monkeypatch.setattr(room, "_QUIET", 0.01)
 
     async def play() -> list[bytes]:
-        page, found = Page("a"), []
+        page, found = Page("a", "10.0.0.1"), []
         async for piece in page.events():
             found.append(piece)
             if len(found) == 3:

@@ -11,8 +11,9 @@ import pytest
 
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.shares import Displaced
 from irtwin.serve.source import Source
-from irtwin.serve.turns import Displaced, Turns
+from irtwin.serve.turns import Turns
 
 Served = list[str]
 

@@ -122,15 +122,15 @@ class StateReader:
 
 
 def feed(
-    lines: Iterable[bytes], reader: StateReader, take: Callable[[State], None], refuse: Callable[[str], None]
+    lines: Iterable[bytes], reader: StateReader, take: Callable[[State], None], refuse: Callable[[InputError], None]
 ) -> None:
-    """Give each line's state on; a line that says none is refused by its reason and stops nothing."""
+    """Give each line's state on; a line that says none is refused by its error and stops nothing."""
     for line in lines:
         if line.strip():
             try:
                 take(reader.read(line))
             except InputError as error:
-                refuse(str(error))
+                refuse(error)
 
 
 def lines_of(stream: BinaryIO) -> Iterator[bytes]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Self
 
@@ -25,7 +25,8 @@ from irtwin.live.joint_stream import State
 from irtwin.live.kept_run import energy_tables, keep, left_by_a_crash
 from irtwin.live.known_robots import KnownRobots
 from irtwin.live.shown import ShownRuns
-from irtwin.live.watched_run import HOLE, WatchedRun
+from irtwin.live.stream_clock import HOLE, StreamClock, Tick, WrongTime, jump
+from irtwin.live.watched_run import WatchedRun
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import Header, Rows, read_journal
@@ -33,7 +34,7 @@ from irtwin.storage.schema import LIVE, LIVE_RUN
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
 RUN_SECONDS = 3600.0  # after which a run ends and the next begins
-AHEAD = 3600.0  # s by which a state's time may be ahead of the clock: clocks differ, years do not
+AHEAD = 7200.0  # s by which a state's time may be ahead of the clock: summer time is one hour, and clocks differ
 SHOWN_EVERY = 1.0  # s between two energies of a run in the graph
 PAUSE = 0.04  # s between two states of a run in the graph at least: readers see two a second
 FLUSH = 2.0  # s between two flushes of the graph: readers replay its log, of 60 kB a state
@@ -67,6 +68,7 @@ class LiveTwin:
         self.stored = self.superseded = 0
         self.waited = 0.0
         self._waiting = 0
+        self._clocks: defaultdict[str, StreamClock] = defaultdict(StreamClock)
         self._runs: dict[str, WatchedRun] = {}
         self._left: list[WatchedRun] = []  # over, but for what waits for storage
         self._due: deque[WatchedRun] = deque()
@@ -79,6 +81,8 @@ class LiveTwin:
         self._over = threading.Condition(self._lock)
         self._showing = threading.Lock()  # of the graph's view of runs
         for path, header, samples in left_by_a_crash(self._folder, announce):
+            if len(samples):
+                self.robots.times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
             self._close(path, header, samples, {}, None)
         self._refresh()
         work = (self._show_states, self._store_samples, self._work_out, self._close_runs)
@@ -96,13 +100,13 @@ class LiveTwin:
         """Take a state. Waits where storage is far behind. Raises InputError for one that comes late, or too early.
 
         A state more than a minute before or after the newest is held until the next one: where that goes on from it,
-        a new run began; where that goes on from the run, InputError is raised for the one held.
-        A state of a time that a stored run of the robot covers is refused, too: a log that comes again is stored once.
-        So is one that says a plan that its robot has not.
+        the clock was set, and a new run begins; where that goes on from the run, InputError is raised for the one held.
+        A state of a time that another run of the robot covers is refused, too: a log that comes again is stored once,
+        and no time is counted twice. So is one that says a plan that its robot has not.
         Raises also what ended the work in the background: a full disk, say.
         """
         if state.time > time.time() + AHEAD:
-            raise InputError(f"{state.robot_id}: a state more than {AHEAD:g} s ahead of the clock here; not stored")
+            self._refuse_ahead(state, state.time - time.time())
         self.robots.plan(state)
         with self._lock:
             if self._waiting >= MOST_WAITING:
@@ -110,27 +114,82 @@ class LiveTwin:
             self.check()
             if self._stop.is_set():
                 raise InputError("watching has ended; not stored")
-            if (stored := self.robots.times.run_at(state.robot_id, state.time)) is not None:
-                raise InputError(f"{state.robot_id}: the stored run {stored} covers this time; not stored again")
-            run = self._runs.get(state.robot_id) or self._begin(state)
-            is_next = run.is_next(state)
-            doubted, run.doubted = run.doubted, None
-            if is_next:
-                self._take(run, state)
-            elif doubted is not None and state.time > doubted.time:
-                run.doubted = doubted
-                run = self._begin_again(run)
-                if run.is_next(state):
-                    self._take(run, state)
-                else:
-                    run.doubted = state
-                return
+            clock = self._clocks[state.robot_id]
+            tick, set_by = clock.tell(state.time)
+            held, run = clock.held, self._runs.get(state.robot_id)
+            if tick is Tick.LATE:
+                self._refuse_late(state, run, clock)
+            clock.held = None
+            if set_by is not None:
+                self._end_before_jump(state.robot_id, run, clock, set_by)
+                if held is not None and abs(set_by) >= HOLE:  # else the clock went back by less, state for state
+                    self._go_on(held)
+                    held = None
+            if tick is Tick.LEAP:
+                self._hold(state, clock)
             else:
-                run.doubted = state
-                if run.newest is not None:
-                    run.health.leaps(state.time - run.newest.time)
-            if doubted is not None:
-                raise InputError(f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours; not stored")
+                self._go_on(state)
+            if held is not None:
+                reason = f"{state.robot_id}: a state more than {HOLE:g} s away from its neighbours"
+                raise WrongTime(reason, held.time - state.time)
+
+    def _refuse_ahead(self, state: State, by: float) -> None:
+        with self._lock:
+            if (run := self._runs.get(state.robot_id)) is not None:
+                run.health.leaps(by)
+        raise WrongTime(f"{state.robot_id}: a state more than {AHEAD:g} s ahead of the clock here", by)
+
+    def _refuse_late(self, state: State, run: WatchedRun | None, clock: StreamClock) -> None:
+        assert clock.now is not None
+        if run is not None:
+            run.health.late(state.time, clock.now)
+        if state.time == clock.now:
+            raise InputError(f"{state.robot_id}: a state of the same time as the one before; not stored")
+        raise WrongTime(f"{state.robot_id}: a state that comes late, out of order", clock.now - state.time)
+
+    def _end_before_jump(self, robot_id: str, run: WatchedRun | None, clock: StreamClock, by: float) -> None:
+        """End the run whose stream's clock was set, and tell it; a pause of the stream ends it without a word."""
+        said = None if clock.paused(by) else jump(by)
+        if run is not None:
+            if said is not None:
+                run.health.end(said)
+            self._leave(run)
+        if said is not None:
+            self._announce(f"{self.robots.names[robot_id]}: {said}; its run ends, and no time is stored twice")
+
+    def _hold(self, state: State, clock: StreamClock) -> None:
+        """Keep a state whose time leaps until the next one comes; one that cannot be stored anyway is refused."""
+        assert clock.now is not None
+        run = self._runs.get(state.robot_id)
+        if run is not None:
+            run.health.leaps(state.time - clock.now)
+        self._refuse_covered(state)
+        clock.held = state
+
+    def _refuse_covered(self, state: State) -> None:
+        covering = self.robots.times.run_in(state.robot_id, state.time, state.time)
+        run = self._runs.get(state.robot_id)
+        if covering is None and run is not None and run.newest is not None:
+            covering = run.header.run_id if run.began <= state.time <= run.newest.time else None
+        if covering is not None:
+            raise InputError(f"{state.robot_id}: the stored run {covering} covers this time; not stored again")
+
+    def _go_on(self, state: State) -> None:
+        """Store a state in the run that lasts, or in a new one where another run lies between, or none lasts."""
+        run = self._runs.get(state.robot_id)
+        since = state.time if run is None or run.newest is None else run.newest.time
+        if run is not None and self.robots.times.run_in(state.robot_id, since, state.time) is not None:
+            self._leave(run)
+            run = None
+        self._refuse_covered(state)
+        self._take(run or self._begin(state), state)
+
+    def _leave(self, run: WatchedRun) -> None:
+        """End a run, but for what waits for storage; its times are taken from now on."""
+        assert run.newest is not None
+        del self._runs[run.header.robot_id]
+        self._left.append(run)
+        self.robots.times.add(run.header.robot_id, run.header.run_id, run.began, run.newest.time)
 
     def _take(self, run: WatchedRun, state: State) -> None:
         was_stale = run.health.stale_since is not None
@@ -151,24 +210,18 @@ class LiveTwin:
             self._due.append(run)
             self._news.notify()
 
-    def _begin_again(self, run: WatchedRun) -> WatchedRun:
-        """End a run whose next state leaps; return the one that begins with that state."""
-        state = run.doubted
-        assert state is not None
-        run.doubted = None
-        following = self._begin(state)
-        self._left.append(run)
-        self._take(following, state)
-        return following
-
     def stop(self) -> None:
         """Store what is left, end all runs, bring the graph up to date. Raises what ended the background work."""
         with self._lock:
-            for run in [run for run in self._runs.values() if run.doubted is not None]:
-                try:
-                    self._begin_again(run)
-                except InputError as error:
-                    self._announce(str(error))
+            for robot_id, clock in self._clocks.items():
+                if clock.held is not None:  # what came last is kept
+                    if (run := self._runs.get(robot_id)) is not None:
+                        self._leave(run)
+                    try:
+                        self._go_on(clock.held)
+                    except InputError as error:
+                        self._announce(str(error))
+                    clock.held = None
             self._stop.set()
         self._wake_all()
         for thread in self._threads:
@@ -269,9 +322,9 @@ class LiveTwin:
             self._over.notify_all()
 
     def _end_runs(self, all_of_them: bool) -> None:
-        for robot_id, run in list(self._runs.items()):
-            if run.doubted is None and (all_of_them or run.length >= RUN_SECONDS):
-                self._left.append(self._runs.pop(robot_id))
+        for run in list(self._runs.values()):
+            if all_of_them or run.length >= RUN_SECONDS:
+                self._leave(run)
         ended = [run for run in self._left if not run.waiting]
         if ended:
             self._left = [run for run in self._left if run.waiting]
@@ -293,7 +346,7 @@ class LiveTwin:
             for run in ended:
                 with self._showing:
                     run.over = True
-                counts = {"superseded_states": run.superseded, "waited_s": self.waited}
+                counts = {"superseded_states": run.superseded, "waited_s": self.waited, **run.health.of_end()}
                 self._close(run.journal.path, *read_journal(run.journal.path), counts, run.shown)
                 run.journal.close()  # last: till then it is nobody's who crashed
             self._refresh()
@@ -303,8 +356,6 @@ class LiveTwin:
     ) -> None:
         """Make a run of a journal, in the database and in the graph, and drop the journal."""
         if len(samples):
-            with self._lock:
-                self.robots.times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
             tables = keep(self._place, header, samples, {**counts, "stream_state": "ended"}, self._announce)
             self._shown.show(header.run_id, shown, self._shown.mapped(tables))
         remove(path)

@@ -85,11 +85,11 @@ class Rtde:
     def follow(
         self,
         take: Callable[[State], None],
-        refuse: Callable[[str], None],
+        refuse: Callable[[InputError], None],
         done: threading.Event,
         announce: Callable[[str], None] = lambda line: None,
     ) -> None:
-        """Give each state on until `done`; one that says none, or is not taken, is refused by its reason.
+        """Give each state on until `done`; one that says none, or is not taken, is refused by its error.
 
         A connection that is lost is made again, and announced.
         """
@@ -100,7 +100,7 @@ class Rtde:
                         try:
                             take(self._state(said, offset))
                         except InputError as error:
-                            refuse(str(error))
+                            refuse(error)
             except (OSError, LostError) as error:
                 if done.is_set():
                     return

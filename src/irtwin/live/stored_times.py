@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from collections import defaultdict
 from datetime import UTC
+from itertools import accumulate
 
 from sqlalchemy import select
 
@@ -19,7 +20,8 @@ class StoredTimes:
 
     def __init__(self, place: Workspace) -> None:
         """Read the runs of a workspace."""
-        self._runs: defaultdict[str, list[tuple[float, float, str]]] = defaultdict(list)
+        self._runs: defaultdict[str, list[tuple[float, float, str]]] = defaultdict(list)  # by start
+        self._reach: dict[str, list[tuple[float, str]]] = {}  # of each and those before: the last end, and whose
         runs = select(Run.robot_id, Run.run_id, Run.start_time, Run.run_time_s).where(Run.kind.in_(WATCHED_RUNS))
         with place.reading() as session:
             for robot_id, run_id, began, length in session.execute(runs):
@@ -29,16 +31,18 @@ class StoredTimes:
 
     def add(self, robot_id: str, run_id: str, start: float, end: float) -> None:
         """Note one more run."""
-        insort(self._runs[robot_id], (start - _STEP, end + _STEP, run_id))
+        runs = self._runs[robot_id]
+        insort(runs, (start - _STEP, end + _STEP, run_id))
+        self._reach[robot_id] = list(accumulate(((end, run_id) for _, end, run_id in runs), max))
 
     def end(self, robot_id: str) -> float:
         """Return the end of the last run of a robot; 0 where there is none."""
         return max((end for _, end, _ in self._runs[robot_id]), default=0.0)
 
-    def run_at(self, robot_id: str, time: float) -> str | None:
-        """Return the run that covers a time; None where none does."""
-        runs = self._runs[robot_id]
-        place = bisect_right(runs, (time, float("inf"), "")) - 1
-        if place < 0 or runs[place][1] < time:
+    def run_in(self, robot_id: str, first: float, last: float) -> str | None:
+        """Return a run that covers a time from the first to the last; None where none does."""
+        begun = bisect_right(self._runs[robot_id], (last, float("inf"), ""))
+        if not begun:
             return None
-        return runs[place][2]
+        end, run_id = self._reach[robot_id][begun - 1]
+        return run_id if end >= first else None

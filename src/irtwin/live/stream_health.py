@@ -12,6 +12,11 @@ STALE = 2.0  # s without a good state; of a slow source five times its usual pau
 _PAUSES = 5.0
 
 
+def seconds(by: float) -> str:
+    """Say how many seconds: three digits of few, all of many."""
+    return f"{by:.3g} s" if abs(by) < 1000 else f"{by:.0f} s"
+
+
 class StreamHealth:
     """Told of good states and of late ones; `stale_since` is when the last good one came, None while they come.
 
@@ -25,6 +30,7 @@ class StreamHealth:
         self._count = 0
         self._late: str | None = None
         self.frozen: str | None = None
+        self._ended = False
 
     def good(self, frozen: str | None = None) -> None:
         """Note a state that was taken; `frozen`: why its values are none, though it came."""
@@ -39,11 +45,16 @@ class StreamHealth:
         if said == newest:
             self._late = "the stream repeats the state that was taken last"
         else:
-            self._late = f"the stream went back in time, by {newest - said:.3g} s"
+            self._late = f"the stream went back in time, by {seconds(newest - said)}"
 
     def leaps(self, by: float) -> None:
         """Note a state whose time is so many seconds away that nobody trusts it yet."""
-        self._late = f"the stream's time leaps by {by:.3g} s"
+        self._late = f"the stream's time leaps by {seconds(by)}"
+
+    def end(self, reason: str) -> None:
+        """Note why the run ends before its time."""
+        self.stale_since, self.reason = self._last_good(time.monotonic() - self._heard), reason
+        self._ended = True
 
     def look(self) -> bool:
         """Note whether the stream is stale now; return whether that is news."""
@@ -52,7 +63,7 @@ class StreamHealth:
         quiet = bool(self.frozen) or silence >= max(STALE, _PAUSES * usual)
         if self.stale_since is not None or not self._count or not quiet:
             return False
-        self.stale_since = datetime.fromtimestamp(time.time() - silence, UTC).replace(tzinfo=None)
+        self.stale_since = self._last_good(silence)
         self.reason = self.frozen or self._late or f"no state came for {silence:.1f} s"
         return True
 
@@ -60,4 +71,15 @@ class StreamHealth:
         """Return what a row says of the stream."""
         if self.stale_since is None:
             return {"stream_state": "flowing"}
-        return {"stream_state": "stale", "stale_since": self.stale_since, "stale_reason": self.reason}
+        return {"stream_state": "stale", **self._why()}
+
+    def of_end(self) -> dict[str, Any]:
+        """Return what the row of a run that is over says of why it ended before its time."""
+        return self._why() if self._ended else {}
+
+    def _why(self) -> dict[str, Any]:
+        return {"stale_since": self.stale_since, "stale_reason": self.reason}
+
+    @staticmethod
+    def _last_good(silence: float) -> datetime:
+        return datetime.fromtimestamp(time.time() - silence, UTC).replace(tzinfo=None)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -17,6 +16,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
+from irtwin.live.refusals import Refusals
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.providers.records import find_plan, find_robot, load_robot
@@ -28,7 +28,6 @@ from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 Announce = Callable[[str], None]
-_MOST_REASONS = 20  # said of refused lines
 
 
 def watch(
@@ -55,15 +54,10 @@ def watch(
     read.
     """
     sys.setswitchinterval(SWITCH)
-    refused: Counter[str] = Counter()
+    refusals = Refusals(announce)
     done = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: done.set())
-
-    def refuse(reason: str) -> None:
-        refused[reason] += 1
-        if refused[reason] == 1 and len(refused) <= _MOST_REASONS:
-            announce(f"line refused: {reason}")
 
     with (
         told_when_full(workspace),
@@ -81,17 +75,17 @@ def watch(
         reader = StateReader(twin.robots.joints, twin.robots.names)
 
         def take(lines: Iterable[bytes]) -> None:
-            feed(lines, reader, twin.receive, refuse)
+            feed(lines, reader, twin.receive, refusals.refuse)
 
         if replay is not None:
             start = replay.start(after=twin.robots.times.end(replay.robot_id), ahead=AHEAD)
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
-            replay.play(_refusing(receive, refuse), done, start)
+            replay.play(_refusing(receive, refusals.refuse), done, start)
         elif rtde is not None and robot is not None:
-            _follow(_arm(place, rtde, robot), receive, twin.check, refuse, done, announce)
+            _follow(_arm(place, rtde, robot), receive, twin.check, refusals.refuse, done, announce)
         else:
             _read(take, port, twin, done, announce)
-    announce(f"{twin.stored} samples stored, {refused.total()} lines refused")
+    announce(f"{twin.stored} samples stored, {refusals.count} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
 
 
@@ -129,12 +123,12 @@ def _follow(
     arm: Rtde,
     receive: Callable[[State], None],
     check: Callable[[], None],
-    refuse: Callable[[str], None],
+    refuse: Callable[[InputError], None],
     done: threading.Event,
     announce: Announce,
 ) -> None:
-    def refuse_of_arm(reason: str) -> None:
-        refuse(reason)
+    def refuse_of_arm(error: InputError) -> None:
+        refuse(error)
         check()  # whether it was refused as nothing can be stored any more
 
     announce(f"Following {arm.address}: {arm.what}")
@@ -146,14 +140,14 @@ def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
     return Replay(log, load_robot(place, robot_id), robot_id, speed)
 
 
-def _refusing(take: Callable[[State], None], refuse: Callable[[str], None]) -> Callable[[State], None]:
-    """Return what takes a state, and refuses one that cannot be taken, by its reason."""
+def _refusing(take: Callable[[State], None], refuse: Callable[[InputError], None]) -> Callable[[State], None]:
+    """Return what takes a state, and refuses one that cannot be taken, by its error."""
 
     def take_or_refuse(state: State) -> None:
         try:
             take(state)
         except InputError as error:
-            refuse(str(error))
+            refuse(error)
 
     return take_or_refuse
 

@@ -23,15 +23,11 @@ from irtwin.storage.schema import LIVE
 from irtwin.twin.so_far import Stretch
 
 LEAST = 0.2  # s of samples that are worked out at once
-HOLE = 60.0  # s without a state: the run is over, and the next begins
 
 
 @dataclass
 class WatchedRun:
-    """A run that lasts. `waiting` is for storage; `shown` is what the graph says of it, None where that is unknown.
-
-    `doubted` is a state whose time leaps: the next one tells whether a new run begins with it, or its time was wrong.
-    """
+    """A run that lasts. `waiting` is for storage; `shown` is what the graph says of it, None where that is unknown."""
 
     header: Header
     joints: Sequence[str]
@@ -55,7 +51,6 @@ class WatchedRun:
     values: FrozenValues = field(default_factory=FrozenValues)
     alarms: AlarmNews = field(default_factory=AlarmNews)
     shown: set[Quad] | None = field(default_factory=set)
-    doubted: State | None = None
     standing_since: float | None = None  # s since 1970; None while a joint moves
     _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
     _stood: float | None = None  # s, of which the alarms are those of `_idle`: once a second is enough
@@ -83,15 +78,6 @@ class WatchedRun:
     def length(self) -> float:
         """Seconds from the first state to the newest."""
         return 0.0 if self.newest is None else self.newest.time - self.began
-
-    def is_next(self, state: State) -> bool:
-        """Whether a state follows the newest. Raises InputError where it comes late: as old, or a little older."""
-        if self.newest is None:
-            return True
-        if -HOLE < state.time - self.newest.time <= 0:
-            self.health.late(state.time, self.newest.time)
-            raise InputError(f"{state.robot_id}: a state that is not later than the one before; not stored")
-        return 0 < state.time - self.newest.time <= HOLE
 
     def take(self, state: State) -> None:
         """Take the next state, of a later time than the one before."""

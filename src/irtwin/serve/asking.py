@@ -15,6 +15,7 @@ from irtwin.knowledge.store.table import to_python
 from irtwin.report.questions import Answer, Answers, Question, Row
 from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.shares import client
 from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
@@ -90,11 +91,6 @@ class Asking:
             if len(body) > _MOST:
                 raise Refusal(503, "there is more of this than a page shows: ask /sparql for a part of it")
         return head, bytes(body)
-
-
-def client(request: Request) -> str:
-    """Return the address that a client asks from; clients of one machine, or behind one proxy, share it."""
-    return request.client.host if request.client is not None else ""
 
 
 def _rows(body: bytes) -> tuple[Row, ...]:

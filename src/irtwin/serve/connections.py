@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from typing import Any, cast
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from irtwin.serve.shares import Displaced, client_of, gives_way
 
 HEAD = 10.0  # s from a connection's opening, or from its last answer, to the end of a request's head
 STALL = 30.0  # s in which a client has to take some 50 kB of an answer
@@ -15,18 +18,23 @@ STALL = 30.0  # s in which a client has to take some 50 kB of an answer
 class Connection(H11Protocol):
     """uvicorn's connection, with a limit on what it waits for.
 
-    Where there are as many connections as may be, a new one takes the place of the one that has been waiting longest
-    for a head: who holds connections open without asking anything keeps nobody out.
+    Where there are as many connections as may be, a new one takes the place of one of the client that has most: of the
+    one that has been waiting longest for a head, else of the newest. A client that has as many as any other gives up
+    one of its own that waits. So who holds connections open, with a request or without, keeps nobody else out.
     """
 
     def __init__(self, *arguments: Any, **named: Any):
         super().__init__(*arguments, **named)
         self._head: asyncio.TimerHandle | None = None
         self._stall: asyncio.TimerHandle | None = None
+        self._of = ""  # its client
+        self._opened = 0.0  # by the loop's clock
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a head."""
         super().connection_made(transport)
+        self._of = client_of(self.client[0] if self.client is not None else "")
+        self._opened = self.loop.time()
         self._watch()
         if self.limit_concurrency is not None and len(self.connections) >= self.limit_concurrency:
             self._take_the_place_of_another()
@@ -65,11 +73,20 @@ class Connection(H11Protocol):
 
     def _take_the_place_of_another(self) -> None:
         others = cast("set[Connection]", self.connections - {self})
-        waiting = {other: other._head.when() for other in others if other._head is not None}
+        try:
+            most = gives_way(Counter(other._of for other in others), self._of)
+        except Displaced:
+            most = self._of
+        theirs = [other for other in others if other._of == most]
+        waiting = {other: other._head.when() for other in theirs if other._head is not None}
         if waiting:
-            longest = min(waiting, key=lambda other: waiting[other])
-            longest.transport.abort()
-            self.connections.discard(longest)  # now: others may come before its end is told
+            self._end(min(waiting, key=lambda other: waiting[other]))
+        elif most != self._of:
+            self._end(max(theirs, key=lambda other: other._opened))
+
+    def _end(self, other: Connection) -> None:
+        other.transport.abort()
+        self.connections.discard(other)  # now: others may come before its end is told
 
     def _end_head(self) -> None:
         if self._head is not None:

@@ -15,6 +15,7 @@ from irtwin.serve import description, negotiation, page
 from irtwin.serve.answer import Answer, Answers
 from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
+from irtwin.serve.shares import client
 from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
@@ -105,7 +106,7 @@ class Endpoint:
     async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
         """Take the answer off the worker as fast as it makes it; the client may take its time."""
         with self._answers.new() as answer, ExitStack() as held:
-            async with self._pool.worker(_client(request)) as worker:
+            async with self._pool.worker(client(request)) as worker:
                 deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
                 accept = request.headers.get("accept", "")
                 media_type = await self._ask(worker, operation, request, accept, deadline)
@@ -145,7 +146,7 @@ class Endpoint:
         return head.media_type
 
     async def _named_graphs(self, request: Request) -> list[str]:
-        async with self._pool.worker(_client(request)) as worker:
+        async with self._pool.worker(client(request)) as worker:
             deadline = time.monotonic() + self._limits.seconds
             try:
                 await self._ask(worker, Operation("query", description.NAMED_GRAPHS), request, "text/csv", deadline)
@@ -180,11 +181,6 @@ async def _left(receive: Receive) -> None:
 def _address(request: Request) -> str:
     """Return the endpoint's address as the client wrote it, which relative IRIs are below."""
     return str(request.url.replace(query=""))
-
-
-def _client(request: Request) -> str:
-    """Return the address that a client asks from; clients of one machine, or behind one proxy, share it."""
-    return request.client.host if request.client is not None else ""
 
 
 def _with_charset(media_type: str) -> str:

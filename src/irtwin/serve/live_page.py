@@ -22,6 +22,7 @@ from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.serve.page import FOLDER, POLICY
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
+from irtwin.serve.shares import client
 from irtwin.serve.source import Source
 from irtwin.serve.worker import SERVER_FAILS
 from irtwin.storage.files import read_document
@@ -53,7 +54,7 @@ class LivePages:
         ]
 
     async def _events(self, request: Request) -> Response:
-        return _Events(self.samples, self.samples.page(request.path_params["robot"]))
+        return _Events(self.samples, self.samples.page(request.path_params["robot"], client(request)))
 
     async def _robot(self, request: Request) -> Response:
         robot_id = request.path_params["robot"]

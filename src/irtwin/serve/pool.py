@@ -15,8 +15,9 @@ from typing import Any
 
 from irtwin.knowledge.store.linked import remove_left_behind
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.shares import Displaced
 from irtwin.serve.source import Source
-from irtwin.serve.turns import Displaced, Turns
+from irtwin.serve.turns import Turns
 from irtwin.serve.worker import FRAME
 
 _log = logging.getLogger(__name__)
@@ -137,6 +138,7 @@ class Pool:
     """A fixed number of workers, and a queue of bounded length before them, in which clients take turns.
 
     Where there are several, no client holds the last one: a small query need not wait for another client's large ones.
+    A worker that a query ended counts as its client's until another stands in its place.
     """
 
     def __init__(self, source: Source, size: int, limits: Limits):
@@ -171,28 +173,27 @@ class Pool:
             if worker.idle and worker.alive:
                 self._idle.give(client, worker)
             else:
-                self._idle.lose(client)
-                self._replace(worker)
+                self._replace(worker, client)
 
     async def _wait(self, client: str) -> Worker:
         try:
             async with asyncio.timeout(self._limits.seconds):
                 while not (worker := await self._idle.take(client)).alive:
-                    self._idle.lose(client)
-                    self._replace(worker)
+                    self._replace(worker, client)
                 return worker
         except TimeoutError:
             raise Refusal(503, "no worker came free in time: try again later", _RETRY_AFTER) from None
         except Displaced:
             raise Refusal(503, "too many queries are waiting: try again later", _RETRY_AFTER) from None
 
-    def _replace(self, worker: Worker) -> None:
+    def _replace(self, worker: Worker, client: str) -> None:
         async def replace() -> None:
             await worker.end()
             self.workers.discard(worker)
             while True:
                 try:
-                    return await self._start()
+                    await self._start()
+                    return self._idle.lose(client)
                 except Refusal as error:
                     _log.error("no worker can be started: %s", error.message)
                     await asyncio.sleep(1.0)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections import deque
+from collections import Counter, deque
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 
 from irtwin.live.broadcast import SOCKET, reachable
 from irtwin.serve.protocol import Refusal
+from irtwin.serve.shares import Displaced, gives_way
 from irtwin.storage.schema import LIVE
 
 MOST = 16  # pages that may look on
@@ -23,8 +24,8 @@ _LONGEST_LINE = 1 << 20  # bytes
 class Page:
     """Who looks on at one robot: the newest lines that were not sent yet; `lost` once there were too many."""
 
-    def __init__(self, robot_id: str) -> None:
-        self.robot_id = robot_id
+    def __init__(self, robot_id: str, client: str) -> None:
+        self.robot_id, self.client = robot_id, client
         self.lost = False
         self._lines: deque[bytes] = deque()
         self._news = asyncio.Event()
@@ -57,25 +58,35 @@ class Samples:
 
     def __init__(self, workspace: Path) -> None:
         self._socket = workspace / LIVE / SOCKET
-        self._pages: set[Page] = set()
+        self._pages: list[Page] = []  # the newest last
         self._reading: asyncio.Task[None] | None = None
 
-    def page(self, robot_id: str) -> Page:
-        """Let one more page look on. Raises Refusal where there are too many."""
+    def page(self, robot_id: str, client: str) -> Page:
+        """Let one more page of a client look on, in the place of another's that has more. Raises Refusal."""
         if len(self._pages) >= MOST:
-            raise Refusal(503, f"{MOST} pages look on already: close one", {"Retry-After": "5"})
-        page = Page(robot_id)
-        self._pages.add(page)
+            self._make_room(client)
+        page = Page(robot_id, client)
+        self._pages.append(page)
         if self._reading is None:
             self._reading = asyncio.create_task(self._read())
         return page
 
     def leave(self, page: Page) -> None:
         """Note that a page is gone; after the last one, nothing is read."""
-        self._pages.discard(page)
+        if page in self._pages:
+            self._pages.remove(page)
         if not self._pages and self._reading is not None:
             self._reading.cancel()
             self._reading = None
+
+    def _make_room(self, client: str) -> None:
+        try:
+            most = gives_way(Counter(page.client for page in self._pages), client)
+        except Displaced:
+            raise Refusal(503, f"{MOST} pages look on already: close one", {"Retry-After": "5"}) from None
+        newest = next(page for page in reversed(self._pages) if page.client == most)
+        newest.let_go()
+        self.leave(newest)
 
     def close(self) -> None:
         """Let all pages go."""

@@ -6,11 +6,9 @@ import asyncio
 from collections import Counter, deque
 from typing import Generic, TypeVar
 
+from irtwin.serve.shares import Displaced, gives_way
+
 T = TypeVar("T")
-
-
-class Displaced(Exception):
-    """A place in the queue was given to another client, which had fewer."""
 
 
 class Turns(Generic[T]):
@@ -53,7 +51,7 @@ class Turns(Generic[T]):
         self.add(thing)
 
     def lose(self, client: str) -> None:
-        """Take it that what a client held is no more."""
+        """Take it that what a client held is no more, nor on its way to be replaced."""
         self._held -= Counter([client])
         self._lend()
 
@@ -73,10 +71,8 @@ class Turns(Generic[T]):
     def _make_room(self, client: str) -> None:
         if sum(map(len, self._waiting.values())) < self._most_waiting:
             return
-        longest = max(self._waiting.values(), key=len, default=deque())
-        if len(longest) <= len(self._waiting.get(client, ())) + 1:
-            raise Displaced
-        longest.pop().set_exception(Displaced())
+        most = gives_way({other: len(places) for other, places in self._waiting.items()}, client)
+        self._waiting[most].pop().set_exception(Displaced())
 
     def _leave(self, client: str, place: asyncio.Future[T]) -> None:
         places = self._waiting.get(client, deque())

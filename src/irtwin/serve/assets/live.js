@@ -149,8 +149,9 @@
   const RUN = `SELECT * WHERE {
     ${iri} irt:has_Information / irt:IR_Name ?name .
     OPTIONAL {
-      { SELECT (MAX(?began) AS ?start) { VALUES ?watched { irt:Live_Run irt:Replayed_Run } ?any irt:run_of ${iri} ; a ?watched ; irt:Start_Time ?began } }
-      ?run irt:run_of ${iri} ; irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
+      { SELECT ?run { VALUES ?watched { irt:Live_Run irt:Replayed_Run } ?run irt:run_of ${iri} ; a ?watched ; irt:Start_Time ?began ; irt:Stream_State ?goes }
+        ORDER BY (?goes = "ended") DESC(?began) LIMIT 1 }
+      ?run irt:Start_Time ?start ; irt:Run_Time ?lasts ; irt:Sample_Count ?samples ; irt:Stream_State ?stream .
       OPTIONAL { ?run irt:Stale_Since ?since ; irt:Stale_Reason ?why }
       OPTIONAL { ?run irt:Energy_From ?from ; irt:Run_Power ?mean OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }
       BIND(COALESCE(?measured, ?modelled) AS ?energy)
@@ -191,7 +192,7 @@
     find("stream").textContent = stream === "ended" ? "run ended" : stream;
     find("stream").className = "stream " + (run.stream || "");
     document.querySelector("main").classList.toggle("is-stale", stream === "stale");
-    find("why").textContent = run.why ? run.why + "; the last good state is of " + new Date(run.since).toLocaleTimeString() : "";
+    find("why").textContent = run.why && stream === "stale" ? run.why + "; the last good state is of " + new Date(run.since).toLocaleTimeString() : "";
     const [energy, unit] = run.energy === undefined ? ["–", "J"] : inJoules(Number(run.energy));
     find("energy").value = energy;
     find("energy-unit").textContent = unit;
@@ -242,8 +243,15 @@
   }
 
   for (const place of ["by-joint", "by-effect", "gaps"]) bars(place, []);
-  const events = new EventSource(here + "/events");
-  events.onmessage = take;
+  function follow() {
+    const events = new EventSource(here + "/events");
+    events.onmessage = take;
+    events.onerror = () => { // a browser comes again by itself, but not once it was refused
+      if (events.readyState === EventSource.CLOSED) setTimeout(follow, 5000);
+    };
+  }
+
+  follow();
   build().catch((error) => { find("drawing").textContent = error.message; });
   poll();
   requestAnimationFrame(frame);

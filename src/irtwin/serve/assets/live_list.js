@@ -1,9 +1,11 @@
 "use strict";
-// The robots that are or were watched, the newest live run of each: asked of /sparql each second.
+// The robots that are or were watched, of each the run that lasts, else the newest: asked of /sparql each second.
 (function () {
   const QUERY = `SELECT ?robot ?name ?stream ?at ?energy ?power (COUNT(DISTINCT ?alarm) AS ?alarms) WHERE {
-    { SELECT ?robot (MAX(?began) AS ?start) { VALUES ?watched { irt:Live_Run irt:Replayed_Run } ?any a ?watched ; irt:run_of ?robot ; irt:Start_Time ?began } GROUP BY ?robot }
+    { SELECT ?robot (MAX(?rank) AS ?first) { VALUES ?watched { irt:Live_Run irt:Replayed_Run } ?any a ?watched ; irt:run_of ?robot ; irt:Start_Time ?began ; irt:Stream_State ?goes
+      BIND(CONCAT(IF(?goes = "ended", "0 ", "1 "), STR(?began)) AS ?rank) } GROUP BY ?robot }
     ?run irt:run_of ?robot ; irt:Start_Time ?start ; irt:Stream_State ?stream ; irt:State_Time ?at .
+    FILTER(CONCAT(IF(?stream = "ended", "0 ", "1 "), STR(?start)) = ?first)
     ?robot irt:has_Information / irt:IR_Name ?name .
     OPTIONAL { ?run irt:Run_Power ?power OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }
     BIND(COALESCE(?measured, ?modelled) AS ?energy)
