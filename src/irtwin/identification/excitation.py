@@ -30,7 +30,7 @@ _BARRIERS = (0.3, 0.1, 0.03, 0.01, 0.003)  # weights of the walls, falling: an i
 _RESERVE = 0.99  # share of the joint limits that is used: controllers round, too
 _STARTS = 10
 _POSTURES = 300
-_MOST_WORK = 3e8  # products of regressors' numbers, an iteration asked for: sixty times what seven joints take in one
+_MOST_WORK = 3e8  # products of regressors' numbers, an iteration asked for: tens of times what seven joints take
 _MOST = 100_000_000  # numbers that a motion is worked out from: 3600 s at 500 Hz of six joints, 0.8 GB
 
 
