@@ -2,7 +2,7 @@
 
 A case is RUNSxSAMPLES, at 100 samples a second; without one, 12x2000, 12x83000 and 1x1000000. The logs are those of a
 KUKA KR6 R700 that has friction, losses and noise as below, and in observed runs a hose that pulls at joint 3, which the
-twin lacks. `--profile` adds where the time goes.
+twin lacks. RUNSxSAMPLESxJOINTS is the same of a chain of so many joints. `--profile` adds where the time goes.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from irtwin.signals.motion import Motion
 CASES = ("12x2000", "12x83000", "1x1000000")
 RATE = 100.0  # Hz
 PIECE = 8192  # samples that are made at once
+AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")  # of a chain, again and again
 EFFECTS = (*BASELINE, "copper_loss", "cable_drag")
 COEFFICIENTS = {"Ia": 0.5, "Fc": 6.0, "Fv": 9.0, "k": 0.0, "c": 0.3, "R": 0.02, "": 1.0, "P0": 150.0}
 PULL = 8.0  # N m/rad, at joint 3 of observed runs
@@ -55,14 +56,31 @@ def runs(count: int) -> list[Run]:
     return [Run(f"run_{k}", roles[k], programmes[k], k) for k in range(count)]
 
 
-def write(place: Path, count: int, samples: int) -> None:
-    """Write a data set."""
-    urdf = folder("ontology") / "robots" / "kuka_kr6_r700.urdf"
-    stack = Stack(read_urdf(urdf), EFFECTS)
+def chain(joints: int) -> str:
+    """Return the URDF of a chain of links, each lighter than the one before."""
+    links, last = ['<link name="base"/>'], "base"
+    for k in range(joints):
+        mass = 20 / (k + 2)
+        moments = " ".join(f'i{axis}{axis}="{0.02 * mass:.5f}"' for axis in "xyz") + ' ixy="0" ixz="0" iyz="0"'
+        links.append(
+            f'<link name="link_{k + 1}"><inertial><origin xyz="0.02 0.01 0.05"/><mass value="{mass:.4f}"/>'
+            f'<inertia {moments}/></inertial></link><joint name="joint_{k + 1}" type="revolute"><parent link="{last}"/>'
+            f'<child link="link_{k + 1}"/><origin xyz="{0.02 * (k % 3)} 0.01 0.12"/><axis xyz="{AXES[k % len(AXES)]}"/>'
+            '<limit lower="-2.5" upper="2.5" velocity="3" effort="500"/></joint>'
+        )
+        last = f"link_{k + 1}"
+    return f'<robot name="chain_{joints}">{"".join(links)}</robot>'
+
+
+def write(place: Path, count: int, samples: int, joints: int | None = None) -> None:
+    """Write a data set, of the KR6 or of a chain of joints."""
+    kr6 = folder("ontology") / "robots" / "kuka_kr6_r700.urdf"
     (place / "runs").mkdir(parents=True)
-    (place / "robot.urdf").write_bytes(urdf.read_bytes())
+    urdf = place / "robot.urdf"
+    urdf.write_text(kr6.read_text(encoding="utf-8") if joints is None else chain(joints), encoding="utf-8")
+    stack = Stack(read_urdf(urdf), EFFECTS)
     lines = [
-        '[robot]\nname = "KR6"\nurdf = "robot.urdf"\n\n[twin]\neffects = [',
+        '[robot]\nname = "robot"\nurdf = "robot.urdf"\n\n[twin]\neffects = [',
         f"{str([*BASELINE, 'copper_loss'])[1:-1]}]",
     ]
     first: dict[int, str] = {}
@@ -163,10 +181,10 @@ def profile(place: Path) -> None:
 def main(cases: list[str], profiled: bool) -> None:
     print("| runs x samples | seconds | processor seconds | most memory, MB |\n| --- | --- | --- | --- |")
     for case in cases:
-        count, samples = (int(number) for number in case.split("x"))
+        numbers = [int(number) for number in case.split("x")]
         with tempfile.TemporaryDirectory() as scratch:
             place = Path(scratch, case)
-            write(place, count, samples)
+            write(place, *numbers)
             cost = measure(place)
             print(f"| {case} | {cost.seconds:.1f} | {cost.processor:.1f} | {cost.memory:.0f} |", flush=True)
             if profiled:

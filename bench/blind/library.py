@@ -33,7 +33,8 @@ class Library:
     @cached_property
     def groups(self) -> list[np.ndarray]:
         """Each group's products of all columns and the measurement, (D + 1, D + 1)."""
-        return self.system.moments(noise_before(self.system))
+        moments = self.system.moments(noise_before(self.system))
+        return [one.whole for one in moments]
 
     @cached_property
     def total(self) -> np.ndarray:

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, measure, swing
 
+import diagnosis_speed
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.report.gap.page import render_alone
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
-from irtwin.signals.log import DataSet, Run
+from irtwin.signals.log import DataSet, Run, read_data_set
 from irtwin.twin.files import from_json, to_json
 
 SLIDER = '<link name="{child}">{body}</link><joint name="{name}" type="prismatic"><parent link="{parent}"/>'
@@ -45,6 +46,14 @@ def runs(robot: Robot, count: int = 4, seconds: float = 6.0, **changes) -> list[
 
 def data_set(robot: Robot, made: list[Run]) -> DataSet:
     return DataSet(Path("odd"), robot, tuple(made), None, None, "mains", True, {})
+
+
+@pytest.mark.nightly
+def test_what_one_of_thirty_joints_lacks_is_named(tmp_path):
+    diagnosis_speed.write(tmp_path / "chain", 9, 600, 30)
+    found = diagnose(read_data_set(tmp_path / "chain")).document
+    assert found.verdict == "attributed"
+    assert [(one.effect, one.joints, one.scope) for one in found.causes] == [("cable_drag", ("joint_3",), "changed")]
 
 
 def checked(robot: Robot, made: list[Run], tmp_path: Path) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 from tests.synthetic import arm, swing
 
 from irtwin.gap.regression import progress
-from irtwin.gap.regression.progress import with_progress
+from irtwin.gap.regression.progress import paced, with_progress
 from irtwin.identification.accumulate import Rows
 
 ROBOT = arm(2)
@@ -34,3 +34,13 @@ def test_long_work_says_how_far_it_has_come(monkeypatch):
 def test_short_work_says_nothing(monkeypatch):
     assert said(MOTIONS, 60.0, monkeypatch) == []
     assert with_progress(equations, MOTIONS, None) is equations
+
+
+def test_steps_are_told_where_they_take_long(monkeypatch):
+    lines = []
+    paced(lines.append)("a step at once")
+    assert lines == []
+    monkeypatch.setattr(progress, "_EVERY", 0.0)
+    paced(lines.append)("a step")
+    paced(None)("nobody listens")
+    assert lines == ["a step"]

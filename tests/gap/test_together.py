@@ -13,6 +13,7 @@ from irtwin.effects.load import ExternalContact, Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import noise_before, twin_values
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.payloads import untold_payload
@@ -43,7 +44,7 @@ def screened(loaded, touched, still=()):
     stack = Stack(ROBOT, BASELINE)
     system = torque_system(stack, motions, grouping, (), None)
     noise = noise_before(system)
-    left = remainders(case, stack, twin_values(system, system.solution((), np.sum(system.moments(noise), axis=0))))
+    left = remainders(case, stack, twin_values(system, system.solution((), summed(system.moments(noise)))))
     alone = contact(ROBOT, left, noise, DEFAULT.contact), untold_payload(ROBOT, system, noise, DEFAULT.some_payload, 0)
     both = each_beside_the_other(case, stack, system, noise, alone, 0)
     return [[one and one.effect.runs for one in pair] for pair in (alone, both)]

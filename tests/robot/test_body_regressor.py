@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.robot import body_regressor as module
-from irtwin.robot.body_regressor import body_regressor, point_jacobian
+from irtwin.robot.body_regressor import body_regressor, point_jacobian, regressor_slope
 
 
 def tree(parents: list[int], slides: list[bool], rng: np.random.Generator) -> pin.Model:
@@ -40,6 +40,20 @@ def test_it_is_what_pinocchio_says_of_each_sample(data, joints, seed):
     rng = np.random.default_rng(seed)
     model, states = tree(parents, slides, rng), rng.uniform(-3, 3, (3, 4, joints))
     np.testing.assert_allclose(body_regressor(model, *states), one_by_one(model, *states), rtol=1e-11, atol=1e-10)
+
+
+@settings(max_examples=30)
+@given(st.data(), st.integers(1, 7), st.integers(0, 2**32 - 1))
+def test_its_slope_is_that_of_differences(data, joints, seed):
+    parents = [data.draw(st.integers(0, number), "parent") for number in range(joints)]
+    slides = data.draw(st.lists(st.booleans(), min_size=joints, max_size=joints), "slides")
+    rng = np.random.default_rng(seed)
+    model, states = tree(parents, slides, rng), rng.uniform(-2, 2, (3, 4, joints))
+    weights, along = rng.standard_normal((4, joints, 10 * joints)), rng.standard_normal((3, 4, joints))
+    up, down = (body_regressor(model, *(states + step * along)) for step in (1e-5, -1e-5))
+    differences = ((up - down) * weights).sum(axis=(1, 2)) / 2e-5
+    found = (np.array(regressor_slope(model, *states, weights)) * along).sum(axis=(0, 2))
+    np.testing.assert_allclose(found, differences, rtol=1e-6, atol=1e-4)
 
 
 @pytest.mark.parametrize("samples", [0, 1, 6, 7, 15])

@@ -252,7 +252,13 @@ def diagnose(
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
     measures = {channel.finding.name: flexible_regression(channel, case.seen, seed) for channel in planned}
     proposal = next_experiment(
-        case.robot, planned, [catalogue()[one.effect] for one in lacking], case.seen, thresholds.experiment, excitation
+        case.robot,
+        planned,
+        [catalogue()[one.effect] for one in lacking],
+        case.seen,
+        thresholds.experiment,
+        excitation,
+        tell,
     )
     return Diagnosis(
         description=case.robot,
@@ -348,9 +354,11 @@ def _torque(
     system = replace(system, transient=found.contact)
 
     def alone(without: Set[Without]) -> tuple[Finding, Floor]:
-        first = find("torque", case, system, floor.torque, seed, without)
+        first = find("torque", case, system, floor.torque, seed, without, tell=tell)
         left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
-        return (first, floor) if left is floor else (find("torque", case, system, left.torque, seed, without), left)
+        if left is floor:
+            return first, floor
+        return find("torque", case, system, left.torque, seed, without, tell=tell), left
 
     return find_possible(case, alone, unknown)
 
@@ -381,7 +389,7 @@ def _power(
     plain = before().system if before else None
 
     def search(without: Set[Without]) -> tuple[Finding, Floor]:
-        return find("power", case, system, level, seed, without, plain), floor
+        return find("power", case, system, level, seed, without, plain, tell), floor
 
     finding, _, refusals = find_possible(case, search, unknown)
     found = explained_power(stack, finding, torque, power_of)

@@ -9,6 +9,7 @@ import numpy as np
 
 from irtwin.gap.document.document import Change
 from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.regression.moments import summed
 from irtwin.signals.motion import Motion
 
 _RESAMPLED = 1000
@@ -45,7 +46,7 @@ def energy_errors(finding: Finding, motions: Sequence[Motion]) -> EnergyErrors:
     ):
         ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
         moments = system.moments(noise)
-        total = np.sum(moments, axis=0)
+        total = summed(moments)
         part = []
         for group in np.flatnonzero(system.group_observed):
             vector = system.solution(columns, total - moments[group])

@@ -9,11 +9,10 @@ import numpy as np
 from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
-from irtwin.robot.body_regressor import body_regressor
+from irtwin.robot.body_regressor import body_regressor, regressor_slope
 from irtwin.robot.description import Robot
 
 _SHARPNESS = 4  # of the smooth maximum and minimum of the eigenvalues
-_STEP = 1e-6  # rad, rad/s: for the differences of the regressor
 
 
 @dataclass(frozen=True)
@@ -61,16 +60,8 @@ class BaseRegressor:
         weight = weight.reshape(samples, n, -1)
         rigid, joint = weight[:, :, : 10 * n], np.arange(n)
         rotor, viscous, coulomb = (weight[:, joint, (10 + k) * n + joint] for k in range(3))
-        gradient = MotionGradient(np.zeros_like(q), viscous + coulomb * (1 - sign**2) / slow, rotor.copy())
-        here = body_regressor(self._model, q, dq, ddq)
-        for j, e in enumerate(np.eye(n)):
-            for target, step, moved in (
-                (gradient.q, _STEP, body_regressor(self._model, q + _STEP * e, dq, ddq)),
-                (gradient.dq, _STEP, body_regressor(self._model, q, dq + _STEP * e, ddq)),
-                (gradient.ddq, 1.0, body_regressor(self._model, q, dq, ddq + e)),  # linear in ddq: exact
-            ):
-                target[:, j] += np.einsum("nij,nij->n", moved - here, rigid) / step
-        return value, gradient
+        by_q, by_dq, by_ddq = regressor_slope(self._model, q, dq, ddq, rigid)
+        return value, MotionGradient(by_q, by_dq + viscous + coulomb * (1 - sign**2) / slow, by_ddq + rotor)
 
     def _all(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, sign: np.ndarray) -> np.ndarray:
         each_joint = [_diagonals(ddq), _diagonals(dq), _diagonals(sign), _diagonals(np.ones_like(dq))]

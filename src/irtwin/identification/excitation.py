@@ -30,7 +30,7 @@ _BARRIERS = (0.3, 0.1, 0.03, 0.01, 0.003)  # weights of the walls, falling: an i
 _RESERVE = 0.99  # share of the joint limits that is used: controllers round, too
 _STARTS = 10
 _POSTURES = 300
-_MOST_WORK = 3e7  # numbers of regressors, an iteration asked for: thrice what six or seven joints take
+_MOST_WORK = 3e8  # products of regressors' numbers, an iteration asked for: tens of times what seven joints take
 _MOST = 100_000_000  # numbers that a motion is worked out from: 3600 s at 500 Hz of six joints, 0.8 GB
 
 
@@ -194,9 +194,9 @@ class _Search:
         )
 
     def _spend(self, most: float) -> None:
-        """Count the numbers of a cost and its gradient: a sample's regressor is n by 10 n, and 3 n + 1 are needed."""
+        """Count the products of a cost and its gradient: those of all columns, 10 n, of regressors with n rows each."""
         n = len(self._robot.joints)
-        self._work += len(self._rest.grid) * (3 * n + 1) * 10 * n**2
+        self._work += len(self._rest.grid) * n * (10 * n) ** 2
         if self._work > most:
             raise _MostWork
 

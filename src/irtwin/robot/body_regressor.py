@@ -13,6 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+_INERTIAS = np.zeros((6, 3, 3))  # a unit of each, in Pinocchio's order
+for _unit, (_row, _column) in zip(_INERTIAS, ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)), strict=True):
+    _unit[_row, _column] = _unit[_column, _row] = 1.0
 _PIECE = 2048  # samples that are worked on at once: they stay in the processor's cache
 
 
@@ -38,6 +41,14 @@ class _Joint:
             still += part
         return np.asarray(still)
 
+    def handed_down(self, slopes: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Return slopes (m, 6, N) by motions seen in the joint's frame as slopes by those of the parent."""
+        still, *moved = self.maps.reshape(-1, 6, 6).swapaxes(1, 2)
+        found = still @ slopes
+        for part, by in zip(moved, (q,) if self.slides else (np.sin(q), np.cos(q)), strict=True):
+            found += part @ slopes * by
+        return np.asarray(found)
+
 
 def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
     """Return (N, n, 10 n): each joint's torque by ten inertial parameters a body, in Pinocchio's order.
@@ -51,6 +62,24 @@ def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
         states = (np.ascontiguousarray(each[cut].T) for each in (q, dq, ddq))
         _fill(found[:, :, cut], joints, model.gravity.vector, *states)
     return found.transpose(2, 0, 1)
+
+
+def regressor_slope(
+    model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the derivatives (N, n) of the sum of weights times regressor, (N, n, 10 n) both, by q, dq and ddq.
+
+    They are worked out backwards from the tip to the base (reverse accumulation, Griewank and Walther 2008), which
+    takes as long as a few regressors, where differences would take one for each joint.
+    """
+    joints = _joints(model)
+    found = np.empty((3, *q.shape))
+    for first in range(0, len(q), _PIECE):
+        cut = slice(first, first + _PIECE)
+        states = np.ascontiguousarray(np.stack([q[cut], dq[cut], ddq[cut]]).swapaxes(1, 2))
+        slopes = _slope(joints, model.gravity.vector, states, weights[cut].transpose(1, 2, 0))
+        found[:, cut] = slopes.swapaxes(1, 2)
+    return found[0], found[1], found[2]
 
 
 def point_jacobian(model: pin.Model, frame: int, q: np.ndarray) -> np.ndarray:
@@ -92,19 +121,77 @@ def _fill(
     found: np.ndarray, joints: Sequence[_Joint], gravity: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
 ) -> None:
     """Write the regressor (n, 10 n, N) of a few samples (n, N)."""
+    for index, (own, chain) in enumerate(_motions(joints, gravity, q, dq, ddq)):
+        for carrier, torque in zip(chain, _torques(own[2:], own[0], own[1]), strict=True):
+            found[carrier, 10 * index : 10 * index + 10] = torque
+
+
+def _motions(
+    joints: Sequence[_Joint], gravity: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+) -> list[tuple[np.ndarray, list[int]]]:
+    """Return each body's motions (2 + c, 6, N) at a few samples (n, N), and the c joints that carry it.
+
+    These are its speed, its acceleration less gravity, and what a unit of speed of each of the joints makes.
+    """
     still = np.zeros((6, q.shape[1]))
     base = np.stack([still, still - gravity[:, None]])
-    motions: list[np.ndarray] = []  # of each body: speed, acceleration, and what a unit of speed of each carrier makes
-    carriers: list[list[int]] = []
+    found: list[tuple[np.ndarray, list[int]]] = []
     for index, joint in enumerate(joints):
-        before, carrying = (base, []) if joint.parent < 0 else (motions[joint.parent], carriers[joint.parent])
+        before, carrying = (base, []) if joint.parent < 0 else found[joint.parent]
         own = np.concatenate([joint.seen(before, q[index]), np.broadcast_to(joint.axis[:, None], (1, *still.shape))])
         own[0] += joint.axis[:, None] * dq[index]
         own[1] += joint.axis[:, None] * ddq[index] + joint.crossed @ own[0] * dq[index]
-        motions.append(own)
-        carriers.append([*carrying, index])
-        for carrier, torque in zip(carriers[-1], _torques(own[2:], own[0], own[1]), strict=True):
-            found[carrier, 10 * index : 10 * index + 10] = torque
+        found.append((own, [*carrying, index]))
+    return found
+
+
+def _slope(joints: Sequence[_Joint], gravity: np.ndarray, states: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the slopes (3, n, N) at a few samples' q, dq and ddq (3, n, N), by weights (n, 10 n, N)."""
+    q, dq, ddq = states
+    motions = _motions(joints, gravity, q, dq, ddq)
+    slopes = [np.zeros_like(own) for own, _ in motions]  # of the sum, by each body's motions
+    found = np.empty((3, *q.shape))
+    for index, joint in reversed(list(enumerate(joints))):
+        (own, chain), slope = motions[index], slopes[index]
+        _add_torque_slope(slope, own, weights[chain, 10 * index : 10 * index + 10])
+        turned = joint.crossed @ own[0]
+        found[1, index] = np.einsum("kn,kn->n", turned, slope[1])
+        slope[0] += joint.crossed.T @ slope[1] * dq[index]
+        found[1, index] += joint.axis @ slope[0]
+        found[2, index] = joint.axis @ slope[1]
+        carried = own[:-1].copy()  # the joint's own axis does not depend on its position
+        carried[1] -= turned * dq[index]
+        found[0, index] = np.einsum("mkn,mkn->n", joint.crossed @ carried, slope[:-1])
+        if joint.parent >= 0:
+            slopes[joint.parent] += joint.handed_down(slope[:-1], q[index])
+    return found
+
+
+def _add_torque_slope(slope: np.ndarray, own: np.ndarray, weights: np.ndarray) -> None:
+    """Add to `slope` how weights (c, 10, N) times a body's torques change with its motions, (2 + c, 6, N) both."""
+    (speed, acceleration), carried = own[:2], own[2:]
+    v, w, dw = speed[:3], speed[3:], acceleration[3:]
+    a = acceleration[:3] + np.cross(w, v, axis=0)
+    slope[2:, :3] += weights[:, 0, None] * a
+    slope[2:] += np.einsum("kpn,mpn->mkn", _by_first_moments(a, w, dw), weights[:, 1:4])
+    slope[2:, 3:] += np.einsum("kpn,mpn->mkn", _by_inertia(w, dw), weights[:, 4:])
+    wrench = np.einsum("mpn,mkn->pkn", weights, carried)  # by which each parameter counts
+    force, torque = wrench[1:4, :3], wrench[1:4, 3:]  # of first moments, whose unit vectors are the rows
+    by_a = wrench[0, :3] - _axial(torque)
+    by_w = np.einsum("pkn,pn->kn", force, w) + np.einsum("pkn,kn->pn", force, w) - 2 * np.einsum("ppn->n", force) * w
+    by_dw = _axial(force)
+    for parameter, inertia in zip(wrench[4:, 3:], _INERTIAS, strict=True):
+        by_dw += inertia @ parameter
+        by_w += np.cross(inertia @ w, parameter, axis=0) + inertia @ np.cross(parameter, w, axis=0)
+    slope[0, :3] += np.cross(by_a, w, axis=0)
+    slope[0, 3:] += by_w + np.cross(v, by_a, axis=0)
+    slope[1, :3] += by_a
+    slope[1, 3:] += by_dw
+
+
+def _axial(rows: np.ndarray) -> np.ndarray:
+    """Return (3, N) the sum of the unit vectors times the rows (3, 3, N)."""
+    return np.array([rows[1, 2] - rows[2, 1], rows[2, 0] - rows[0, 2], rows[0, 1] - rows[1, 0]])
 
 
 def _torques(carried: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored
+from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System, noise_before
 from irtwin.gap.thresholds import SameRobot
 from irtwin.robot.description import Robot
@@ -31,8 +32,8 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
     others = [run for run in runs if run.role != "observed"]
     moments = system.moments(noise_before(system))
     seen = system.group_observed
-    other = system.solution((), np.sum([m for m, own in zip(moments, seen, strict=True) if not own], axis=0))
-    total = np.sum([m for m, own in zip(moments, seen, strict=True) if own], axis=0)
+    other = system.solution((), summed([m for m, own in zip(moments, seen, strict=True) if not own]))
+    total = summed([m for m, own in zip(moments, seen, strict=True) if own])
     own = system.solution((), total)
     foreign = _foreign_share(stack.robot, system, total, own, other, limits) > limits.foreign[others[0].role]
     opposed = _opposed(stack.robot, system, own, other, limits.opposed)
@@ -45,7 +46,7 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
 
 
 def _foreign_share(
-    robot: Robot, system: System, total: np.ndarray, own: np.ndarray, other: np.ndarray, limits: SameRobot
+    robot: Robot, system: System, total: Moments, own: np.ndarray, other: np.ndarray, limits: SameRobot
 ) -> np.ndarray:
     """Return how much of each observed joint's mean square (n,) the bodies of the other runs leave.
 
@@ -88,11 +89,12 @@ def _allowed(robot: Robot, system: System, heaviest: float) -> np.ndarray:
     return allowed
 
 
-def _refitted(system: System, total: np.ndarray, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def _refitted(system: System, total: Moments, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """Return what is added to coefficients `start` (D,) so that they fit best, each no farther than allowed (K,)."""
     free = np.flatnonzero(allowed > 0)
-    factor = np.triu(factored(total[np.ix_(free, free)], system.prior()[np.ix_(free, free)]))
-    right = total[free, -1] - total[free, : len(start)] @ start
+    products = total.of(free)
+    factor = np.triu(factored(products[:, free], system.prior()[np.ix_(free, free)]))
+    right = products[:, -1] - products[:, : len(start)] @ start
     found = lsq_linear(factor, solve_triangular(factor.T, right, lower=True), (-allowed[free], allowed[free]))
     added = np.zeros(len(start))
     added[free] = found.x

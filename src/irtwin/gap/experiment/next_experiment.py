@@ -17,6 +17,7 @@ from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
+from irtwin.gap.regression.progress import Tell, paced
 from irtwin.gap.thresholds import NextExperiment, Thresholds
 from irtwin.identification.excitation import Excitation
 from irtwin.robot.description import Robot
@@ -214,12 +215,14 @@ def next_experiment(
     seen: Sequence[Motion],
     limits: NextExperiment,
     excitation: Callable[[], Excitation | None] | None = None,
+    tell: Tell | None = None,
 ) -> Proposal | None:
     """Design what tells the rivals of causes that matter apart; where there are none, what shows the effects `lacking`.
 
-    `channels`: planned equations of each; `seen`: the motions that were judged; `excitation` as for `programmes`. Of
-    the programmes that reach a separation of `limits.enough` in every question the one that takes the least time is
-    chosen, else the one that answers the most. None where there is nothing to ask.
+    `channels`: planned equations of each; `seen`: the motions that were judged; `excitation` as for `programmes`;
+    `tell` is told which programme is weighed, where that takes long. Of the programmes that reach a separation of
+    `limits.enough` in every question the one that takes the least time is chosen, else the one that answers the most.
+    None where there is nothing to ask.
     """
     questions = [q for channel in channels for cause in _mattering(channel) if (q := _rivals(channel, cause))]
     if questions:
@@ -236,7 +239,8 @@ def next_experiment(
     warm = any("temperature" in effect.requires for effect in effects)
     off = [effect for effect in effects if effect.taken_off]
     tried = programmes(robot, joints, seen, warm=warm, take_off=off, excitation=excitation) if questions else ()
-    weighed = [(one, _weigh(one, questions)) for one in tried]
+    told = paced(tell)
+    weighed = [(one, _weigh(one, questions, told)) for one in tried]
     note = _note([weights for _, weights in weighed])
     if questions and not weighed:
         note = f"no programme of at most {LONGEST / 60:g} minutes keeps to the limits of this robot"
@@ -250,7 +254,8 @@ def next_experiment(
     return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note, limits.enough)
 
 
-def _weigh(programme: Programme, questions: Sequence[_Question]) -> list[Weight]:
+def _weigh(programme: Programme, questions: Sequence[_Question], tell: Tell) -> list[Weight]:
+    tell(f"  weighing {programme.kind.replace('_', ' ')}")
     products: dict[str, Products] = {}
     for channel in {q.channel.finding.name: q.channel for q in questions}.values():
         name = channel.finding.name

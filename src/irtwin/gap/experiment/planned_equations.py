@@ -18,12 +18,15 @@ from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import PowerOf, TwinPower
 from irtwin.gap.regression.hypotheses import Column
+from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System, least_noise
 from irtwin.gap.regression.residuals import as_filtered
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.accumulate import Rows, accumulate_any
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
+
+_PIECE = 256  # samples whose columns are held at once
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,12 @@ class PlannedEquations:
         return max(1.0, float(self.finding.system.rows.sum(axis=0).max(initial=0.0)))
 
     @cached_property
-    def _moments(self) -> list[np.ndarray]:
+    def _moments(self) -> list[Moments]:
         return self.finding.system.moments(self.finding.attribution.noise)
 
     @cached_property
-    def _total(self) -> np.ndarray:
-        return np.asarray(np.sum(self._moments, axis=0))
+    def _total(self) -> Moments:
+        return summed(self._moments)
 
     def products(self, programme: Programme, tried: Sequence[int | Column]) -> Products:
         """Return the products of the twin's columns and those tried.
@@ -91,9 +94,9 @@ class PlannedEquations:
         system, base = self.finding.system, self.finding.system.base
         inside = [k for k in tried if isinstance(k, int)]
         into = np.append([*range(base), *(base + p for p, k in enumerate(tried) if isinstance(k, int))], -1)
-        places = np.append([*range(base), *inside], -1)
+        places = np.array([*range(base), *inside, self._total.size - 1])
         existing = np.zeros((base + len(tried) + 1,) * 2)
-        existing[np.ix_(into, into)] = self._total[np.ix_(places, places)]
+        existing[np.ix_(into, into)] = self._total.among(places, places)
         at = {column: base + place for place, column in enumerate(tried)}
         return Products(existing, existing + self._planned(programme, tried), at, system)
 
@@ -104,18 +107,20 @@ class PlannedEquations:
         """
         finding, system = self.finding, self.finding.system
         columns = [system.columns[self._plain(k) - system.base] for k in finding.chosen]
-        rows = self._equations(part, columns, ())
         base = system.base
         plain = system.expected + system.solution((), self._total)[:base] * system.scale[:base]
         measured = part.torque if finding.name == "torque" else part.power
         assert measured is not None
-        own = np.asarray(rows.columns)[..., :base]
-        known = self._known(part, own)
-        both = [own @ plain + known, np.asarray(rows.columns) @ finding.estimate.values + known]
-        both = [as_filtered(part, values) for values in both]
+        said = []
+        for piece in part.pieces(_PIECE):
+            rows = self._equations(piece, columns, ())
+            every, none = np.asarray(rows.columns), np.zeros(rows.known.shape, dtype=bool)
+            known = self._known(piece, every[..., :base])
+            undecided = none if rows.undecided is None else rows.undecided
+            said.append((every[..., :base] @ plain + known, every @ finding.estimate.values + known, undecided))
+        twin, with_causes, undecided = map(np.concatenate, zip(*said, strict=True))
         measured = measured.reshape(len(part.time), -1)
-        undecided = np.zeros(measured.shape, dtype=bool) if rows.undecided is None else rows.undecided
-        return measured - both[0], measured - both[1], undecided
+        return measured - as_filtered(part, twin), measured - as_filtered(part, with_causes), undecided
 
     def load(self, part: Motion) -> np.ndarray:
         """Return the joint torque that the twin predicts for a part of a run, (N, n) N m."""
@@ -150,7 +155,7 @@ class PlannedEquations:
             replace(motion, run=f"{programme.kind} {k} {' '.join(programme.joints)}")
             for k, motion in enumerate(programme.motions)
         ]
-        blocks = accumulate_any(motions, lambda part: self._equations(part, columns, programme.without), pattern)
+        blocks = accumulate_any(motions, lambda part: self._of_joints(part, columns, programme, pattern), pattern)
         scale = np.append([*system.scale[:base], *(column.term.spread for column in columns)], 0.0)
         found = np.zeros((len(scale), len(scale)))
         places = [np.append(np.flatnonzero(row), len(scale) - 1) for row in pattern]
@@ -163,20 +168,34 @@ class PlannedEquations:
                 found[np.ix_(used, used)] += factor.T @ factor
         return found
 
+    def _of_joints(self, part: Motion, columns: Sequence[Column], programme: Programme, pattern: np.ndarray) -> Rows:
+        """Return a part's equations, each with the columns alone that it has: of many joints all would be large."""
+        stack, base = self._stack, self.finding.system.base
+        if self.finding.name != "torque":
+            return self._equations(part, columns, programme.without)
+        own, made = stack.columns_by_joint(part), self._tried(part, columns, programme.without)
+        both: list[list[np.ndarray]] = [
+            [first, *(made[k][:, joint, None] for k in np.flatnonzero(used[base:]))]
+            for joint, (first, used) in enumerate(zip(own, pattern, strict=True))
+        ]
+        return Rows(both, np.zeros(part.dq.shape), np.zeros(part.dq.shape), stack.undecided(part))
+
+    def _tried(self, part: Motion, columns: Sequence[Column], without: Sequence[str]) -> list[np.ndarray]:
+        """Return the columns tried over a part, (N, n) or (N,) each; zero for effects that are taken off."""
+        below, held = self._below(part.whole or part), dict[int, np.ndarray]()
+        return [self._made(column, part, below, held) * (column.effect.id not in without) for column in columns]
+
     def _plain(self, index: int) -> int:
         """Return the index of a column as it is, where that of its change is given."""
         system = self.finding.system
         return index if index < system.changed else index - len(system.columns)
 
     def _equations(self, part: Motion, columns: Sequence[Column], without: Sequence[str]) -> Rows:
-        stack, below = self._stack, self._below(part.whole or part)
-        held: dict[int, np.ndarray] = {}
-        made = [self._made(column, part, below, held) * (column.effect.id not in without) for column in columns]
+        stack, made = self._stack, self._tried(part, columns, without)
         if self.finding.name == "torque":
             own, undecided = stack.torque_columns(part), stack.undecided(part)
         else:
-            real = below.torque[part.start : part.start + len(part.time)]
-            own, undecided = stack.power_columns(part, real)[:, None, ~stack.fixed], None
+            own, undecided = stack.power_columns(part, self.load(part))[:, None, ~stack.fixed], None
             made = [values[:, None] for values in made]
         joined = np.concatenate([own, *(values[..., None] for values in made)], axis=2)
         return Rows(joined, np.zeros(joined.shape[:2]), np.zeros(joined.shape[:2]), undecided)

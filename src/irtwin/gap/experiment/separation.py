@@ -12,6 +12,7 @@ import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.cross_validation import scores
+from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 
 _LEAST = 1.0  # squares of a column in units of its prior: with less the prior decides
@@ -39,7 +40,7 @@ def unimitated(left: np.ndarray, own: Sequence[int], values: np.ndarray, by: Seq
     return max(squares, 0.0)
 
 
-def dispersion(system: System, moments: Sequence[np.ndarray], noise: np.ndarray, chosen: Sequence[int]) -> float:
+def dispersion(system: System, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]) -> float:
     """Return how many times more than with independent samples the scores of columns vary.
 
     Samples of one run are not independent, so what a fit leaves counts by this the less: the median over all candidate
@@ -47,7 +48,7 @@ def dispersion(system: System, moments: Sequence[np.ndarray], noise: np.ndarray,
     moments, noise: as of `System.moments`; chosen: the columns fitted beside the twin's.
     """
     by_block, products = scores(system, moments, noise, chosen)
-    sizes = np.diag(products)[:-1]
+    sizes = products.squares(range(by_block.shape[1]))
     judged = np.arange(system.base, len(sizes))
     judged = np.setdiff1d(judged[sizes[judged] > _LEAST], chosen)
     if not len(judged):

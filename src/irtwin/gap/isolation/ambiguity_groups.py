@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
 
 import numpy as np
 
 from irtwin.gap.isolation.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.regression.cross_validation import attempt, canonical_correlation
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant
+from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.thresholds import Ambiguity, Thresholds
@@ -19,7 +19,7 @@ _Parts = tuple[Variant, ...]
 
 def causes(
     system: System,
-    moments: Sequence[np.ndarray],
+    moments: Sequence[Moments],
     noise: np.ndarray,
     candidates: Sequence[Hypothesis],
     found: Sequence[Find],
@@ -44,13 +44,11 @@ def causes(
     return tuple(one for one, needed in zip(joined, least, strict=True) if one is joined[0] or one.gain >= needed)
 
 
-def _in_equations(
-    system: System, moments: Sequence[np.ndarray], noise: np.ndarray, named: Sequence[Cause]
-) -> np.ndarray:
+def _in_equations(system: System, moments: Sequence[Moments], noise: np.ndarray, named: Sequence[Cause]) -> np.ndarray:
     """Return (g,) what the first cause explains of each equation beside the others, a row, on groups left out."""
     rest = [k for cause in named[1:] for k in cause.columns]
     every = [*named[0].columns, *rest]
-    total = reduce(np.add, moments)
+    total = summed(moments)
     gain = np.zeros(len(system.pattern))
     for group in np.flatnonzero(judged(system, named[0].scope)).tolist():
         train = total - moments[group]
@@ -62,7 +60,7 @@ def _in_equations(
 
 def _cause(
     system: System,
-    moments: Sequence[np.ndarray],
+    moments: Sequence[Moments],
     candidates: Sequence[Hypothesis],
     members: Sequence[Find],
     others: Sequence[int],
@@ -76,7 +74,7 @@ def _cause(
     trial = attempt(system, moments, others, [[as_one(parts)] for parts in sides])
     gain, said = gains(system, trial)[:, own], (trial.said[0] / rows(system))[own]
     mean = np.average(gain, axis=1, weights=rows(system)[own])
-    alike = canonical_correlation(system, reduce(np.add, moments), others, [as_one(parts).columns for parts in sides])
+    alike = canonical_correlation(system, summed(moments), others, [as_one(parts).columns for parts in sides])
     known: dict[str, float] = {}
     correlations: dict[str, float] = {}
     equal: list[str] = []
@@ -116,7 +114,7 @@ def indistinguishable_below(behind: np.ndarray, gain: float, most: float, limits
 
 def _competing(
     system: System,
-    moments: Sequence[np.ndarray],
+    moments: Sequence[Moments],
     candidates: Sequence[Hypothesis],
     members: Sequence[Find],
     others: Sequence[int],

@@ -59,7 +59,7 @@ def find_beside_power(
         return replace(found, whole=replace(found.whole, transient=transient))
 
     equations = about(predicted, before, effects[0])
-    first, both = _find(case, equations, floor, seed, without)
+    first, both = _find(case, equations, floor, seed, without, tell)
     if not any(cause.carries_power for cause in first.causes):
         return first, floor
     explained = ExplainedTorque(stack, first, below)
@@ -71,7 +71,7 @@ def find_beside_power(
         equations = about(explained, power, shapes)
     elif left is floor:
         return first, floor
-    return _find(case, equations, left, seed, without)[0], left
+    return _find(case, equations, left, seed, without, tell)[0], left
 
 
 def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:
@@ -105,12 +105,12 @@ def _best_shapes(system: System, found: Attribution) -> list[Effect]:
 
 
 def _find(
-    case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]
+    case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without], tell: Tell | None
 ) -> tuple[Finding, Attribution]:
     """Return what both equations show of torque, and all that they show."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
-    both = attributed(case, whole, np.concatenate(levels), seed, without)
+    both = attributed(case, whole, np.concatenate(levels), seed, without, tell)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(equations, tuple(of_power), both.noise)

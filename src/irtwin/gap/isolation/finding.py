@@ -21,6 +21,7 @@ from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
+from irtwin.gap.regression.progress import Tell
 from irtwin.identification.estimators import Estimate
 
 _NO_NOISE = 1e-9
@@ -142,13 +143,14 @@ def find(
     seed: int,
     without: Set[Without] = frozenset(),
     plain: System | None = None,
+    tell: Tell | None = None,
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
 
-    `plain` as a finding's.
+    `plain` as a finding's; `tell` as for `attribute`.
     """
     places = (None,) if name == "power" else case.robot.joint_names
-    found = attributed(case, system, floor, seed, without)
+    found = attributed(case, system, floor, seed, without, tell)
     return finding_of(name, places, case.observed, system, found, floor, seed, plain)
 
 
@@ -193,7 +195,12 @@ def finding_of(
 
 
 def attributed(
-    case: Case, system: System, floor: np.ndarray | None, seed: int, without: Set[Without] = frozenset()
+    case: Case,
+    system: System,
+    floor: np.ndarray | None,
+    seed: int,
+    without: Set[Without] = frozenset(),
+    tell: Tell | None = None,
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS.
 
@@ -201,11 +208,11 @@ def attributed(
     """
     inside = _inside(case, system)
     candidates = _hypotheses(system, inside, without)
-    found = attribute(system, candidates, seed, case.thresholds, floor)
+    found = attribute(system, candidates, seed, case.thresholds, floor, tell)
     known = {effect for effect, _ in inside}
     while old := shown_before(system, found.causes, found.noise, known, case.thresholds.changes):
         candidates = [one for one in candidates if not (one.effect in old and one.scope == CHANGED)]
-        found = attribute(system, candidates, seed, case.thresholds, floor)
+        found = attribute(system, candidates, seed, case.thresholds, floor, tell)
     return found
 
 

@@ -13,7 +13,9 @@ from irtwin.gap.isolation.ambiguity_groups import causes, indistinguishable_belo
 from irtwin.gap.isolation.cause import Cause, Find, between_groups, gains, judged, rows
 from irtwin.gap.regression.cross_validation import Trial, attempt, scores
 from irtwin.gap.regression.hypotheses import MISSING, Hypothesis, in_scope
+from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.progress import Tell, paced
 from irtwin.gap.regression.significance import p_values
 from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.thresholds import Selection, Thresholds
@@ -38,23 +40,26 @@ def attribute(
     seed: int,
     limits: Thresholds,
     floor: np.ndarray | None = None,
+    tell: Tell | None = None,
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's.
 
     Each round tries every hypothesis beside those chosen, refits everything, and judges it on groups left out; an
     episode by what its joints say of each other. With a `floor` (g,), RMS, some causes have to explain a part of it.
+    `tell` is told how far that has come, where it takes long.
     """
     candidates = in_scope(candidates, both=system.both)
     noise = system.residual_rms((), np.ones(len(system.pattern)))
     noise = system.residual_rms((), noise)
     moments = system.moments(noise)
     first = attempt(system, moments, (), [h.variants for h in candidates])
-    search = _Search(system, candidates, seed, floor, limits)
+    search = _Search(system, candidates, seed, floor, limits, paced(tell))
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
     moments = system.moments(noise)
     least = search.matters(noise, [one.hypothesis for one in found]) / 2
     found = _backward(system, moments, found, least, limits.selection)
+    search.tell(f"  rivals of the {len(found)} that are found")
     named = causes(system, moments, noise, candidates, found, limits)
     noise = system.residual_rms([k for cause in named for k in cause.columns], noise)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
@@ -69,6 +74,7 @@ class _Search:
     seed: int
     floor: np.ndarray | None
     limits: Thresholds
+    tell: Tell
 
     def matters(self, noise: np.ndarray, left: Sequence[Hypothesis]) -> np.ndarray:
         """Return what each has to gain, (H,), where equations are weighed by `noise` (g,)."""
@@ -103,13 +109,14 @@ class _Search:
             if all_found:
                 noise = self.noise(all_found, noise)
             moments = self.system.moments(noise)
+            self.tell(f"  {len(self.candidates)} hypotheses, beside {len(all_found)} that are found")
             new = self._round(moments, noise, all_found) or self._elsewhere(moments, noise, all_found)
             if not new:
                 break
             all_found.extend(new)
         return all_found
 
-    def _round(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
+    def _round(self, moments: Sequence[Moments], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
         chosen, limits = _columns(found), self.limits.selection
         left = self._left(found)
         if not left:
@@ -132,7 +139,7 @@ class _Search:
         best = _leader(sure, gain, gains(self.system, trial), left, found, self.limits)
         return [_find(trial, left, k, gain, t, p) for k in [best, *_leads_too(best, sure, gain, left, limits)]]
 
-    def _elsewhere(self, moments: Sequence[np.ndarray], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
+    def _elsewhere(self, moments: Sequence[Moments], noise: np.ndarray, found: Sequence[Find]) -> list[Find]:
         """Return what the effects that were found add at other joints, which show it less."""
         known = {_key(one) for one in found if one.hypothesis.joint}
         left = [one for one in self._left(found) if one.joint and (one.effect, one.scope) in known]
@@ -153,7 +160,7 @@ class _Search:
         left = [h for h in self.candidates if not any(set(v.columns) & taken for v in h.variants)]
         return [h for h in left if not any(_same_place(h, one.hypothesis) for one in found)]
 
-    def loss(self, found: Sequence[Find], moments: Sequence[np.ndarray]) -> float:
+    def loss(self, found: Sequence[Find], moments: Sequence[Moments]) -> float:
         """Return the weighted squares that finds leave on groups left out."""
         return float(attempt(self.system, moments, _columns(found), [[found[0].variant]]).start.sum())
 
@@ -299,7 +306,7 @@ def _find(trial: Trial, left: Sequence[Hypothesis], place: int, gain: np.ndarray
 
 
 def _backward(
-    system: System, moments: Sequence[np.ndarray], found: list[Find], least: np.ndarray, limits: Selection
+    system: System, moments: Sequence[Moments], found: list[Find], least: np.ndarray, limits: Selection
 ) -> list[Find]:
     """Drop what gains less than `least` (F,) beside the others: the later ones made it idle."""
     while len(found) > 1:
@@ -312,9 +319,7 @@ def _backward(
     return found
 
 
-def _alone(
-    system: System, moments: Sequence[np.ndarray], found: Sequence[Find], place: int, limits: Selection
-) -> float:
+def _alone(system: System, moments: Sequence[Moments], found: Sequence[Find], place: int, limits: Selection) -> float:
     rest = _columns([one for k, one in enumerate(found) if k != place])
     one = found[place]
     trial = attempt(system, moments, rest, [[one.variant]])

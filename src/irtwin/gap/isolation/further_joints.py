@@ -16,8 +16,9 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.isolation.cause import Cause, gains, judged, rows
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.repeating import repeating
-from irtwin.gap.regression.cross_validation import Trial, attempt, scores
+from irtwin.gap.regression.cross_validation import Projected, Trial, attempt, scores
 from irtwin.gap.regression.hypotheses import MISSING, Hypothesis, Variant
+from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.significance import FINE, likeness, p_values
 from irtwin.gap.regression.transient import is_transient
@@ -96,7 +97,7 @@ class _Judge:
                 shown.append(_Shown(one, variant, p))
         return shown
 
-    def _p(self, one: Hypothesis, variant: Variant, said: tuple[np.ndarray, np.ndarray]) -> float:
+    def _p(self, one: Hypothesis, variant: Variant, said: tuple[np.ndarray, Projected]) -> float:
         system = self.finding.system
         memory = float(self.memories[one.effect][system.equations(variant.columns)].max())
         alike = likeness(system.blocks, memory)
@@ -136,7 +137,7 @@ def _below_lowest(finding: Finding) -> dict[str, list[int]]:
     """Return, by joint, the twin's coefficients that a fit without bounds puts below their lowest values."""
     system = finding.system
     noise = system.residual_rms(finding.chosen, finding.attribution.noise)
-    values = twin_values(system, system.solution(finding.chosen, np.sum(system.moments(noise), axis=0)))
+    values = twin_values(system, system.solution(finding.chosen, summed(system.moments(noise))))
     found: dict[str, list[int]] = {}
     for k, (_, term) in enumerate(system.terms):
         if term.joint is not None and values[k] < term.lowest:

@@ -11,6 +11,7 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.regression.channel_equations import Torque, power_system
+from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.signals.motion import Motion
 
@@ -58,7 +59,7 @@ def _squares(case: Case, stack: Stack, torque: Torque) -> np.ndarray:
     system = power_system(stack, case.with_power, case.grouping, nuisance, torque, nothing)
     chosen = range(system.base, system.base + len(system.columns))
     moments = system.moments(noise_before(system))
-    total = np.sum(moments, axis=0)
+    total = summed(moments)
     groups = np.flatnonzero(system.group_observed)
     squares = [system.squares(system.solution(chosen, total - moments[g]), int(g)).sum() for g in groups]
     return np.asarray(np.maximum(squares, np.finfo(float).tiny))

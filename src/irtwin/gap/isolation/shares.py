@@ -10,6 +10,7 @@ from math import factorial
 import numpy as np
 
 from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before
 
 _EXACT = 8  # causes: 256 subsets
@@ -25,7 +26,7 @@ def closed_squares(system: System, found: Attribution, seed: int) -> np.ndarray:
     players = [cause.columns for cause in found.causes]
     judged = np.flatnonzero(system.group_observed)
     weighed = {True: system.moments(found.noise), False: system.moments(noise_before(system))}
-    totals = {some: np.sum(moments, axis=0) for some, moments in weighed.items()}
+    totals = {some: summed(moments) for some, moments in weighed.items()}
 
     @cache
     def left(members: frozenset[int]) -> np.ndarray:

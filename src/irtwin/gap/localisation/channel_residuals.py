@@ -17,6 +17,7 @@ from irtwin.gap.localisation.locations import Location, locate, standing_out
 from irtwin.gap.localisation.operating_variable import curve, followed
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.hypotheses import CHANGED
+from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
 from irtwin.gap.thresholds import Places
@@ -190,10 +191,10 @@ def fitted_values(finding: Finding, *, reference: bool) -> Values:
     system = finding.system
     moments = system.moments(finding.rmse)
     if not reference:
-        whole = twin_values(system, system.solution((), np.sum(moments, axis=0)))
+        whole = twin_values(system, system.solution((), summed(moments)))
         return lambda run: whole
     groups = np.flatnonzero(~system.group_observed)
-    total = np.sum([moments[group] for group in groups], axis=0)
+    total = summed([moments[group] for group in groups])
     whole = twin_values(system, system.solution((), total))
     own: dict[str, np.ndarray] = {}
     for group in groups if len(groups) > 1 else ():

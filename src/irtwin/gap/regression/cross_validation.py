@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Variant, bounds
+from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
 
+_PANEL = 256  # rows of a product of matrices, at least
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
 
 
@@ -45,7 +46,7 @@ class _Batch:
 
 
 def attempt(
-    system: System, moments: Sequence[np.ndarray], chosen: Sequence[int], candidates: Sequence[Sequence[Variant]]
+    system: System, moments: Sequence[Moments], chosen: Sequence[int], candidates: Sequence[Sequence[Variant]]
 ) -> Trial:
     """Try hypotheses, each a list of variants, beside the twin's terms and the `chosen` columns.
 
@@ -55,60 +56,65 @@ def attempt(
     variants = [variant for group in candidates for variant in group]
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
     batches = _batches(system, variants)
-    total = reduce(np.add, moments)
-    whole, _ = _project(system, total, total, chosen)
+    total = summed(moments)
+    asked = _asked(total, [k for variant in variants for k in variant.columns])
+    whole, _ = _project(system, total, None, chosen, asked)
     objective, _, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss, said = np.empty((2, len(candidates), len(moments)))
     for group, part in enumerate(moments):
-        train, test = _project(system, total - part, part, chosen)
-        start[group] = test.squares
-        inner, left_out, added, _ = _fit(train, test, batches, len(variants))
+        train, test = _project(system, total, part, chosen, asked)
+        start[group] = test.squares([total.size - 1])[0]
+        inner, left_out, adds, _ = _fit(train, test, batches, len(variants))
         for place, variant in enumerate(variants):
             if is_transient(variant.effect):
                 left_out[place] = _left(test, variant.columns, values[place])
         best = _best(inner, owner, len(candidates))
-        loss[:, group], said[:, group] = left_out[best], added[best]
+        loss[:, group], said[:, group] = left_out[best], adds[best]
     best = _best(objective, owner, len(candidates))
-    diagonal = whole.diagonal
+    columns = [k for place in best for k in variants[place].columns]
+    ends = np.cumsum([len(variants[place].columns) for place in best])[:-1]
+    left, before = (np.split(each.squares(columns), ends) for each in (whole, total))
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
-    visible = np.array([diagonal[list(variants[k].columns)].sum() / rows for k in best])
-    before = np.diag(total)
-    share = np.array([_ratio(diagonal[list(variants[k].columns)], before[list(variants[k].columns)]) for k in best])
+    visible = np.array([own.sum() / rows for own in left])
+    share = np.array([_ratio(own, every) for own, every in zip(left, before, strict=True)])
     return Trial(start, loss, said, best, tuple(values[k] for k in best), visible, share)
 
 
 def scores(
-    system: System, moments: Sequence[np.ndarray], noise: np.ndarray, chosen: Sequence[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return each block's score of each column (B, D), and the products of projected columns (D + 1, D + 1).
+    system: System, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]
+) -> tuple[np.ndarray, Projected]:
+    """Return each block's score of each column (B, D), and the products of what the fit leaves of columns.
 
     A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
     """
-    total = reduce(np.add, moments)
-    inside, weights = _weights(system, total, chosen)
-    rest = np.zeros(len(total))
+    total = summed(moments)
+    inside = _inside(system, chosen)
+    products = total.of(inside)
+    weights = _weights(system, inside, products[:, inside], products)
+    rest = np.zeros(total.size)
     rest[-1] = 1.0
     rest[inside] = -weights[:, -1]
-    found = np.empty((len(system.blocks), len(total) - 1))
+    found = np.empty((len(system.blocks), total.size - 1))
     for block in range(len(system.blocks)):
-        vector = np.zeros(len(total))
+        vector = np.zeros(total.size)
         for equation, level in enumerate(noise):
-            left, products = system.scored(block, equation, rest)
+            left, own = system.scored(block, equation, rest)
             loud = np.sqrt(left @ left / max(system.blocks[block].rows[equation], 1)) / level
-            vector += products / level**2 / max(float(loud), _QUIET)
+            vector += own / level**2 / max(float(loud), _QUIET)
         found[block] = (vector - weights.T @ vector[inside])[:-1]
-    return found, total - total[inside].T @ weights
+    return found, Projected.by(total, np.arange(total.size), products, weights)
 
 
 def canonical_correlation(
-    system: System, total: np.ndarray, chosen: Sequence[int], sets: Sequence[Sequence[int]]
+    system: System, total: Moments, chosen: Sequence[int], sets: Sequence[Sequence[int]]
 ) -> np.ndarray:
     """Return the largest canonical correlation of each set of columns with the first set, (S,), after the refit.
 
-    total: (D + 1, D + 1) products of columns. What the prior holds near zero anyway correlates with nothing.
+    What the prior holds near zero anyway correlates with nothing.
     """
-    whole, _ = _project(system, total, total, chosen)
+    asked = _asked(total, [k for columns in sets for k in columns])
+    whole, _ = _project(system, total, None, chosen, asked)
     first = len(sets[0])
     found = []
     for columns in sets:
@@ -125,9 +131,9 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> float:
     return float(part.sum() / whole.sum()) if whole.sum() > 0 else 0.0
 
 
-def _left(test: _Products, columns: Sequence[int], values: np.ndarray) -> float:
+def _left(test: Projected, columns: Sequence[int], values: np.ndarray) -> float:
     """Return the squares left on test by known coefficients of some columns."""
-    both = np.array([[*columns, len(test.whole) - 1]])
+    both = np.array([[*columns, test.whole.size - 1]])
     return float(_squares(test.of(both), values[None])[0])
 
 
@@ -144,70 +150,104 @@ def _batches(system: System, variants: Sequence[Variant]) -> list[_Batch]:
     return batches
 
 
-def _weights(system: System, total: np.ndarray, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the fitted columns' indices, and their weights in the fit of every column and of the measurement."""
-    inside = np.append(np.arange(system.base), np.array(chosen, dtype=int))
-    return inside, solved(factored(total[np.ix_(inside, inside)], system.prior(chosen)), total[inside])
+def _inside(system: System, chosen: Sequence[int]) -> np.ndarray:
+    """Return the indices of the columns that are fitted."""
+    return np.append(np.arange(system.base), np.array(chosen, dtype=int))
+
+
+def _asked(total: Moments, columns: Sequence[int]) -> np.ndarray:
+    """Return the columns that are asked for and the measurement, in order.
+
+    A few are made more by repeating the last: BLAS rounds products of few rows in a way of its own, and what comes out
+    should not depend on what else is asked.
+    """
+    asked = np.unique([*columns, total.size - 1])
+    return np.pad(asked, (0, max(0, _PANEL - len(asked))), mode="edge")
+
+
+def _weights(system: System, inside: np.ndarray, among: np.ndarray, products: np.ndarray) -> np.ndarray:
+    """Return the weights (c, a) of the columns `inside` in the fit of others, by their products (c, c) and (c, a)."""
+    return solved(factored(among, system.prior(inside[system.base :])), products)
 
 
 @dataclass(frozen=True)
-class _Products:
-    """Products of what a fit leaves of each column, worked out for the columns that are asked for.
+class Projected:
+    """Products of what a fit leaves of the columns that are `asked` (a,), worked out where they are needed.
 
-    `whole` (D + 1, D + 1): products of the columns as they are; of each pair (D + 1, K) the product is taken off.
+    `whole`: products of the columns as they are; of each pair (a, c) the product is taken off.
     """
 
-    whole: np.ndarray
+    whole: Moments
+    asked: np.ndarray
     pairs: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    @classmethod
+    def by(cls, whole: Moments, asked: np.ndarray, products: np.ndarray, weights: np.ndarray) -> Projected:
+        """Take the products (c, a) of the columns that are fitted, and their weights in the fit to these."""
+        return cls(whole, asked, ((np.ascontiguousarray(products.T), np.ascontiguousarray(weights.T)),))
 
     def of(self, columns: np.ndarray) -> np.ndarray:
         """Return the products among each row of columns: (V, k) -> (V, k, k)."""
-        found: np.ndarray = self.whole[columns[:, :, None], columns[:, None, :]]
+        found = self.whole.blocks(columns)
+        places = np.searchsorted(self.asked, columns)
         for left, right in self.pairs:
-            found = found - left[columns] @ right[columns].swapaxes(1, 2)
+            found = found - left[places] @ right[places].swapaxes(1, 2)
         return found
 
-    @property
-    def squares(self) -> float:
-        """Those of the measurement."""
-        return float(self.of(np.array([[len(self.whole) - 1]]))[0, 0, 0])
+    def each(self, sets: Sequence[tuple[int, ...]]) -> dict[tuple[int, ...], np.ndarray]:
+        """Return the products among the columns of each set, (k, k)."""
+        found: dict[tuple[int, ...], np.ndarray] = {}
+        for size in {len(columns) for columns in sets}:
+            own = [columns for columns in sets if len(columns) == size]
+            found |= dict(zip(own, self.of(np.array(own)), strict=True))
+        return found
 
-    @property
-    def diagonal(self) -> np.ndarray:
-        """(D,) those of each column."""
-        return self.of(np.arange(len(self.whole) - 1)[:, None])[:, 0, 0]
+    def squares(self, columns: Sequence[int]) -> np.ndarray:
+        """Return the squares (k,) of some columns."""
+        return self.of(np.array(columns)[:, None])[:, 0, 0]
 
 
-def _project(system: System, train: np.ndarray, test: np.ndarray, chosen: Sequence[int]) -> tuple[_Products, _Products]:
-    """Return the products of what a fit on `train` leaves of each column: on train, and on test."""
-    inside, weights = _weights(system, train, chosen)
-    own = np.ascontiguousarray(weights.T)
-    seen = np.ascontiguousarray(test[inside].T)
-    fitted = seen - own @ test[np.ix_(inside, inside)]
-    return (
-        _Products(train, ((np.ascontiguousarray(train[inside].T), own),)),
-        _Products(test, ((own, fitted), (seen, own))),
-    )
+def _project(
+    system: System, total: Moments, left_out: Moments | None, chosen: Sequence[int], asked: np.ndarray
+) -> tuple[Projected, Projected]:
+    """Return the products of what a fit leaves of the columns `asked`: where it was fitted, and in the groups left out.
+
+    Without any left out, both are of all groups.
+    """
+    inside = _inside(system, chosen)
+    every = np.append(inside, asked)
+    products = total.among(inside, every)
+    seen = None if left_out is None else left_out.among(inside, every)
+    if seen is not None:
+        products = products - seen
+    among, beside = products[:, : len(inside)], products[:, len(inside) :]
+    fitted_to = total if left_out is None else total - left_out
+    train = Projected.by(fitted_to, asked, beside, _weights(system, inside, among, beside))
+    if left_out is None or seen is None:
+        return train, train
+    own, across = train.pairs[0][1], np.ascontiguousarray(seen[:, len(inside) :].T)
+    fitted = across - own @ seen[:, : len(inside)]
+    return train, Projected(left_out, asked, ((own, fitted), (across, own)))
 
 
 def _fit(
-    train: _Products, test: _Products, batches: Sequence[_Batch], count: int
+    train: Projected, test: Projected, batches: Sequence[_Batch], count: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
     """Fit each variant on train; return the objective there, the squares left and added on test, the coefficients."""
-    objective, left_out, added = np.empty((3, count))
+    objective, left_out, adds = np.empty((3, count))
     values: list[np.ndarray] = [np.zeros(0)] * count
     for batch in batches:
-        target = np.full((len(batch.columns), 1), len(train.whole) - 1)
+        target = np.full((len(batch.columns), 1), train.whole.size - 1)
         both = np.concatenate([batch.columns, target], axis=1)
         on_train, on_test = train.of(both), test.of(both)
         normal, right = on_train[:, :-1, :-1], on_train[:, :-1, -1]
         solved = _bounded(normal + np.eye(normal.shape[1]), right, batch.lowest)
         objective[batch.place] = _squares(on_train, solved) + (solved**2).sum(axis=1)
         left_out[batch.place] = _squares(on_test, solved)
-        added[batch.place] = np.einsum("vi,vij,vj->v", solved, on_test[:, :-1, :-1], solved)
+        adds[batch.place] = np.einsum("vi,vij,vj->v", solved, on_test[:, :-1, :-1], solved)
         for place, value in zip(batch.place, solved, strict=True):
             values[place] = value
-    return objective, left_out, added, values
+    return objective, left_out, adds, values
 
 
 def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student_t
 
+from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System
 
 _RESAMPLED = 1000
@@ -83,6 +84,6 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
     return [float(value) for value in np.quantile(drawn, [0.025, 0.975])]
 
 
-def _left_out(system: System, moments: Sequence[np.ndarray], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
-    total = np.sum(moments, axis=0)
+def _left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
+    total = summed(moments)
     return np.array([system.squares(system.solution(chosen, total - moments[group]), int(group)) for group in judged])

@@ -16,11 +16,13 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Column
+from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, numbers
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
-_MOST_BYTES = 750_000_000  # of all groups' products; with what is worked out of them, 1.5 GB
+_MOST_BYTES = 3_000_000_000  # of blocks, of all groups' products, and of what is worked out of them:
+_AT_WORK = 6  # products of the twin's columns with all, held at once
 _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
 
 
@@ -90,10 +92,7 @@ class System:
     def quietest(self) -> np.ndarray:
         """(g,) the least noise that an equation is taken to have: exact or dead signals have finite weights, too."""
         return np.array(
-            [
-                least_noise(np.sum([np.diag(products)[:-1].max(initial=0.0) for _, products in own]))
-                for own in zip(*self._products, strict=True)
-            ]
+            [least_noise(np.sum([products.largest for products in own])) for own in zip(*self._products, strict=True)]
         )
 
     @cached_property
@@ -167,86 +166,68 @@ class System:
         return left, found
 
     @cached_property
-    def _products(self) -> list[list[tuple[np.ndarray, np.ndarray]]]:
-        """Per group and equation: the indices of its columns, the measurement's (D) last, and their products."""
+    def _products(self) -> list[list[Products]]:
+        """Per group and equation."""
         self._fits_in_memory()
-        found = []
-        for group in range(self.groups):
-            blocks = np.flatnonzero(self.group == group)
-            own = []
-            for equation in range(len(self.pattern)):
-                own.append(self._spread(*self._products_of(blocks, equation)))
-            found.append(own)
-        return found
+        return [
+            [self._products_of(np.flatnonzero(self.group == group), equation) for equation in range(len(self.pattern))]
+            for group in range(self.groups)
+        ]
 
-    def _products_of(self, blocks: np.ndarray, equation: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the indices of an equation's columns, the measurement last, and their products over a group's blocks.
-
-        Of columns that stand there twice the products are worked out once.
-        """
+    def _products_of(self, blocks: np.ndarray, equation: int) -> Products:
+        """Return an equation's products over a group's blocks."""
+        places = self._places[bool(self.observed[blocks[0]])][equation]
         used = np.flatnonzero(self.pattern[equation])
-        own, places = used[used < self.base], np.arange(len(used))
+        own = used[used < self.base]
         stacked = np.concatenate([self.blocks[block].factors[equation] for block in blocks])
         stacked[:, -1] -= stacked[:, : len(own)] @ self.expected[own]
-        if self.both and self.observed[blocks[0]]:
-            places = np.append(places, places[len(own) :])
-            used = np.append(used, used[len(own) :] + len(self.columns))
-        places, scale = np.append(places, -1), np.append(self.scale[used], 1.0)
-        products = (stacked.T @ stacked)[np.ix_(places, places)]
-        products *= scale[:, None] * scale
-        return np.append(used, self._size), products
+        return Products.of(places, stacked, np.append(self.scale[used], 1.0))
+
+    @cached_property
+    def _places(self) -> tuple[list[Places], list[Places]]:
+        """Of each equation, in runs that are not observed and in observed ones."""
+        alone, twice = [], []
+        for row in self.pattern:
+            used = np.flatnonzero(row)
+            own, held = int((used < self.base).sum()), np.arange(len(used) + 1)
+            alone.append(Places(np.append(used, self._size), held, self._size + 1))
+            every = np.concatenate([used, used[own:] + len(self.columns), [self._size]])
+            twice.append(Places(every, np.concatenate([held[:-1], held[own:]]), self._size + 1))
+        return alone, twice if self.both else alone
 
     def _fits_in_memory(self) -> None:
-        """Refuse what would take too much, before any is taken."""
-        size = 8 * self.groups * (self._size + 1) ** 2
-        if size > _MOST_BYTES:
+        """Refuse what would take too much, before more is taken."""
+        held = sum(factor.size for block in self.blocks for factor in block.factors)
+        for group in range(self.groups):
+            blocks = [self.blocks[k] for k in np.flatnonzero(self.group == group)]
+            for own in zip(*(block.factors for block in blocks), strict=True):
+                held += numbers(sum(map(len, own)), own[0].shape[1])
+        taken = 8 * (held + _AT_WORK * self.base * self._size)
+        if taken > _MOST_BYTES:
             raise InputError(
-                f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {2 * size / 1e9:.1f} GB "
-                f"of memory, and {2 * _MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
+                f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {taken / 1e9:.1f} GB of "
+                f"memory, and {_MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
             )
 
-    def _spread(self, places: np.ndarray, products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the products with zeros for what an equation lacks, if it has most columns: these add up faster."""
-        if 2 * len(places) < self._size:
-            return places, products
-        found = np.zeros((self._size + 1, self._size + 1))
-        found[np.ix_(places, places)] = products
-        return np.arange(self._size + 1), found
-
-    def moments(self, noise: np.ndarray) -> list[np.ndarray]:
-        """Return each group's (D + 1, D + 1) products of columns, equations weighted by their `noise` (g,).
+    def moments(self, noise: np.ndarray) -> list[Moments]:
+        """Return each group's products of columns, (D + 1, D + 1), equations weighted by their `noise` (g,).
 
         Raises InputError where they would take too much memory.
         """
-        return [self._weighted(group, noise) for group in range(self.groups)]
-
-    def _weighted(self, group: int, noise: np.ndarray) -> np.ndarray:
         weights = np.maximum(noise, self.quietest) ** -2.0
-        every = [len(places) > self._size for places, _ in self._products[group]]
-        total = np.zeros((self._size + 1, self._size + 1))
-        for nth, k in enumerate(np.flatnonzero(every)):
-            _, products = self._products[group][k]
-            if nth == 0:
-                np.multiply(products, weights[k], out=total)
-            else:
-                total += products * weights[k]
-        for k in np.flatnonzero(~np.array(every)):
-            places, products = self._products[group][k]
-            total[np.ix_(places, places)] += products * weights[k]
-        return total
+        return [GroupMoments(products, weights) for products in self._products]
 
     def _weighted_among(
         self, inside: np.ndarray, groups: Sequence[int] | np.ndarray, noise: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the products among `inside` columns (k, k), and with the measurement (k,), over some groups."""
-        position = np.full(self._size + 1, -1)
-        position[[*inside, self._size]] = np.arange(len(inside) + 1)
-        total = np.zeros((len(inside) + 1, len(inside) + 1))
+        every = np.append(inside, self._size)
+        total = np.zeros((len(every), len(every)))
         for group in groups:
-            for (places, products), level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
-                here = np.flatnonzero(position[places] >= 0)
-                there = position[places[here]]
-                total[np.ix_(there, there)] += products[np.ix_(here, here)] / float(level) ** 2
+            for products, level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
+                held = products.places.at[every]
+                there = np.flatnonzero(held >= 0)
+                total[np.ix_(there, there)] += products.among(held[there], held[there]) / float(level) ** 2
         return total[:-1, :-1], total[:-1, -1]
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
@@ -271,10 +252,11 @@ class System:
         squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
         return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
-    def solution(self, chosen: Sequence[int], total: np.ndarray) -> np.ndarray:
+    def solution(self, chosen: Sequence[int], total: Moments) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
         inside = self._inside(chosen)
-        return self._solved(inside, total[np.ix_(inside, inside)], total[inside, -1])
+        products = total.among(inside, np.append(inside, self._size))
+        return self._solved(inside, products[:, :-1], products[:, -1])
 
     def _inside(self, chosen: Sequence[int]) -> np.ndarray:
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))
@@ -287,8 +269,7 @@ class System:
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
         """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
         weights = np.append(-vector, 1.0)
-        left = [float(weights[places] @ products @ weights[places]) for places, products in self._products[group]]
-        return np.maximum(left, 0.0)
+        return np.maximum([products.squares(weights) for products in self._products[group]], 0.0)
 
 
 def _change(term: Term) -> Term:

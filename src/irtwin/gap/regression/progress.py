@@ -14,19 +14,29 @@ Tell = Callable[[str], None]
 _EVERY = 5.0  # s between two lines: short work says none
 
 
+def paced(tell: Tell | None) -> Tell:
+    """Return what tells a line only where the last was some seconds ago: it may be given one at each step."""
+    said = time.monotonic()
+
+    def told(line: str) -> None:
+        nonlocal said
+        if tell is not None and time.monotonic() - said >= _EVERY and not in_copy():
+            said = time.monotonic()
+            tell(line)
+
+    return told
+
+
 def with_progress(equations: Equations, motions: Sequence[Motion], tell: Tell | None) -> Equations:
     """Return the equations, with a line every few seconds of how much of the motions they have been asked for."""
     if tell is None:
         return equations
     place = {motion.run: number for number, motion in enumerate(motions, start=1)}
-    said = time.monotonic()
+    told = paced(tell)
 
     def asked(motion: Motion) -> Rows:
-        nonlocal said
-        if time.monotonic() - said >= _EVERY and not in_copy():
-            said = time.monotonic()
-            share = 100 * motion.start // len((motion.whole or motion).time)
-            tell(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")
+        share = 100 * motion.start // len((motion.whole or motion).time)
+        told(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")
         return equations(motion)
 
     return asked

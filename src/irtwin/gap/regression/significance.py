@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irtwin.gap.regression.cross_validation import Projected
 from irtwin.gap.regression.hypotheses import Hypothesis
 from irtwin.identification.accumulate import Block
 
@@ -16,7 +17,7 @@ FINE = 3999
 
 def p_values(
     scores: np.ndarray,
-    products: np.ndarray,
+    products: Projected,
     hypotheses: Sequence[Hypothesis],
     seed: int,
     likeness: np.ndarray | None = None,
@@ -24,7 +25,7 @@ def p_values(
 ) -> np.ndarray:
     """Return each hypothesis' p-value, adjusted for the whole catalogue (H,).
 
-    scores: (B, D) each block's score of each column; products: (D + 1, D + 1) of the projected columns. Where an effect
+    scores: (B, D) each block's score of each column; `products` of the projected columns. Where an effect
     is absent a block's score is as likely positive as negative; the largest score statistic over all hypotheses and
     shapes, each in units of its own spread under random signs, says what chance reaches (Westfall and Young's max-T).
     With a `likeness` (B, B), the correlation of blocks near each other, signs become normal numbers that are as alike
@@ -37,7 +38,8 @@ def p_values(
         signs = generator.standard_normal((flips + 1, len(scores))) @ np.linalg.cholesky(likeness).T
     signs[0] = 1.0
     sums = signs @ scores
-    statistics = np.stack([_statistic(sums, products, hypothesis) for hypothesis in hypotheses], axis=1)
+    among = products.each([variant.columns for hypothesis in hypotheses for variant in hypothesis.variants])
+    statistics = np.stack([_statistic(sums, among, hypothesis) for hypothesis in hypotheses], axis=1)
     normal = np.cbrt(statistics)  # chi-square of any order is then nearly normal (Wilson and Hilferty)
     alike = (normal - normal[1:].mean(axis=0)) / np.maximum(normal[1:].std(axis=0), 1e-12)
     largest = alike.max(axis=1)
@@ -56,11 +58,10 @@ def likeness(blocks: Sequence[Block], memory: float) -> np.ndarray:
     return np.asarray(np.where(same, np.exp(-apart), 0.0) + 1e-9 * np.eye(len(blocks)))
 
 
-def _statistic(sums: np.ndarray, products: np.ndarray, hypothesis: Hypothesis) -> np.ndarray:
+def _statistic(sums: np.ndarray, among: dict[tuple[int, ...], np.ndarray], hypothesis: Hypothesis) -> np.ndarray:
     best = np.zeros(len(sums))
     for variant in hypothesis.variants:
-        columns = list(variant.columns)
-        normal = products[np.ix_(columns, columns)] + np.eye(len(columns))
-        own = sums[:, columns]
-        best = np.maximum(best, np.einsum("fi,fi->f", own, np.linalg.solve(normal, own.T).T) / len(columns))
+        normal = among[variant.columns] + np.eye(len(variant.columns))
+        own = sums[:, variant.columns]
+        best = np.maximum(best, np.einsum("fi,fi->f", own, np.linalg.solve(normal, own.T).T) / len(normal))
     return best

@@ -76,10 +76,15 @@ def beside(robot: Robot, system: System, noise: np.ndarray, payload: Payload) ->
 
 @dataclass(frozen=True)
 class _Parts:
-    """Each run's products per joint, (R, n, D, D), of [twin's columns | payload | measured], and its group (R,)."""
+    """Each run's products (R, D, D) of [twin's columns | payload | measured], and its group (R,).
+
+    of_joints: the products (R, n) of each joint among the columns that act on it, `acting` (n,): most do not.
+    """
 
     runs: tuple[str, ...]
     products: np.ndarray
+    of_joints: list[list[np.ndarray]]
+    acting: list[np.ndarray]
     rows: np.ndarray
     group: np.ndarray
     observed: np.ndarray
@@ -99,7 +104,8 @@ class _Parts:
         base, size = system.base, system.base + onto.shape[1] + 1
         full = np.zeros((base + 1, size))
         full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
-        products = np.zeros((len(runs), len(noise), size, size))
+        acting = [_acting(full, row[:base]) for row in system.pattern]
+        of_joints = [[np.zeros((len(own), len(own))) for own in acting] for _ in runs]
         rows = np.zeros(len(runs))
         for number, block in enumerate(system.blocks):
             run = runs.index(block.run)
@@ -108,8 +114,22 @@ class _Parts:
                 factor, used = system.factor(number, joint)
                 inside = used < base
                 mapped = factor[:, np.append(inside, True)] @ full[np.append(used[inside], base)] / level
-                products[run, joint] += mapped.T @ mapped
-        return cls(runs, products, rows, np.array([one.pop() for one in groups]), observed, base, system.prior())
+                of_joints[run][joint] += (mapped.T @ mapped)[np.ix_(acting[joint], acting[joint])]
+        products = np.zeros((len(runs), size, size))
+        for total, each in zip(products, of_joints, strict=True):
+            for places, own in zip(acting, each, strict=True):
+                total[np.ix_(places, places)] += own
+        return cls(
+            runs,
+            products,
+            of_joints,
+            acting,
+            rows,
+            np.array([one.pop() for one in groups]),
+            observed,
+            base,
+            system.prior(),
+        )
 
     def carrying(self, inside: np.ndarray) -> np.ndarray:
         """Return (R,) which runs carry the payload, as runs `inside` tell; the heavier where either part could.
@@ -141,7 +161,7 @@ class _Parts:
             own = np.flatnonzero(self.group == group)
             with_load = self.carrying(rest)
             if not with_load[rest].any():
-                found.append(np.zeros(self.products.shape[1]))
+                found.append(np.zeros(len(self.acting)))
                 continue
             fold = _Fold(self, rest)
             plain, loaded = fold.values(np.zeros(len(self.runs), dtype=bool)), fold.values(with_load)
@@ -156,7 +176,18 @@ class _Parts:
     def _losses(self, runs: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return the squares (r, n) that coefficients leave of runs and joints."""
         vector = np.append(-values, 1.0)
-        return np.asarray(np.einsum("rjab,a,b->rj", self.products[runs], vector, vector))
+        weights = [vector[places] for places in self.acting]
+        return np.array(
+            [
+                [np.einsum("ab,a,b->", own, each, each) for own, each in zip(self.of_joints[run], weights, strict=True)]
+                for run in runs
+            ]
+        )
+
+
+def _acting(full: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return which columns act on a joint: `full` (K + 1, D) makes them of the twin's, `own` (K,), and the measured."""
+    return np.flatnonzero(full[np.append(own, True)].any(axis=0))
 
 
 class _Fold:
@@ -165,7 +196,7 @@ class _Fold:
     def __init__(self, parts: _Parts, inside: np.ndarray):
         """Take the runs to fit to."""
         base = parts.base
-        products = parts.products.sum(axis=1)
+        products = parts.products
         total = products[inside].sum(axis=0)
         factor = factored(total[:base, :base], parts.prior)
         used = np.isin(np.arange(len(products)), inside)[:, None, None]

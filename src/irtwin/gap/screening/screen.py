@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.local import LocalEffect
@@ -15,6 +13,7 @@ from irtwin.effects.stack import Stack
 from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.hypotheses import Variant
+from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.gap.regression.transient import Transient, is_transient
 from irtwin.gap.screening.contact import contact
@@ -57,7 +56,7 @@ class Screened:
 def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
     """Search the runs' torque; system: its equations, with the terms of the twin at least."""
     noise, limits = noise_before(system), case.thresholds
-    values = twin_values(system, system.solution((), np.sum(system.moments(noise), axis=0)))
+    values = twin_values(system, system.solution((), summed(system.moments(noise))))
     left = remainders(case, stack, values)
     in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
