@@ -28,7 +28,8 @@ nightly: $(VENV)/test
 compiled: $(VENV)/test
 	-$(BIN)/python -m pytest --collect-only -q >/dev/null
 
-# Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
+# Odd robots, spoilt logs, hostile archives, workspaces, streams and peers through every command, for FUZZ_SECONDS (600);
+# what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test
 	$(BIN)/python -m tests.fuzz.fuzz
 
