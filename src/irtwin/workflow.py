@@ -242,15 +242,20 @@ def rewriting(place: Workspace, url: str | None) -> Iterator[KnowledgeGraph]:
     Who reads the folder meanwhile sees what was there before, if anything was; who wants to rewrite it too waits.
     Raises InputError for a fault in what extends the workspace, before anything is written, or after too long a wait.
     """
-    check_extensions(place.resources)
-    check_mappings(place.resources, place.engine)
-    series_place.check(place.folder)
+    check_before(place)
     with ExitStack() as held:
         held.enter_context(rewriting_alone(place.engine, place.folder))
         graph = held.enter_context(KnowledgeGraph.of_workspace(place, url))
         if url is None and graph.graphs():
             held.enter_context(kept(place.graph_folder))
         yield graph
+
+
+def check_before(place: Workspace) -> None:
+    """Raise InputError for a fault in what extends a workspace, or where its series cannot be kept."""
+    check_extensions(place.resources)
+    check_mappings(place.resources, place.engine)
+    series_place.check(place.folder)
 
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
