@@ -20,7 +20,7 @@ from tests.fuzz.commands import try_case
 from tests.fuzz.fault import Fault
 
 KEPT = Path(__file__).parent / "kept"
-_ROUND = 50  # draws by one seed, before it is looked which commands came seldom
+_ROUND = 20  # draws by one seed, before it is looked which commands came seldom
 
 
 class Session:
