@@ -44,7 +44,10 @@ def read_text(path: Path) -> Recording:
     text = _decoded(path, read_input(path, _LARGEST)).replace("\r\n", "\n").rstrip()
     lines = text.split("\n", 2 * LOOKED_AT)[: 2 * LOOKED_AT]
     kept = [number for number, line in enumerate(lines) if line.strip()][:LOOKED_AT]
-    form = _form(path, [lines[number] for number in kept])
+    try:
+        form = _form(path, [lines[number] for number in kept])
+    except csv.Error as error:  # a cell of more than 131,072 characters
+        raise InputError(f"{path}: is no log in columns ({error}); export it as CSV, one line a sample") from None
     before = kept[form.head.first]
     _check_names(path, form)
     names, units = form.head.names_in(form.rows), form.head.units_in(form.rows)
