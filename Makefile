@@ -12,7 +12,7 @@ demo: $(VENV)/demo
 
 # What to run before each commit, in a minute: everything but the tests that are marked slow or system.
 check: $(VENV)/test lint
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not slow and not system"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not slow and not system and not nightly"
 
 test: lint suite
 
@@ -28,7 +28,8 @@ nightly: $(VENV)/test
 compiled: $(VENV)/test
 	-$(BIN)/python -m pytest --collect-only -q >/dev/null
 
-# Odd robots and spoilt logs through every command, for FUZZ_SECONDS (600); what fails is kept in tests/fuzz/kept, as a test.
+# Odd robots, spoilt logs, hostile archives, workspaces, streams and peers through every command, for FUZZ_SECONDS (600);
+# what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test
 	$(BIN)/python -m tests.fuzz.fuzz
 

@@ -27,6 +27,7 @@ from irtwin.storage.journal import Header, Journal
 from irtwin.storage.schema import LIVE, Base
 from tests.data_sets import irtwin
 from tests.small_robots import data_set
+from tests.trusting import trust_all
 
 pytestmark = pytest.mark.slow
 
@@ -182,6 +183,17 @@ def test_repair_keeps_what_updates_wrote(workspace: Path, unreasoned: None) -> N
     ]  # fmt: skip
 
 
+def test_repair_looks_through_what_extends_a_workspace(workspace: Path) -> None:
+    shape = workspace / "shapes" / "mine.ttl"
+    shape.parent.mkdir()
+    shape.write_text(
+        "@prefix sh: <http://www.w3.org/ns/shacl#> . <urn:s> a sh:NodeShape ; sh:targetNode <urn:x> ; "
+        'sh:sparql [ sh:select "SELECT $this { SERVICE <http://h/> { $this ?a ?b } }" ] .'
+    )
+    trust_all(workspace)
+    assert f"{shape}, line 1: its SPARQL is none: column 16: SERVICE" in one_line(workspace, "repair")
+
+
 def test_repair_says_which_files_are_lost(workspace: Path, unreasoned: None) -> None:
     file = next((workspace / "series").iterdir())
     file.unlink()
@@ -242,5 +254,5 @@ def test_a_row_that_leads_outside_removes_nothing_there(workspace: Path, tmp_pat
         database.commit()
     said = irtwin("drop", "First", "--workspace", workspace)
     assert said.status == 2
-    assert "leads outside the workspace; nothing was read or written" in said.err
+    assert "a row of table robot was changed by another program: robot_id '../../mine'" in said.err
     assert (tmp_path / "mine.html").read_text() == (tmp_path / "mine.run.journal").read_text() == "mine"

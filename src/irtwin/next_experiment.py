@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from irtwin.gap.diagnosis import Diagnosis
 from irtwin.gap.document.document import Document
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.identification.excitation import excite
+from irtwin.json_text import parse_json
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.modelling import expect
@@ -116,7 +116,7 @@ def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
         found = session.scalars(of_robot).one_or_none()
     if found is None:
         return []
-    proposed = Document.from_json(json.loads(place.read_document(found.file, found.sha256))).next_experiment
+    proposed = Document.from_json(parse_json(place.read_document(found.file, found.sha256))).next_experiment
     if proposed is None:
         return []
     if proposed.programme is None or found.motion_file is None or found.motion_sha256 is None:

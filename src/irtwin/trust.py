@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from irtwin.errors import InputError
+from irtwin.json_text import parse_json
 from irtwin.storage.files import write
 
 _Given = dict[str, dict[str, object]]  # of each place: the folder's number there, and the names that are trusted
@@ -59,10 +60,10 @@ def _number(workspace: Path) -> int | None:
 def _read() -> _Given:
     file = _file()
     try:
-        given = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        given = parse_json(file.read_text(encoding="utf-8")) if file.exists() else {}
         if isinstance(given, dict) and all(isinstance(said, dict) and "names" in said for said in given.values()):
             return given
-    except (OSError, ValueError, RecursionError):
+    except (OSError, ValueError):
         pass
     raise InputError(f"{file}: cannot be read; remove it, and trust your workspaces again")
 

@@ -32,7 +32,7 @@ from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, Run
 from irtwin.storage.series import is_whole
 from irtwin.storage.series_place import asks as series_asks
 from irtwin.storage.series_place import check as check_series
-from irtwin.workflow import Announce, conclude, map_rows, populate_others, rewriting, write_report
+from irtwin.workflow import Announce, check_before, conclude, map_rows, populate_others, rewriting, write_report
 
 _DAMAGED = "graph.damaged"
 
@@ -165,6 +165,7 @@ def repair(
 
 def _rebuild(place: Workspace, announce: Announce) -> None:
     """Make the graph in a folder anew, and put it in place of the old one."""
+    check_before(place)  # as `rewriting` does
     with _nobody_else(place.graph_folder), files.working_folder(place.folder, ".repair-") as folder:
         place.mapped_rows.unlink(missing_ok=True)
         with KnowledgeGraph(folder / "graph", place.folder, place.resources, place.base) as graph:

@@ -259,9 +259,7 @@ def rewriting(place: Workspace, url: str | None, announce: Announce = lambda lin
     Where the block fails after a change, the graph says that it is behind.
     Raises InputError for a fault in what extends the workspace, before anything is written, or after too long a wait.
     """
-    check_extensions(place.resources)
-    check_mappings(place.resources, place.engine)
-    series_place.check(place.folder)
+    check_before(place)
     with ExitStack() as held:
         held.enter_context(rewriting_alone(place.engine, place.folder))
         graph = held.enter_context(KnowledgeGraph.of_workspace(place, url))
@@ -288,6 +286,13 @@ def _catch_up(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> No
         map_rows(place, graph)
         populate_others(place, graph, announce)
         conclude(graph, announce)
+
+
+def check_before(place: Workspace) -> None:
+    """Raise InputError for a fault in what extends a workspace, or where its series cannot be kept."""
+    check_extensions(place.resources)
+    check_mappings(place.resources, place.engine)
+    series_place.check(place.folder)
 
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:

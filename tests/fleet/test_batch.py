@@ -96,10 +96,11 @@ def test_a_data_set_of_which_processes_die_is_set_aside(tmp_path: Path, asked: l
     assert len(list(records.iterdir())) == 2
 
 
-def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str]) -> None:
+@pytest.mark.parametrize("text", ['{"state"', "[" * 100_000, '{"data_set": "x", "state": "done", "seconds": []}'])
+def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str], text: str) -> None:
     batch = _batch(tmp_path, "good")
     batch.work()
-    (batch.folder / "records" / f"{key(batch.places[0])}.json").write_text('{"state"')
+    (batch.folder / "records" / f"{key(batch.places[0])}.json").write_text(text)
     batch.work()
     assert _states(batch) == ["done"] and asked == ["good", "good"]
 
@@ -110,8 +111,9 @@ def test_a_storage_that_does_not_answer_fails_one_data_set(tmp_path: Path, asked
     assert _states(batch) == ["failed", "done"]
 
 
-def test_a_damaged_list_of_sets_says_what_to_do(tmp_path: Path) -> None:
-    (tmp_path / "sets.json").write_text("{")
+@pytest.mark.parametrize("text", ["{", "[" * 100_000, "[]", '{"data_sets": []}', '{"kind": "run", "data_sets": {}}'])
+def test_a_damaged_list_of_sets_says_what_to_do(tmp_path: Path, text: str) -> None:
+    (tmp_path / "sets.json").write_text(text)
     with pytest.raises(InputError, match=r"sets\.json: cannot be read .*; remove its folder"):
         _ = Batch(tmp_path).places
 

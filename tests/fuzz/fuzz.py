@@ -9,26 +9,38 @@ import hashlib
 import os
 import re
 import sys
+import tempfile
 import time
 from collections import Counter
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from tests.fuzz.case import Case, cases
-from tests.fuzz.commands import Fault, try_case
+from tests.fuzz.commands import try_case
+from tests.fuzz.fault import Fault
 
 KEPT = Path(__file__).parent / "kept"
-_ROUND = 200  # draws by one seed
+_ROUND = 20  # draws by one seed, before it is looked which commands came seldom
 
 
 class Session:
     """Draws until the time is over; `faults` counts each kind, `tried` each command."""
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self, seconds: float, sound: Path) -> None:
         self.faults: dict[str, int] = {}
         self.tried: Counter[str] = Counter()
         self.draws = 0
+        self._sound = sound
+        self._seen: set[Case] = set()  # a drawing repeats itself
         self._end = time.monotonic() + seconds
+
+    @property
+    def commands(self) -> Counter[str]:
+        """How often each command was tried, however it ended."""
+        count: Counter[str] = Counter()
+        for how, times in self.tried.items():
+            count[how.rpartition(": ")[0]] += times
+        return count
 
     @property
     def over(self) -> bool:
@@ -37,12 +49,11 @@ class Session:
 
     def take(self, case: Case) -> None:
         """Try a case, keep it where it shows a fault that none smaller shows."""
-        if self.over:
+        if self.over or case in self._seen:
             return
+        self._seen.add(case)
         self.draws += 1
-        if self.draws % _ROUND == 0:
-            print(f"draw {self.draws}, {sum(self.tried.values())} commands", flush=True)
-        fault = try_case(case, self.tried)
+        fault = try_case(case, self._sound, self.tried)
         if fault is None:
             return
         self.faults[fault.kind] = self.faults.get(fault.kind, 0) + 1
@@ -64,25 +75,35 @@ def main() -> None:
     """Run a session."""
     number = int(os.environ.get("FUZZ_SEED", time.time_ns() % 1_000_000))
     seconds = float(os.environ.get("FUZZ_SECONDS", "600"))
-    session, began = Session(seconds), time.monotonic()
-    print(f"FUZZ_SEED={number}", flush=True)
-    while not session.over:
-        drawn = settings(
-            max_examples=_ROUND,
-            deadline=None,
-            database=None,
-            phases=[Phase.generate],
-            suppress_health_check=[*HealthCheck],
-        )
-        drawn(seed(number)(given(cases())(session.take)))()
-        number += 1
-    minutes = (time.monotonic() - began) / 60
-    print(f"{session.draws} draws, {session.draws / minutes:.0f} a minute; {len(session.faults)} kinds of fault")
+    with tempfile.TemporaryDirectory(prefix="irtwin-sound-") as sound:
+        session, began = Session(seconds, Path(sound)), time.monotonic()
+        print(f"FUZZ_SEED={number}", flush=True)
+        while not session.over:
+            _draw(session, number)
+            number += 1
+            minutes = (time.monotonic() - began) / 60
+            print(
+                f"{session.draws} draws, {session.draws / minutes:.0f} a minute, "
+                f"{sum(session.tried.values())} commands; {len(session.faults)} kinds of fault",
+                flush=True,
+            )
     for how, count in sorted(session.tried.items()):
         print(f"{count:6d}  {how}")
     for kind, count in sorted(session.faults.items(), key=lambda entry: -entry[1]):
         print(f"{count:6d}  {kind}")
     sys.exit(bool(session.faults))
+
+
+def _draw(session: Session, number: int) -> None:
+    """Draw a round of cases by a seed."""
+    drawn = settings(
+        max_examples=_ROUND,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate],
+        suppress_health_check=[*HealthCheck],
+    )
+    drawn(seed(number)(given(cases(tried=session.commands))(session.take)))()
 
 
 if __name__ == "__main__":

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
-from hypothesis import strategies as st
 
 VALUES = (
     "9" * 5000,
@@ -27,12 +25,6 @@ VALUES = (
 VALUES += ("-1", "true", "{}", '""', "9" * 400, '"../../../etc/passwd"', "0x" + "f" * 300, "'''", "1e308", "5e-324")
 KEYS = ("payload_mass", "file", "role", "name", "urdf", "power_at", "started", "payload_com", "repeat_of", "weight")
 CELLS = ("nan", "inf", "", "x", "1e400", "9" * 5000, "-1e12", "\ufeff", "\x00", '"', "1,5", "1e9", "٣")
-
-
-def spoil(folder: Path, way: str, seed: int) -> None:
-    """Spoil the data set in one way; the seed says where. What is spoilt beyond reading stays as it is."""
-    with suppress(pa.ArrowException, UnicodeDecodeError, OverflowError, OSError):
-        WAYS[way](folder, np.random.default_rng(seed))
 
 
 def _file(folder: Path, rng: np.random.Generator) -> Path:
@@ -163,9 +155,3 @@ WAYS: dict[str, Callable[[Path, np.random.Generator], None]] = {
     "column": _column,
     "columns": _columns,
 }
-
-
-def spoils() -> st.SearchStrategy[tuple[tuple[str, int], ...]]:
-    """Draw none, one or two ways, each with its seed."""
-    one = st.tuples(st.sampled_from(sorted(WAYS)), st.integers(0, 9999))
-    return st.lists(one, max_size=2).map(tuple)

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
-from tests.fuzz.case import ALONE, Case, cases, read_case
-from tests.fuzz.commands import fault_of, in_child, try_case_apart
+from tests.fuzz.case import OF_DATA, Case, cases, read_case
+from tests.fuzz.child import in_child
+from tests.fuzz.commands import try_case_apart
+from tests.fuzz.fault import fault_of
 
 FEW = settings(max_examples=12, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck])
 
@@ -19,9 +21,9 @@ FEW = settings(max_examples=12, derandomize=True, phases=[Phase.generate], suppr
 @pytest.mark.slow
 @pytest.mark.nightly
 @FEW
-@given(cases())
-def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(case: Case):
-    fault = try_case_apart(replace(case, commands=ALONE))
+@given(cases(OF_DATA))
+def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(tmp_path: Path, case: Case):
+    fault = try_case_apart(replace(case, commands=("diagnose with page and twin", "predict")), tmp_path)
     assert fault is None, f"{fault.kind}\n{fault.said}\n{case.to_json()}"
 
 

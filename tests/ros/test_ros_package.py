@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import pinocchio
 import pytest
 from hypothesis import given, settings
-from tests import mesh_robots
+from tests import mesh_robots, synthetic
 from tests.fuzz.drawn_robots import RobotPlan, robots, urdf
 from tests.providers.test_robot_of_graph import BRANCHED
 from tests.ros.test_description import ODD
@@ -149,6 +149,11 @@ def test_a_branched_robot_has_a_group_of_all_joints(tmp_path: Path) -> None:
     joints = [joint.get("name") for joint in semantics.iterfind("group[@name='all_joints']/joint")]
     assert sorted(map(str, joints)) == ["a_right", "turn", "z_left"]
     assert {joint.get("name") for joint in semantics.iterfind("group_state/joint")} == {"turn", "a_right"}
+
+
+def test_a_joint_may_have_the_name_of_the_flange(tmp_path: Path) -> None:
+    write_package(synthetic.arm(3), tmp_path)  # whose last joint and link are both called flange
+    assert ' tip_link="flange"' in (tmp_path / "config" / "arm_3.srdf").read_text()
 
 
 def test_a_robot_with_odd_names_and_no_shapes_is_written_and_told(tmp_path: Path) -> None:

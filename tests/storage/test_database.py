@@ -14,6 +14,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Activity, ActivityUse, Base, Run, RunEnergy, RunState, Series, Twin
 
 WORK = f"{rows.ROBOT}.work"
+TWIN, OTHER = f"{rows.ROBOT}.t1", f"{rows.ROBOT}.t2"
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
@@ -40,10 +41,16 @@ def populate(workspace: Workspace) -> None:
     workspace.ingest(*rows.data_set())
     workspace.replace_activity(rows.activity("state.1", "run_state", "run"), ["series"], rows.run_state())
     workspace.replace_activity(
-        rows.activity("twin.1", "identification"), ["runs"], rows.twin("t1"), documents={"twins/t1.json": b"{}"}
+        rows.activity("twin.1", "identification"),
+        ["runs"],
+        rows.twin(TWIN),
+        documents={f"twins/{TWIN}.json": b"{}"},
     )
     workspace.replace_activity(
-        rows.activity("energy.1", "energy"), ["twin"], rows.run_energy("t1"), series={WORK: rows.samples(9)}
+        rows.activity("energy.1", "energy"),
+        ["twin"],
+        rows.run_energy(TWIN),
+        series={WORK: rows.samples(9)},
     )
 
 
@@ -151,14 +158,17 @@ def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace
     populate(workspace)
     assert workspace.read_series(WORK, "modelled").equals(rows.samples(9))
     workspace.replace_activity(
-        rows.activity("twin.2", "identification"), [], rows.twin("t2"), documents={"twins/t2.json": b"{2}"}
+        rows.activity("twin.2", "identification"),
+        [],
+        rows.twin(OTHER),
+        documents={f"twins/{OTHER}.json": b"{2}"},
     )
     with workspace.reading() as session:
-        assert session.scalars(select(Twin.twin_id)).all() == ["t2"]
+        assert session.scalars(select(Twin.twin_id)).all() == [OTHER]
         assert session.scalars(select(RunEnergy)).all() == []
         assert set(session.scalars(select(Series.kind))) == {"measured"}
         assert set(session.scalars(select(Activity.activity_id))) == {"state.1", "twin.2"}
-    assert [file.name for file in (workspace.folder / "twins").iterdir()] == ["t2.json"]
+    assert [file.name for file in (workspace.folder / "twins").iterdir()] == [f"{OTHER}.json"]
     assert len(list((workspace.folder / "series").iterdir())) == 2
 
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+import sqlite3
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import Table
+from sqlalchemy import Table, insert
 from tests import rows
 
+from irtwin.errors import InputError
+from irtwin.storage import engine
+from irtwin.storage.database import Workspace
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Base, Individuals, Joint, Robot, Run, Series
@@ -78,3 +84,29 @@ def test_what_irtwin_would_not_write_is_told(table: type[Base], column: str, val
 def of(table: type[Base]) -> Table:
     assert isinstance(table.__table__, Table)
     return table.__table__
+
+
+@pytest.mark.parametrize("value", ["x", b"\xff", "9e999"])
+def test_a_workspace_whose_rows_another_program_changed_is_not_opened(tmp_path: Path, value: object) -> None:
+    with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
+        session.execute(insert(of(Robot)), [row_of(Robot)])
+    with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
+        database.execute("UPDATE robot SET weight_kg = ?", (value,))
+        database.commit()
+    with pytest.raises(InputError, match=r"a row of table robot was changed by another program: .*restore a backup"):
+        Workspace(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "ALTER TABLE run_price RENAME TO other; CREATE VIEW run_price AS SELECT * FROM other",
+        "CREATE TRIGGER mine AFTER UPDATE ON robot BEGIN DELETE FROM run; END",
+    ],
+)
+def test_a_workspace_with_anothers_queries_in_its_tables_is_not_opened(tmp_path: Path, words: str) -> None:
+    Workspace(tmp_path).close()
+    with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
+        database.executescript(words)
+    with pytest.raises(InputError, match=r"holds the (view 'run_price'|trigger 'mine'), which irtwin did not make"):
+        Workspace(tmp_path)

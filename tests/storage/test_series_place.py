@@ -101,7 +101,7 @@ def test_a_prefix_that_became_anothers_is_said(objects: MemoryS3, tmp_path: Path
         check(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["url = ", 'url = "s3://plant"'])
+@pytest.mark.parametrize("text", ["url = ", 'url = "s3://plant"', 'url = "/etc"\nworkspace = "x"'])
 def test_a_damaged_setting_is_said(objects: MemoryS3, tmp_path: Path, text: str) -> None:
     (tmp_path / FILE).write_text(text)
     with pytest.raises(InputError, match=r"series\.toml: damaged"):

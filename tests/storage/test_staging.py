@@ -97,7 +97,7 @@ def test_what_a_twin_says_of_a_live_run_goes_with_the_twin_alone(workspace: Work
     populate(workspace)
     live = rows.run("live_1", kind=LIVE_RUN, role=None)
     workspace.keep_live_run(live, rows.samples(8), rows.activity("live.1", LIVE, "run"), [])
-    (energy,) = rows.run_energy("t1")
+    (energy,) = rows.run_energy(f"{rows.ROBOT}.t1")
     energy.run_id = live.run_id
     workspace.replace_activity(
         rows.activity("energy.live", "energy", "live run"), [], [energy], {live.run_id: rows.samples(9)}

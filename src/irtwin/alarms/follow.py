@@ -14,6 +14,7 @@ from pathlib import Path
 from irtwin.alarms.alarm import ACTIVE, Alarm, Event, message
 from irtwin.alarms.delivery import Delivery
 from irtwin.errors import InputError
+from irtwin.json_text import parse_json
 from irtwin.storage import files
 
 EVERY = 1.0  # s between two looks
@@ -31,7 +32,7 @@ class Told:
         self._known: dict[tuple[str | None, ...], Alarm] | None = None
         if file.exists():
             try:
-                alarms = [Alarm.of(row) for row in json.loads(file.read_bytes())]
+                alarms = [Alarm.of(row) for row in parse_json(file.read_bytes())]
             except (ValueError, KeyError, TypeError) as error:
                 raise InputError(f"{file}: cannot be understood ({error}); delete it, and all is told anew") from None
             self._known = {alarm.key: alarm for alarm in alarms}

@@ -9,18 +9,22 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
+from typing import Any
 
 from irtwin import __version__
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.data_sets import at_hand, checksum
+from irtwin.input_file import read_input
+from irtwin.json_text import parse_json
 from irtwin.storage.files import write
 
 RUN, DIAGNOSE = "run", "diagnose"
 BEGUN, DONE, REFUSED, FAILED = "begun", "done", "refused", "failed"
 _ATTEMPTS = 2  # of a data set whose process ended: memory may have been short for another's sake
 _SETS = "sets.json"
+_MOST_BYTES = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,9 @@ class Record:
         return self.state in (DONE, REFUSED, FAILED)
 
 
+_USUAL = Record("", BEGUN)  # whose fields have their types
+
+
 @dataclass(frozen=True)
 class Batch:
     """A folder of a fleet: `sets.json`, `records/`, and the results, a workspace or `diagnoses/`."""
@@ -62,7 +69,7 @@ class Batch:
     @property
     def kind(self) -> str:
         """`run` or `diagnose`."""
-        return str(self._sets()["kind"])
+        return str(self._said("kind"))
 
     @property
     def base(self) -> str | None:
@@ -77,30 +84,33 @@ class Batch:
     @property
     def places(self) -> list[str]:
         """Its data sets."""
-        found = self._sets()["data_sets"]
-        assert isinstance(found, list)
-        return found
+        return list(map(str, self._sets()["data_sets"]))
 
     def _said(self, what: str) -> str | None:
         found = self._sets().get(what)
         return None if found is None else str(found)
 
-    def _sets(self) -> dict[str, object]:
+    def _sets(self) -> dict[str, Any]:
         file = self.folder / _SETS
         try:
-            found: dict[str, object] = json.loads(file.read_text())
-            return found
-        except (OSError, ValueError) as error:
+            found = parse_json(read_input(file, _MOST_BYTES))
+            sound = isinstance(found, dict) and isinstance(found.get("data_sets"), list)
+            if not (sound and found.get("kind") in (RUN, DIAGNOSE)):
+                raise ValueError("it says no data sets, or not what for")
+        except ValueError as error:
             raise InputError(
                 f"{file}: cannot be read ({error}); remove its folder, and its sets are taken again"
             ) from None
+        return dict(found)
 
     def record(self, place: str) -> Record | None:
         """Return what is known of a data set; None where it was never begun, or its record is damaged."""
         try:
-            return Record(**json.loads(self._record_file(place).read_text()))
-        except (OSError, ValueError, TypeError):
+            found = Record(**parse_json(read_input(self._record_file(place), _MOST_BYTES)))
+        except (InputError, ValueError, TypeError):
             return None  # it is tried again
+        sound = all(isinstance(own, type(usual)) for own, usual in zip(astuple(found), astuple(_USUAL), strict=True))
+        return found if sound else None
 
     def records(self) -> Iterator[Record | None]:
         """Yield the record of each data set."""

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from irtwin.json_text import parse_json
 from irtwin.knowledge import locality
 from irtwin.knowledge.locality import Reach
 from irtwin.knowledge.vocabulary import PREFIXES
@@ -34,7 +35,7 @@ def kept(folder: Path | None) -> Iterator[None]:
 def _read(file: Path) -> dict[str, Reach]:
     """Return what a file keeps; nothing where other software made it, or it was altered."""
     try:
-        said = json.loads(file.read_text())
+        said = parse_json(file.read_text())
         if said["made_by"] == _made_by() and said["digest"] == _digest(said["queries"]):
             queries = said["queries"].items()
             return {text: Reach(**{name: frozenset(iris) for name, iris in reach.items()}) for text, reach in queries}

@@ -11,7 +11,6 @@ count where a run begins. The keys of values are those of the table of channels.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import socketserver
@@ -23,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO, TypeGuard, cast
 
 from irtwin.errors import InputError
+from irtwin.json_text import parse_json
 from irtwin.signals.channels import CHANNELS, REQUIRED, Channel
 
 LONGEST_LINE = 1 << 16  # bytes
@@ -79,8 +79,8 @@ class StateReader:
         if len(line) > LONGEST_LINE:
             raise InputError(f"a line is longer than {LONGEST_LINE} bytes")
         try:
-            said = json.loads(line)
-        except (ValueError, RecursionError):
+            said = parse_json(line)
+        except ValueError:
             if _HTTP.match(line):
                 raise InputError("an HTTP request, which a web page may have sent; its connection is closed") from None
             raise InputError("a line is not JSON") from None

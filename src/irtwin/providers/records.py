@@ -19,6 +19,7 @@ import pyarrow as pa
 from sqlalchemy import ColumnElement, select
 
 from irtwin.errors import InputError
+from irtwin.json_text import parse_json
 from irtwin.planning.admission import check_motion
 from irtwin.providers.mesh_files import mesh_copies
 from irtwin.providers.structure_rows import device_rows, structure_rows
@@ -243,7 +244,7 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
     """Return what the data set of a robot said, but for its runs and effects."""
     with workspace.reading() as session:
         row = session.get_one(Robot, robot_id)
-    notes = json.loads(row.notes)
+    notes = parse_json(row.notes)
     return log.DataSet(
         folder=Path(robot_id),
         robot=robot,

@@ -12,6 +12,7 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
+from irtwin.effects.rigid_body import flange_frame
 from irtwin.errors import InputError
 from irtwin.identification.motion_limits import FULL_SPEED_AFTER
 from irtwin.robot.collision import CollisionModel
@@ -98,7 +99,7 @@ def _check_folder(folder: Path, name: str) -> None:
 def _chain(robot: Robot) -> list[str]:
     """Return the moving joints from the base to the flange."""
     model = robot.model
-    at = model.frames[model.getFrameId(flange(robot))].parentJoint
+    at = flange_frame(robot).parentJoint
     found: list[str] = []
     while at > 0:
         found.append(model.names[at])

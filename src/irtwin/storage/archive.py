@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from irtwin.errors import InputError
+from irtwin.json_text import parse_json
 from irtwin.storage import files
 
 _FORMAT = {"format": "irtwin backup", "version": 1}
@@ -87,10 +88,7 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
     foreign = InputError(f"{archive}: not an irtwin backup; make one with `irtwin backup FILE`")
     if manifest is None or manifest.file_size > _MOST_MANIFEST:
         raise foreign
-    try:
-        said = json.loads(source.read(manifest))
-    except RecursionError:
-        raise foreign from None
+    said = parse_json(source.read(manifest))
     if not isinstance(said, dict) or said.get("format") != _FORMAT["format"]:
         raise foreign
     if said.get("version") != _FORMAT["version"]:

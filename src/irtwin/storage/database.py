@@ -21,6 +21,7 @@ from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_changes import keep_notes
+from irtwin.storage.row_rules import check_rows
 from irtwin.storage.rows import (
     base_of,
     drop_activities,
@@ -108,8 +109,12 @@ class Workspace:
             _check_that_nothing_is_lost(folder)
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
-        engine.check(self.engine)
+        is_whole = engine.check(self.engine)
+        engine.check_schema(self.engine, Base.metadata.tables)
         self._make_tables()
+        if is_whole:  # whoever wrote its rows: the folder may come from elsewhere
+            with self.engine.connect() as connection:
+                check_rows(connection, engine.shown(self.engine.url))
         self.base = self._base(base)
         if series_url is not None:
             with self.reading() as session:

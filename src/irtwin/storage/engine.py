@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ from irtwin.errors import InputError, WorkspaceFault
 from irtwin.storage.read_only import connecting, may_only_be_read
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
-MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
+TRIGGERS = "irtwin_"  # what the names of irtwin's own begin with
+MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: its file takes some 0.2 s, its rows 2 s
 _DAMAGE = ("malformed", "not a database")
 _NO_UTF8 = ("ould not decode to UTF-8", "codec can't decode")  # SQLite's words of a value, Python's of a name
 _SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
@@ -179,19 +180,39 @@ def use_write_ahead_log(engine: Engine) -> None:
         time.sleep(0.05)
 
 
-def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> None:
-    """Look through an SQLite database that is not larger. Raises WorkspaceFault where its file is damaged."""
+def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> bool:
+    """Look through an SQLite database that is not larger; return whether it was. WorkspaceFault where it is damaged."""
     if engine.dialect.name != "sqlite":
-        return
+        return False
     with engine.connect() as connection:
         size = connection.exec_driver_sql(
             "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
         ).scalar_one()
         if size > most_bytes:
-            return
+            return False
         found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
     if found != "ok":
         raise WorkspaceFault(_damaged(engine.url, " ".join(str(found).split())))
+    return True
+
+
+def check_schema(engine: Engine, tables: Container[str]) -> None:
+    """Raise WorkspaceFault where an SQLite database has a view in place of a table, or another's trigger on one.
+
+    Each is a query of somebody else's, which runs whenever the table is read or written, and may never end.
+    """
+    if engine.dialect.name != "sqlite":
+        return
+    with engine.connect() as connection:
+        found = connection.exec_driver_sql(
+            "SELECT type, name, tbl_name FROM sqlite_master WHERE type IN ('view', 'trigger')"
+        ).all()
+    for kind, name, table in found:
+        if table in tables and not (kind == "trigger" and name.startswith(TRIGGERS)):
+            raise WorkspaceFault(
+                f"{engine.url.database}: holds the {kind} {name!r}, which irtwin did not make; drop it, or restore a "
+                "backup by `irtwin restore ARCHIVE --workspace NEW`"
+            )
 
 
 def _tell(url: URL, error: BaseException) -> None:

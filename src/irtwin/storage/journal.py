@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from irtwin.json_text import parse_json
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.schema import LIVE_RUN, WATCHED_RUNS
 
@@ -72,8 +73,8 @@ def read_journal(path: Path) -> tuple[Header, Rows]:
     if not found:
         raise ValueError(f"{path}: ends within its header")
     try:
-        header = _header(json.loads(line))
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        header = _header(parse_json(line))
+    except (ValueError, TypeError, KeyError, AttributeError):
         raise DamagedJournal(f"{path}: its header is damaged") from None
     if path.name != f"{header.run_id}{_ENDING}":
         raise DamagedJournal(f"{path}: its header is that of run {header.run_id!r}")

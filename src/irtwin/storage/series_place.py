@@ -104,8 +104,8 @@ def _said(folder: Path) -> _Said | None:
 def _read(file: Path) -> _Said:
     try:
         said = tomllib.loads(read_input(file, _MOST_BYTES).decode("utf-8"))
-        return _Said(str(said["url"]), str(said["workspace"]))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError):
+        return _Said(checked_url(str(said["url"])), str(said["workspace"]))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, InputError):
         raise InputError(
             f"{file}: damaged: it has to say url and workspace, as it did; put the file back, or `irtwin restore` a "
             "backup into another folder"

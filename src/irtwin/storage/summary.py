@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from irtwin.json_text import parse_json
+
 ROW_GROUP = 122_880  # rows; DuckDB's own size: smaller ones cost it time, larger ones make the ends of a window long
 KEY = b"irtwin.groups"
 
@@ -70,7 +72,7 @@ def read_summary(schema: pa.Schema) -> Summary | None:
     content = (schema.metadata or {}).get(KEY)
     if content is None:
         return None
-    said = json.loads(content)
+    said = parse_json(content)
     channels = {
         name: Channel(**{key: np.array(part, dtype=np.float64) for key, part in channel.items()})
         for name, channel in said["channels"].items()

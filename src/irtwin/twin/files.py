@@ -15,6 +15,7 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
+from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.twin.torque_scale import TorqueScale
@@ -95,8 +96,8 @@ def to_json(twin: Twin) -> str:
 def from_json(text: str, path: Path) -> Twin:
     """Return the twin of JSON text; `path` is where it stood. Raises InputError, naming file and key."""
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        document = parse_json(text)
+    except ValueError as error:
         raise InputError(f"{path}: not JSON ({error}); name a twin that irtwin saved") from error
     reader = _Reader(path, document, "")
     if reader.take("format", str) != _FORMAT:

@@ -23,6 +23,7 @@ from sqlalchemy import Connection, Table, func, insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from irtwin.errors import InputError
+from irtwin.json_text import parse_json
 from irtwin.knowledge.mapping.source import snapshot_options
 from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -209,7 +210,7 @@ def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> 
     try:
         for rows in _in_chunks(_row(table, archive, line) for line in _lines(file)):
             connection.execute(insert(table), rows)
-    except (ValueError, TypeError, RecursionError, SQLAlchemyError) as error:
+    except (ValueError, TypeError, SQLAlchemyError) as error:
         reason = str(error).splitlines()[0][:500]
         raise InputError(
             f"{archive}: the rows of table {table.name} do not fit ({reason}); use another backup"
@@ -226,7 +227,7 @@ def _lines(file: Path) -> Iterator[bytes]:
 
 
 def _row(table: Table, archive: Path, line: bytes) -> dict[str, Any]:
-    row = json.loads(line)
+    row = parse_json(line)
     if not isinstance(row, dict) or set(row) != set(table.columns.keys()):
         raise InputError(f"{archive}: table {table.name} was made by another irtwin version; restore it with that one")
     moments = [column.name for column in table.columns if isinstance(column.type, Moment) and row[column.name]]

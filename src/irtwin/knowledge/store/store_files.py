@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+from irtwin.json_text import parse_json
+
 _SUMS = "irtwin-sums.json"  # {"read": {name: [CRC-32, mtime in ns]}, "manifest": [name, size, CRC-32]}
 _BLOCK, _HEADER = 32768, 7
 _PIECE = 1 << 20
@@ -74,7 +76,7 @@ def _fault(folder: Path) -> str | None:
 
 def _noted(folder: Path) -> dict[str, Any]:
     try:
-        said = json.loads((folder / _SUMS).read_text())
+        said = parse_json((folder / _SUMS).read_text())
     except (OSError, ValueError):
         return {}
     return said if isinstance(said, dict) else {}

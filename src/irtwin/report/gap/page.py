@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +12,7 @@ from irtwin.errors import InputError
 from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document
 from irtwin.gap.thresholds import DEFAULT
+from irtwin.json_text import parse_json
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -54,7 +54,7 @@ def render_gap(
         raise InputError(f"{robot}: no diagnosis in the graph; run `irtwin diagnose` with this workspace first")
     bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
     answers = ask(graph, questions, bindings)
-    curves = Curves.from_json(json.loads(read_document(found["evidence_file"], found["evidence_checksum"])))
+    curves = Curves.from_json(parse_json(read_document(found["evidence_file"], found["evidence_checksum"])))
     write(out, _page(resources, answers, bindings, curves).encode())
 
 
