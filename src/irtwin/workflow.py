@@ -127,6 +127,10 @@ def diagnose(
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
+    if kept_in is not None and kept_in.exists():
+        with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
+            check_before(place)
+            check_name(place, data_set.robot.name)
     found = gap.diagnose(data_set, twin=given, withhold=withhold, seed=seed, progress=announce)
     if json_file is not None:
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())

@@ -113,6 +113,7 @@ BOMB = b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">]><COLLADA>&a;</COLLADA>'
         (b"v 0 0 0\nf 1 2 999999\n", ".obj", "no mesh that can be read|holds no triangles"),
         (BOMB, ".dae", "is no DAE that can be read"),
         (written("dae").replace(b"<node ", b"<instance_node/><node ", 1), ".dae", "repeats its parts by instances"),
+        (written("obj") + b"usemtl a\nf 1 2 3\n" * 1001, ".obj", "has more than 1000 groups or materials"),
         (written("dae").replace(b"<asset>", b'<asset><unit meter="x"/>'), ".dae", "its unit of 'x' m is no number"),
         (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", ".obj", "no mesh that can be read|holds no triangles"),
         (b"PK", ".zip", "a mesh as .zip is not read; use STL, OBJ or DAE"),

@@ -107,6 +107,11 @@ def test_a_payload_counts() -> None:
     assert loaded.modelled != pytest.approx(TWIN.energy(WHOLE), rel=1e-3)
 
 
+def test_stamps_that_are_no_robot_s_make_no_filter_of_millions_of_samples() -> None:
+    few = {name: values[:200] for name, values in columns(since=0.0).items()} | {"time": 1e-9 * np.arange(200)}
+    assert fed(EnergySoFar(ROBOT.joint_names, TWIN), few, 50) == []
+
+
 def test_a_few_samples_are_no_energy_yet() -> None:
     so_far = EnergySoFar(ROBOT.joint_names, TWIN)
     assert fed(so_far, {name: values[:15] for name, values in columns().items()}, 5) == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element, ParseError
@@ -18,6 +19,8 @@ from irtwin.input_file import read_input
 FORMATS = (".stl", ".obj", ".dae")
 LARGEST = 20_000_000  # bytes of a file
 _MOST_INSTANCES = 200  # of geometry in a DAE: a small file could name a large one without end
+_MOST_GROUPS = 1000  # of an OBJ by material, object or group: each becomes a mesh that the others are joined to
+_OBJ_GROUP = re.compile(rb"^\s*(?:usemtl|o|g)\s", re.MULTILINE)
 _COLLADA = "{http://www.collada.org/2005/11/COLLADASchema}"
 # what trimesh and pycollada raise on bytes that are no mesh
 _DAMAGED = (ValueError, KeyError, IndexError, TypeError, AttributeError, AssertionError, OverflowError, EOFError)
@@ -70,6 +73,8 @@ def read_mesh(content: bytes, suffix: str, where: str) -> Mesh:
     kind = suffix.lower()
     if kind not in FORMATS:
         raise InputError(f"{where}: a mesh as {suffix or 'a file without an ending'} is not read; use STL, OBJ or DAE")
+    if kind == ".obj" and len(_OBJ_GROUP.findall(content)) > _MOST_GROUPS:
+        raise InputError(f"{where}: has more than {_MOST_GROUPS} groups or materials; export it as one mesh")
     metres = _check_collada(content, where) if kind == ".dae" else 1.0
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what it has to say of bad files is said below
     try:

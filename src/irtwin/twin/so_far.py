@@ -25,6 +25,7 @@ from irtwin.signals.sampling import holes, interval
 from irtwin.twin.twin import Twin
 
 _SEAM = 16  # samples on either side for the splines that differentiate; their ends are forgotten by a third a sample
+_SHORTEST = 1e-5  # s between even times: closer stamps are no robot's, and would make a filter of millions of samples
 _MEMORY = 30.0  # s that effects with memory are given of what went before
 
 
@@ -152,7 +153,7 @@ class EnergySoFar:
                 held = self._signals = held.rows(slice(int(early[-1]), None))
                 self._start = float(held.time[0])
             if len(held.time) >= FEWEST:
-                self._step = interval(held.time)
+                self._step = max(interval(held.time), _SHORTEST)
         return bool(np.isfinite(self._step))
 
     def _reach(self, held: Signals) -> tuple[int, int]:
