@@ -202,7 +202,9 @@ def _link(archive: Path, rng: np.random.Generator) -> None:
     with zipfile.ZipFile(archive, "a") as target:
         entry = zipfile.ZipInfo(some(rng, ["reports/x.html", "series/x.parquet", "live", "rows"]))
         entry.external_attr = (stat.S_IFLNK | 0o777) << 16
-        target.writestr(entry, some(rng, ["/etc/passwd", "../../x", "OUTSIDE/x"]))
+        target.writestr(
+            entry, some(rng, [str(archive.parents[1] / "etc/passwd"), "../../x", str(archive.parents[1] / "x")])
+        )
 
 
 def _nested(archive: Path, rng: np.random.Generator) -> None:

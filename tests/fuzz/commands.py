@@ -53,6 +53,7 @@ def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Faul
         made = in_child(lambda: _make(case, folder), folder)
         if made.status:
             raise AssertionError(f"the harness cannot make what this case has:\n{made.err}\n{case.to_json()}")
+        outside.seal()
         with peer(*case.peer) if case.peer else nullcontext() as port:
             if port is not None:
                 _tell(folder / "workspace", port)

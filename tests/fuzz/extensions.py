@@ -214,10 +214,21 @@ def _odd_file(workspace: Path, rng: np.random.Generator) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     how = rng.integers(7)
     if how == 0:
-        file.symlink_to(some(rng, [workspace.parent / "secret.toml", "/etc/passwd", "/dev/zero", "nowhere", file]))
+        file.symlink_to(
+            some(
+                rng,
+                [
+                    workspace.parents[1] / "secret.toml",
+                    workspace.parents[1] / "etc/passwd",
+                    "/dev/zero",
+                    "nowhere",
+                    file,
+                ],
+            )
+        )
     elif how == 1:
         folder.rmdir()
-        folder.symlink_to(some(rng, [workspace.parents[1], Path("/etc"), Path("nowhere"), folder]))
+        folder.symlink_to(some(rng, [workspace.parents[1], workspace.parents[1] / "etc", Path("nowhere"), folder]))
     elif how == 2:
         os.mkfifo(file)
     elif how == 3:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 SECRET = "k3p7-told-to-nobody"
 _DEPTH = 4  # folders above that of the case, for paths that lead up
-_NAMES = ("x", "x.html", "x.json", "mine.ttl", "mine.run.journal", "secret.toml", "secret.html.jinja")
+_NAMES = ("x", "x.html", "x.json", "mine.ttl", "mine.run.journal", "secret.toml", "secret.html.jinja", "etc/passwd")
 
 
 class Outside:
@@ -17,8 +17,13 @@ class Outside:
         self.case = root.joinpath("above", *map(str, range(_DEPTH)), "case")
         self.case.mkdir(parents=True)
         for folder in self.case.parents[: _DEPTH + 2]:
+            (folder / "etc").mkdir()  # links lead there: those to the machine's own would have a draw write to it
             for name in _NAMES:
                 (folder / name).write_text(f'word = "{SECRET}"\n')
+        self._were = self._there()
+
+    def seal(self) -> None:
+        """Take what is there for what no command may change: spoiling a case has written through its links."""
         self._were = self._there()
 
     def changed(self) -> str | None:

@@ -9,7 +9,19 @@ import numpy as np
 
 DEEP = "@deep@"  # stands for a list in a list, 5,000 times: JSON of Python's cannot write it
 ODD: tuple[Any, ...] = (
-    *("../../../x", "../../secret", "/etc/passwd", "OUTSIDE/x", "..", ".", "", "/", "a/b", "arm/../x", "x" * 300),
+    *(
+        "../../../x",
+        "../../secret",
+        "OUTSIDE/etc/passwd",
+        "OUTSIDE/x",
+        "..",
+        ".",
+        "",
+        "/",
+        "a/b",
+        "arm/../x",
+        "x" * 300,
+    ),
     *(
         "a\0b",
         "\x1b[31mred",

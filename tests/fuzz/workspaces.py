@@ -41,9 +41,8 @@ def _link(folder: Path, rng: np.random.Generator) -> None:
         shutil.move(path, copy)
     else:
         _remove(path)
-        copy = Path(some(rng, [outside, "/etc", "nowhere", path] if is_folder else [
-            outside / "secret.toml", outside / "x.json", "/etc/passwd", "/dev/zero", "/dev/null", "nowhere", path,
-        ]))  # fmt: skip
+        places = ["", "etc"] if is_folder else ["secret.toml", "x.json", "etc/passwd", "/dev/zero", "/dev/null"]
+        copy = some(rng, [*(outside / place for place in places), Path("nowhere"), path])
     path.symlink_to(copy)
 
 
@@ -158,7 +157,7 @@ def _left_over(folder: Path, rng: np.random.Generator) -> None:
         left = folder / some(rng, [".backup-x", ".repair-x", "graph.damaged", ".graph.turn", "reports/.x.tmp"])
         if rng.integers(2):
             left.unlink(missing_ok=True)
-            left.symlink_to(some(rng, [folder.parents[1], Path("/etc"), Path("nowhere")]))
+            left.symlink_to(some(rng, [folder.parents[1], folder.parents[1] / "etc", Path("nowhere")]))
         else:
             left.mkdir(exist_ok=True) if not left.exists() else None
 
