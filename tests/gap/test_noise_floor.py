@@ -10,7 +10,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.thresholds import DEFAULT
+from irtwin.signals.channels import Signals
 from irtwin.signals.filter import low_pass
+from irtwin.signals.motion import Motion
 
 RATE, CUTOFF, NOISE = 125.0, 10.0, 0.3
 TIME = np.arange(4000) / RATE
@@ -56,3 +58,21 @@ def test_a_smoothed_log_tells_no_floor():
 
 def test_of_two_runs_one_smoothed_the_other_tells_it():
     assert floor(white(), smoothed(white(1))).torque == pytest.approx(floor(white()).torque)
+
+
+def test_what_a_joint_holds_at_rest_is_no_noise_of_its_motion():
+    """Stiction holds another torque in each repeat; what a fit leaves is judged in motion alone."""
+    speed = np.where(TIME % 8 < 4, 0.0, 0.5 * np.sin(2 * np.pi * TIME / 4) ** 2)[:, None]
+    q = np.cumsum(speed, axis=0) / RATE
+    rest = (speed == 0) * np.floor(TIME / 8)[:, None] % 2
+
+    def run(name, repeats, seed, held):
+        torque = white(seed)[:, None] + held * rest
+        signals = Signals(TIME, q, torque=torque)
+        motion = Motion(TIME, q, speed, np.gradient(speed, axis=0) * RATE, torque=torque, run=name, cutoff=CUTOFF)
+        return SimpleNamespace(name=name, role="observed", repeat_of=repeats, signals=signals), motion
+
+    (first, one), (second, other) = run("a", None, 0, 0.0), run("b", "a", 1, 20.0)
+    found = noise_floor([first, second], {"a": one, "b": other}, DEFAULT.repeats)
+    assert found.source == "repeats"
+    assert found.torque == pytest.approx([NOISE], rel=0.1)

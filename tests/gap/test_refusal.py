@@ -66,7 +66,9 @@ def test_a_load_is_bounded_by_what_is_there_and_what_is_rated():
 @pytest.mark.parametrize(
     ("effect", "name", "value", "allowed"),
     [
-        ("torque_constant_error", "g", 2.1, False),
+        ("torque_constant_error", "g", 3.0, False),
+        ("torque_constant_error", "g", 1.83, True),
+        ("payload", "c_x", 3.5, False),
         ("torque_constant_error", "g", 0.8, True),
         ("meter_gain", "g", 0.3, False),
         ("cable_drag", "k", -3.0, False),

@@ -30,6 +30,7 @@ from irtwin.signals.motion import Motion
 
 _HEAVIEST = 20.0  # kg: a load that any arm may carry, as data sheets have it,
 _OF_ARM = 0.5  # of the arm's mass, if that is more; where a payload is rated
+_FARTHEST = 1.0  # m from the flange to the centre of a load
 _OVERLOAD = 2.0  # times it
 _STEEPEST = 0.35  # rad: a base that leans more is no tilt, but mounted so
 _UPRIGHT = 0.7  # of an axis' length that is vertical
@@ -135,7 +136,9 @@ class Payload(Effect):
         else:
             most = max(_HEAVIEST, _OF_ARM * sum(inertia.mass for inertia in robot.model.inertias))
             carried = f"no arm of its kind carries more than {most:.3g} kg"
-        return {"m": Possible(least, most, "; ".join(filter(None, (why, carried))))}
+        mass = Possible(least, most, "; ".join(filter(None, (why, carried))))
+        near = Possible(-_FARTHEST, _FARTHEST, "a load's centre is within reach of its flange")
+        return {"m": mass, **{f"c_{axis}": near for axis in "xyz"}}
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None

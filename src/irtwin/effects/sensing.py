@@ -25,7 +25,8 @@ from irtwin.effects.rigid_body import torque_slope
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
-_GAINS = (0.7, 1.4)  # the range of the ontology, `effects.ttl`
+_CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
+_GAINS = (0.7, 1.4)  # of a meter, the range of the ontology, `effects.ttl`
 _FARTHEST = 0.35  # rad or m, of a zero
 
 
@@ -98,7 +99,7 @@ class TorqueConstantError(JointEffect):
         if stated.torque_scale is not None:
             off, why = stated.torque_scale, "torque_scale_uncertainty of the data set allows no more"
             return {"g": Possible(1 - off, 1 + off, why)}
-        return {"g": Possible(*_GAINS, "beyond, a gear ratio or a unit is wrong rather than a constant")}
+        return {"g": Possible(*_CONSTANTS, "beyond, a gear ratio or a unit is wrong rather than a constant")}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from irtwin.effects.effect import Effect
+from irtwin.effects.effect import Effect, JointEffect
 from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
@@ -36,16 +36,24 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
     plain = replace(robot, joints=tuple(replace(j, friction_width=None, friction_exponent=None) for j in robot.joints))
     if not measured:
         return plain
+    named = {effect for effect in effects if isinstance(effect, str)}
     beside = [
         effect
         for effect in Stack(plain, effects).effects
         if effect.signal == "torque" and effect.id != CoulombFriction.id and not effect.needs and not effect.memory
     ]
     stack = Stack(plain, beside)
+    open_shapes = [  # of which the data are yet to choose
+        shape
+        for effect in beside
+        if effect.id in named and isinstance(effect, JointEffect)
+        for shape in effect.candidates(plain)
+        if isinstance(shape, JointEffect) and shape != effect
+    ]
     found: list[Turn | None] = [None] * len(robot.joints)
     for _ in range(2):
         tried = [_COARSE if one is None else _around(one) for one in found]
-        blocks, pattern = _reduced(stack, measured, tried)
+        blocks, pattern = _reduced(stack, open_shapes, measured, tried)
         found = [_best(blocks, pattern, joint, shapes) for joint, shapes in enumerate(tried)]
     return replace(
         plain,
@@ -63,18 +71,30 @@ def _around(found: Turn) -> list[Turn]:
 
 
 def _reduced(
-    stack: Stack, motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
 ) -> tuple[list[Block], np.ndarray]:
-    """Reduce the equations of torque: beside the stack's columns, each joint's dry friction, sharp and by each turn."""
-    counts = [1 + len(shapes) for shapes in tried]
-    of_friction = np.repeat(np.eye(len(counts), dtype=bool), counts, axis=1)
-    pattern = np.concatenate([stack.pattern, of_friction], axis=1)
+    """Reduce the equations of torque.
+
+    Beside the stack's columns stand those of shapes that are open, then each joint's dry friction, sharp and by each
+    turn.
+    """
+    robot = stack.robot
+    counts = [
+        sum(len(shape.joint_terms(joint)) for shape in open_shapes) + 1 + len(turns)
+        for joint, turns in zip(robot.joints, tried, strict=True)
+    ]
+    of_one_joint = np.repeat(np.eye(len(counts), dtype=bool), counts, axis=1)
+    pattern = np.concatenate([stack.pattern, of_one_joint], axis=1)
     sticking = CoulombFriction()
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
         own = stack.columns_by_joint(motion)
-        columns = [[some, *_friction(motion.dq[:, joint], tried[joint])] for joint, some in enumerate(own)]
+        shapes = [sample for shape in open_shapes for sample in shape.samples(robot, motion, None)]
+        columns = [
+            [some, *(sample[:, k : k + 1] for sample in shapes), *_friction(motion.dq[:, k], tried[k])]
+            for k, some in enumerate(own)
+        ]
         undecided = stack.undecided(motion) | sticking.undecided(motion)
         return Rows(columns, stack.shift_torque(motion, own), motion.torque, undecided)
 

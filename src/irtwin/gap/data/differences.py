@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
 
+from irtwin.effects.friction import CoulombFriction
 from irtwin.gap.thresholds import Repeats
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -29,6 +30,13 @@ class Pair:
     def time(self) -> np.ndarray:
         """(M,) s of the first's clock, where both are known."""
         return np.asarray(self.first.time[self.inside])
+
+    @property
+    def moving(self) -> np.ndarray:
+        """(M, n) where each joint moves in both: at rest friction holds what it has to, and no fit is asked there."""
+        still = CoulombFriction().undecided
+        there = make_interp_spline(self.second.time + self.shift, still(self.second).astype(float), k=1)(self.time)
+        return np.asarray(~still(self.first)[self.inside] & (there == 0))
 
     def difference(self, signal: str) -> np.ndarray | None:
         """Return first less second of a signal, (M, ...), None where either lacks it."""

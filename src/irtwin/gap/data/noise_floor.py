@@ -78,9 +78,19 @@ def _pooled(variances: Sequence[np.ndarray | None]) -> np.ndarray | None:
 
 
 def _repeated(pair: Pair, signal: str) -> np.ndarray | None:
-    """Return half the mean square difference of two runs of one motion, (n,) or (1,)."""
+    """Return half the mean square difference of two runs of one motion, (n,) or (1,).
+
+    Of torque where the joint moves, as what a fit leaves is judged there; of a joint at rest throughout, at rest.
+    """
     difference = pair.difference(signal)
-    return None if difference is None else np.atleast_1d(np.mean(_without_jumps(difference**2 / 2), axis=0))
+    if difference is None:
+        return None
+    squares = _without_jumps(difference**2 / 2)
+    if signal != "torque":
+        return np.atleast_1d(np.mean(squares, axis=0))
+    moving = pair.moving
+    judged = moving | ~moving.any(axis=0)
+    return np.asarray(np.mean(squares, axis=0, where=judged))
 
 
 def _without_jumps(squares: np.ndarray) -> np.ndarray:
