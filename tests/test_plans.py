@@ -239,7 +239,7 @@ def test_a_live_run_outlasts_the_plan_of_an_earlier_data_set(watched: Path, tmp_
     shutil.copytree(watched, tmp_path / "w")
     with Workspace(tmp_path / "w") as place:
         with place.engine.begin() as connection:
-            later = sqlalchemy.update(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)
+            later = sqlalchemy.update(schema.Run).where(schema.Run.kind.in_(schema.WATCHED_RUNS))
             connection.execute(later.values(performs="arm_2.later"))
         with staged(place, "arm_2") as apart:
             ingest(apart, read_data_set(write(tmp_path / "logs", recorded())))

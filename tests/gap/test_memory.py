@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -30,7 +32,7 @@ def false_alarms(memory, told, count=60, trials=150):
     column = np.linspace(-1, 1, count)
     for seed in range(trials):
         scores = (column * (root @ rng.standard_normal(count)))[:, None]
-        products = np.diag([float(column @ column), 1.0])
+        products = SimpleNamespace(each=lambda sets: dict.fromkeys(sets, np.array([[float(column @ column)]])))
         p = p_values(scores, products, [DRIFT], seed, likeness(each, told) if told else None, flips=199)
         false += p[0] <= 0.05
     return false / trials

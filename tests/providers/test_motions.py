@@ -51,6 +51,12 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
         yield opened
 
 
+@pytest.fixture(autouse=True)
+def by_band(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Choose the cutoff by the band of the motion alone: what is held out is `tests/identification/test_cutoff.py`."""
+    monkeypatch.setattr(motions, "cutoff_for", lambda robot, runs: choose_cutoff(runs))
+
+
 def data_set(*more: Run) -> DataSet:
     return DataSet(Path(), ROBOT, (*RUNS, *more), EFFECTS, None, "mains", True, {})
 

@@ -185,6 +185,8 @@ def diagnose(
     differ = disturbances(case)
     case, taken = removed(case, stack, plain, differ)
     if taken:
+        case = case.with_friction_near_zero()
+        stack = case.stack.with_effects(stack.effects)
         plain = _plain(case, stack, tell)
     floor = noise_floor(case.runs, case.motions, thresholds.repeats)
     if case.shows("torque") and plain is not None:

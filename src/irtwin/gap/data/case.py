@@ -123,6 +123,10 @@ class Case:
         runs = [motion.run for motion in self.with_torque]
         return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
 
+    def with_friction_near_zero(self) -> Case:
+        """Return the case with the turn of each joint's dry friction as its motions show it."""
+        return replace(self, robot=with_friction_near_zero(self.robot, list(self.motions.values()), self.effects))
+
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""
         return any(getattr(motion, signal) is not None for motion in self.seen)
@@ -138,8 +142,7 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
-    robot = with_friction_near_zero(robot, list(motions.values()), begun.effects)
-    return Case(
+    case = Case(
         robot,
         begun.effects,
         data_set.runs,
@@ -149,6 +152,7 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
         begun.prior,
         _stated(data_set),
     )
+    return case.with_friction_near_zero()
 
 
 def _stated(data_set: DataSet) -> Stated:
