@@ -179,7 +179,7 @@ def _devices(robot: str, joint: str | None, kind: str, column: str, label: str, 
     )
 
 
-def _digest(text: str) -> str:
+def digest(text: str) -> str:
     """Return what stands for the SHA-256 of a file that this fleet does not have."""
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -192,10 +192,10 @@ def _plans() -> Iterator[Base]:
             run_id=run_id, robot_id=robot, name=name, kind="Planned_Run", payload_kg=payload,
             time_scaling_of=scaled, time_scale=times, payload_com_x_m=0.0,
             payload_com_y_m=0.0, payload_com_z_m=0.0, run_time_s=seconds, sample_count=int(100 * seconds),
-            sample_rate_hz=100.0, file=f"series/{run_id}.parquet", sha256=_digest(f"plan of {run_id}"),
+            sample_rate_hz=100.0, file=f"series/{run_id}.parquet", sha256=digest(f"plan of {run_id}"),
         )  # fmt: skip
         yield schema.Series(
-            series_id=_digest(f"planned {run_id}"), run_id=run_id, kind="planned", path=f"series/{run_id}.parquet",
+            series_id=digest(f"planned {run_id}"), run_id=run_id, kind="planned", path=f"series/{run_id}.parquet",
             row_count=int(100 * seconds), columns="time,q_j1",
         )  # fmt: skip
 
@@ -215,7 +215,7 @@ def _prices() -> Iterator[Base]:
             peak_power_upper_w=290.0, activity_id=made,
         )  # fmt: skip
         yield schema.Series(
-            series_id=_digest(f"modelled {run_id}"), run_id=run_id, kind="modelled",
+            series_id=digest(f"modelled {run_id}"), run_id=run_id, kind="modelled",
             path=f"series/{run_id}.model.parquet",
             row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
         )  # fmt: skip
@@ -233,10 +233,10 @@ def _runs() -> Iterator[Base]:
             performs=performs.get(run_id), start_time=_moment(start), start_time_from="log",
             started=_moment(start), ended=_moment(start) + timedelta(seconds=seconds), run_time_s=seconds,
             sample_count=int(100 * seconds), sample_rate_hz=100.0, file=f"runs/{name}.csv",
-            sha256=_digest(f"log of {run_id}"),
+            sha256=digest(f"log of {run_id}"),
         )  # fmt: skip
         yield schema.Series(
-            series_id=_digest(f"measured {run_id}"), run_id=run_id, kind="measured", path=f"series/{run_id}.parquet",
+            series_id=digest(f"measured {run_id}"), run_id=run_id, kind="measured", path=f"series/{run_id}.parquet",
             row_count=int(100 * seconds), columns="time,q_j1,power",
         )  # fmt: skip
         if idle is None:
@@ -259,7 +259,7 @@ def _twins() -> Iterator[Base]:
         yield _activity(made, robot, "identification", "2026-03-05 12:01")
         yield schema.Twin(
             twin_id=twin, robot_id=robot, created=_moment("2026-03-05 12:01"), file=f"twins/{twin}.json",
-            sha256=_digest(f"twin of {robot}"), cutoff_hz=10.0, condition_number=conditions[robot],
+            sha256=digest(f"twin of {robot}"), cutoff_hz=10.0, condition_number=conditions[robot],
             base_parameter_count=11,
             split="by run", activity_id=made,
             torque_scale_uncertainty=0.1 if robot == "Arm_A" else None,
@@ -313,7 +313,7 @@ def _energies() -> Iterator[Base]:
             standby_share=standby / modelled, returned_energy_j=returned, activity_id=made,
         )  # fmt: skip
         yield schema.Series(
-            series_id=_digest(f"modelled {run_id}"), run_id=run_id, kind="modelled",
+            series_id=digest(f"modelled {run_id}"), run_id=run_id, kind="modelled",
             path=f"series/{run_id}.model.parquet",
             row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
         )  # fmt: skip
@@ -337,7 +337,7 @@ def _live_runs() -> Iterator[Base]:
             payload_com_y_m=0.0, payload_com_z_m=0.0, start_time=_moment(start), start_time_from="log",
             started=_moment(start), ended=_moment(start) + timedelta(seconds=seconds) if stream == "ended" else None,
             run_time_s=seconds, sample_count=int(100 * seconds), sample_rate_hz=100.0,
-            file=f"series/{run_id}.parquet", sha256=_digest(f"log of {run_id}"),
+            file=f"series/{run_id}.parquet", sha256=digest(f"log of {run_id}"),
         )  # fmt: skip
         yield _activity(made, robot, "live", start)
         if robot == "Arm_B":

@@ -58,6 +58,6 @@ def test_a_cause_is_right_where_the_label_has_its_effect():
     diagnoses = {"case_1": {"verdict": "attributed", "causes": [cause, other]}, "case_2": {"error": "x", "causes": []}}
     labels = {"case_1": {"effects": [{"effect": "payload"}]}, "case_2": {"effects": []}}
     assert [(one.right, one.share, one.count) for one in named(json.loads(json.dumps(diagnoses)), labels)] == [
-        (True, 1.0, 2),
+        (True, 1.0, 1.5),  # one of half its gain counts half
         (False, 0.5, 2),
     ]

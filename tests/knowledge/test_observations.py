@@ -42,7 +42,8 @@ def test_a_signal_of_a_run_is_one_observation_whose_result_is_the_series(graph: 
     assert said(graph, SIGNAL) == {
         ("type", f"{SOSA}Observation"), ("observedProperty", "channel/Arm_A/q_j1"),
         ("hasFeatureOfInterest", "joint/Arm_A/j1"), ("madeBySensor", "device/Arm_A/encoder.j1"),
-        ("phenomenonTime", "interval/Arm_A.fit_1"), ("hasResult", "series/measured%20Arm_A.fit_1/Arm_A.fit_1"),
+        ("phenomenonTime", "interval/Arm_A.fit_1"),
+        ("hasResult", f"series/{small_fleet.digest('measured Arm_A.fit_1')}/Arm_A.fit_1"),
     }  # fmt: skip
 
 

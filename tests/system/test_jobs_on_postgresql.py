@@ -19,7 +19,7 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.stored_times import StoredTimes
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE_RUN, ImprovementRound, Run
+from irtwin.storage.schema import WATCHED_RUNS, ImprovementRound, Run
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -56,7 +56,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory, new_postgresql_database: Cal
 
 def live_run(plant: Plant) -> Run:
     with plant.open() as place, place.reading() as session:
-        return session.scalars(select(Run).where(Run.kind == LIVE_RUN)).one()
+        return session.scalars(select(Run).where(Run.kind.in_(WATCHED_RUNS))).one()
 
 
 def test_a_plan_is_held_against_the_run_that_was_watched(plant: Plant) -> None:
@@ -64,8 +64,10 @@ def test_a_plan_is_held_against_the_run_that_was_watched(plant: Plant) -> None:
     assert (row["plan"], row["run"]) == ("reach", live_run(plant).name)
     with plant.open() as place, KnowledgeGraph.of_workspace(place) as graph:
         assert validate(graph) == ()
-        (energy,) = graph.query("SELECT ?joules { ?run a irt:Live_Run ; irt:Modelled_Energy ?joules }")
-        (sampled,) = graph.query("SELECT (series:integral(?run, 'power', 0, 1e9) AS ?joules) { ?run a irt:Live_Run }")
+        (energy,) = graph.query("SELECT ?joules { ?run a irt:Replayed_Run ; irt:Modelled_Energy ?joules }")
+        (sampled,) = graph.query(
+            "SELECT (series:integral(?run, 'power', 0, 1e9) AS ?joules) { ?run a irt:Replayed_Run }"
+        )
     assert energy["joules"] == pytest.approx(sampled["joules"], rel=0.05)
     assert row["measured_J"] == pytest.approx(sampled["joules"], rel=1e-4)
 
@@ -77,9 +79,10 @@ def test_a_sample_that_was_stored_is_known_by_its_time(plant: Plant) -> None:
     with plant.open() as place:
         times = StoredTimes(place)
     middle = run.started.timestamp() + run.run_time_s / 2
-    assert times.run_at("arm_2", middle) == run.run_id
+    assert times.run_in("arm_2", middle, middle) == run.run_id
     assert times.end("arm_2") == pytest.approx(run.ended.timestamp(), abs=1e-5)
-    assert times.run_at("arm_2", run.ended.timestamp() + 1.0) is None
+    later = run.ended.timestamp() + 1.0
+    assert times.run_in("arm_2", later, later) is None
 
 
 def test_a_new_log_betters_the_twin_or_leaves_it(plant: Plant) -> None:
