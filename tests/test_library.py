@@ -66,3 +66,12 @@ def test_paths_as_text_are_read_and_written(demo, tmp_path):
         irtwin.read_urdf("none.urdf")
     with pytest.raises(irtwin.errors.InputError, match="not found"):
         irtwin.diagnose("none", json_file=str(tmp_path / "gap.json"), report=str(tmp_path / "gap.html"))
+
+
+def test_a_workspace_that_cannot_be_used_is_refused_before_a_diagnosis(demo, tmp_path, monkeypatch):
+    (tmp_path / "workspace").mkdir()
+    (tmp_path / "workspace" / "irtwin.db").write_bytes(b"no database" * 1000)
+    monkeypatch.setattr("irtwin.gap.diagnosis.diagnose", lambda *_, **__: pytest.fail("diagnosed all the same"))
+    with pytest.raises(irtwin.errors.InputError, match="irtwin.db"):
+        irtwin.diagnose(demo, workspace=tmp_path / "workspace", json_file=tmp_path / "gap.json")
+    assert not (tmp_path / "gap.json").exists()

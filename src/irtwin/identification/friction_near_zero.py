@@ -52,11 +52,9 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
         for shape in effect.candidates(plain)
         if isinstance(shape, JointEffect) and shape != effect
     ]
-    found: list[Turn | None] = [None] * len(robot.joints)
-    for _ in range(2):
-        tried = [_COARSE if one is None else _around(one) for one in found]
-        blocks, pattern = _reduced(stack, open_shapes, measured, tried)
-        found = [_best(blocks, pattern, joint, shapes) for joint, shapes in enumerate(tried)]
+    found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints))
+    if any(found):
+        found = _found(stack, open_shapes, measured, [[] if one is None else _around(one) for one in found])
     return replace(
         plain,
         joints=tuple(
@@ -64,6 +62,14 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
             for joint, one in zip(plain.joints, found, strict=True)
         ),
     )
+
+
+def _found(
+    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+) -> list[Turn | None]:
+    """Return the best of the turns that are tried in each joint; None where there is none."""
+    blocks, pattern = _reduced(stack, open_shapes, motions, tried)
+    return [_best(blocks, pattern, joint, turns) if turns else None for joint, turns in enumerate(tried)]
 
 
 def _around(found: Turn) -> list[Turn]:
