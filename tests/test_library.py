@@ -72,6 +72,6 @@ def test_a_workspace_that_cannot_be_used_is_refused_before_a_diagnosis(demo, tmp
     (tmp_path / "workspace").mkdir()
     (tmp_path / "workspace" / "irtwin.db").write_bytes(b"no database" * 1000)
     monkeypatch.setattr("irtwin.gap.diagnosis.diagnose", lambda *_, **__: pytest.fail("diagnosed all the same"))
-    with pytest.raises(irtwin.errors.InputError, match="irtwin.db"):
+    with pytest.raises(irtwin.errors.InputError, match=r"irtwin\.db"):
         irtwin.diagnose(demo, workspace=tmp_path / "workspace", json_file=tmp_path / "gap.json")
     assert not (tmp_path / "gap.json").exists()
