@@ -25,7 +25,7 @@ Turn = tuple[float, float]  # width, rad/s or m/s, and exponent of `effects.fric
 _COARSE = [(width, exponent) for width in (1.5e-3, 3e-3, 6e-3, 0.012, 0.024) for exponent in (1.25, 2.0, 4.0, 10.0)]
 _FINER = [(width, exponent) for width in (0.65, 0.8, 1.0, 1.25, 1.5) for exponent in (0.75, 1.0, 1.35)]  # times these
 _WIDEST, _LEAST_EXPONENT = 0.03, 1.25  # a wider turn, or longer tails, are friction that a joint is known by
-_NEARLY_ALL = 0.9  # of the ranks: real turns have 0.95 and more, forms of friction that differ elsewhere 0.83 at most
+_NEARLY_ALL = 0.85  # of the ranks: real turns have 0.87 and more, forms of friction that differ elsewhere 0.83 at most
 _NOTHING = 1e-9  # of the largest column: less is not shown
 
 
