@@ -4,8 +4,27 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+
+
+@contextmanager
+def talking(talk: Callable[[socket.socket], None]) -> Iterator[int]:
+    """Give the port of this machine where each client is talked to, in a thread of its own, until it is gone."""
+
+    def alone(client: socket.socket) -> None:
+        with client, suppress(OSError):
+            talk(client)
+
+    def answer(server: socket.socket) -> None:
+        with suppress(OSError):
+            while True:
+                threading.Thread(target=alone, args=(server.accept()[0],), daemon=True).start()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        threading.Thread(target=answer, args=(server,), daemon=True).start()
+        yield server.getsockname()[1]
+        server.shutdown(socket.SHUT_RDWR)
 
 
 @contextmanager
@@ -14,18 +33,10 @@ def dripping(what: bytes, every: float, first: bytes = b"") -> Iterator[int]:
     over = threading.Event()
 
     def talk(client: socket.socket) -> None:
-        with client, suppress(OSError):
-            client.sendall(first)
-            while not over.wait(every):
-                client.sendall(what)
+        client.sendall(first)
+        while not over.wait(every):
+            client.sendall(what)
 
-    def answer(server: socket.socket) -> None:
-        with suppress(OSError):
-            while True:
-                threading.Thread(target=talk, args=(server.accept()[0],), daemon=True).start()
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        threading.Thread(target=answer, args=(server,), daemon=True).start()
-        yield server.getsockname()[1]
+    with talking(talk) as port:
+        yield port
         over.set()
-        server.shutdown(socket.SHUT_RDWR)

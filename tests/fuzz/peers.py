@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 
 import numpy as np
-from tests.dripping import dripping
+from tests.dripping import dripping, talking
 from tests.fuzz.values import some
 from tests.live.controller import Controller, package, serving
 
@@ -37,25 +36,16 @@ def peer(name: str, seed: int) -> Iterator[int]:
         os.waitpid(child, 0)
 
 
-@contextmanager
-def saying(pieces: Sequence[bytes], every: float = 0.0, stays: float = 0.0) -> Iterator[int]:
+def saying(pieces: Sequence[bytes], every: float = 0.0, stays: float = 0.0) -> AbstractContextManager[int]:
     """Give the port where each client is told some pieces, each `every` s; it is left `stays` s later."""
 
     def talk(client: socket.socket) -> None:
-        with client, suppress(OSError):
-            for piece in pieces:
-                client.sendall(piece)
-                time.sleep(every)
-            time.sleep(stays)
+        for piece in pieces:
+            client.sendall(piece)
+            time.sleep(every)
+        time.sleep(stays)
 
-    def answer(server: socket.socket) -> None:
-        with suppress(OSError):
-            while True:
-                threading.Thread(target=talk, args=(server.accept()[0],), daemon=True).start()
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        threading.Thread(target=answer, args=(server,), daemon=True).start()
-        yield server.getsockname()[1]
+    return talking(talk)
 
 
 def _status(rng: np.random.Generator) -> AbstractContextManager[int]:
