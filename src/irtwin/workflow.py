@@ -127,7 +127,7 @@ def diagnose(
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
-    if kept_in is not None and kept_in.exists():
+    if kept_in is not None and Workspace.is_there(kept_in, database):
         with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
             check_before(place)
             check_name(place, data_set.robot.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import zipfile
@@ -396,7 +397,7 @@ def test_a_large_database_is_looked_through_first(tmp_path: Path, monkeypatch: p
     file = tmp_path / "w" / "irtwin.db"
     content = file.read_bytes()
     file.write_bytes(content[:-4096] + bytes(4096))
-    monkeypatch.setattr(database.engine, "check", lambda engine: None)  # as for one of more than 100 MB
+    monkeypatch.setattr(database.engine, "check", lambda engine: math.inf)  # as for one of more than 100 MB
     with Workspace.existing(tmp_path / "w") as place, KnowledgeGraph(place.graph_folder) as graph:
         monkeypatch.undo()
         with pytest.raises(InputError, match="the database is damaged"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sqlite3
 import time
 from collections.abc import Callable, Container, Iterator
@@ -19,7 +20,7 @@ from irtwin.storage.read_only import connecting, may_only_be_read
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
 TRIGGERS = "irtwin_"  # what the names of irtwin's own begin with
-MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: its file takes some 0.2 s, its rows 2 s
+MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
 _DAMAGE = ("malformed", "not a database")
 _NO_UTF8 = ("ould not decode to UTF-8", "codec can't decode")  # SQLite's words of a value, Python's of a name
 _SECRETS = ("pass", "token", "secret", "key")  # in names of parameters whose values are not shown
@@ -180,20 +181,23 @@ def use_write_ahead_log(engine: Engine) -> None:
         time.sleep(0.05)
 
 
-def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> bool:
-    """Look through an SQLite database that is not larger; return whether it was. WorkspaceFault where it is damaged."""
+def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> float:
+    """Look through an SQLite database that is not larger; return its bytes, infinite where no SQLite keeps it.
+
+    Raises WorkspaceFault where it is damaged.
+    """
     if engine.dialect.name != "sqlite":
-        return False
+        return math.inf
     with engine.connect() as connection:
         size = connection.exec_driver_sql(
             "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
         ).scalar_one()
         if size > most_bytes:
-            return False
+            return float(size)
         found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
     if found != "ok":
         raise WorkspaceFault(_damaged(engine.url, " ".join(str(found).split())))
-    return True
+    return float(size)
 
 
 def check_schema(engine: Engine, tables: Container[str]) -> None:
