@@ -18,7 +18,7 @@ from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
-from irtwin.gap.data.noise_floor import REPEATS, Floor, noise_floor
+from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.document.curves import Curves
@@ -33,10 +33,8 @@ from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
-from irtwin.gap.isolation.finding import Finding, Without, find, keeping
+from irtwin.gap.isolation.finding import Finding, Without, find
 from irtwin.gap.isolation.floor_left import floor_left
-from irtwin.gap.isolation.memory import standing
-from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
 from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.torque_scale import torque_scale
@@ -107,19 +105,13 @@ class Diagnosis:
     @cached_property
     def document(self) -> Document:
         """The diagnosis as it is handed out: in JSON, in the graph, on a page."""
-        robot, gains = self.description, [cause.gain for _, cause in self.causes]
-        fallen = [cause.gain for channel in self.channels for cause in channel.fallen]
+        robot = self.description
         acted_on = [(cause.effect, cause.touched(robot)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
-        weights = self.thresholds.confidence
-        # what the weight of a gap left open was fitted to; above the band one is left open by most real robots
-        unexplained = self.left_open is not None and self.floor.source == REPEATS
-        written = tuple(
-            writing.cause(robot, *one, [*gains, *fallen], weights, self.scale, unexplained=unexplained) for one in named
-        )
+        written = tuple(writing.cause(robot, *one, self.scale, self.thresholds.criterion) for one in named)
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
-        causes = apart.causes(written, weights)
+        causes = apart.causes(written)
         found = writing.findings(robot, self.channels, named, written, self.thresholds)
         found = apart.findings(found, causes, self.thresholds.matters)
         causes = writing.folded(causes, found)
@@ -209,9 +201,8 @@ def diagnose(
         )
         torque = ExplainedTorque(stack, found, loaded)
         if case.shows("power"):
-            found = _weighed(found, power_balances(case, power_stack, torque))
+            found = replace(found, power_balances=power_balances(case, power_stack, torque))
             torque = ExplainedTorque(stack, found, loaded)
-        torque = ExplainedTorque(stack, _remembering(case, torque, predicted, seed), loaded)
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
@@ -358,18 +349,9 @@ def _torque(
     def alone(without: Set[Without]) -> tuple[Finding, Floor]:
         first = find("torque", case, system, floor.torque, seed, without, tell=tell)
         left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
-        if left is floor:
-            return first, floor
-        return find("torque", case, system, left.torque, seed, without, tell=tell), left
+        return replace(first, floor=left.torque), left
 
     return find_possible(case, alone, unknown)
-
-
-def _weighed(found: Finding, balances: tuple[PowerBalance, ...]) -> Finding:
-    """Return what torque showed with what power says of each cause, without the rivals that it refutes."""
-    pairs = zip(found.causes, balances, strict=True)
-    causes = tuple(filtered(cause, balance, catalogue()) for cause, balance in pairs)
-    return replace(found, attribution=replace(found.attribution, causes=causes), power_balances=balances)
 
 
 def _power(
@@ -394,14 +376,7 @@ def _power(
         return find("power", case, system, level, seed, without, plain, tell), floor
 
     finding, _, refusals = find_possible(case, search, unknown)
-    found = explained_power(stack, finding, torque, power_of)
-    return explained_power(stack, _remembering(case, found, torque, seed), torque, power_of), refusals
-
-
-def _remembering(case: Case, explained: Explained, torque: Torque, seed: int) -> Finding:
-    """Return the finding with the causes that stand though residuals remember longer than a block of time."""
-    kept = standing(explained, case.seen, torque, case.thresholds.selection, seed)
-    return keeping(explained.finding, kept, seed)
+    return explained_power(stack, finding, torque, power_of), refusals
 
 
 def _variants(case: Case, signal: str) -> list[Effect]:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.document import document
 from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.isolation.closing import Closing, closing
-from irtwin.gap.isolation.confidence import confidence
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.held_out import closed_fraction
 from irtwin.gap.regression.hypotheses import MISSING
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.repeats.removal import Removed
-from irtwin.gap.thresholds import Confidence, Matters
+from irtwin.gap.thresholds import Matters
 
 
 def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
@@ -94,21 +95,18 @@ class NotRepeating:
         }
         return replace(gap, torque=sizes, power=gap.power and replace(gap.power, sensor_noise=power))
 
-    def causes(self, others: Sequence[document.Cause], weights: Confidence) -> tuple[document.Cause, ...]:
+    def causes(self, others: Sequence[document.Cause]) -> tuple[document.Cause, ...]:
         """Return all causes: what takes most of what is closed in its channel goes before the others."""
-        count, own = len(others) + len(self.taken), []
+        own = []
         for one, name in zip(self.taken, self._names, strict=True):
             joints = () if one.disturbance.joint is None else (one.disturbance.joint,)
-            sure = confidence(one.t, one.gain, one.gain, 1.0, count, weights, unexplained=False)
             evidence = document.Evidence(
                 channel=one.disturbance.channel,
                 share_of_what_is_closed=self._share(one),
                 closed_where_it_acts=one.gain,
-                gain_on_groups_left_out=one.gain,
-                t_between_groups=one.t,
-                p_adjusted_for_the_catalogue=one.disturbance.p,
-                gain_of_rivals={},
-                correlation_with_rivals={},
+                gain=one.gain,
+                log_odds=_log_odds(one.disturbance.p),
+                probability_of_rivals={},
             )
             own.append(
                 document.Cause(
@@ -116,7 +114,7 @@ class NotRepeating:
                     effect=one.effect.id,
                     joints=joints,
                     scope=MISSING,
-                    confidence=sure,
+                    confidence=float(expit(evidence.log_odds)),
                     parameters=tuple(map(_quantity, one.quantities)),
                     indistinguishable_from=(),
                     evidence=evidence,
@@ -226,6 +224,11 @@ class NotRepeating:
                 )
             )
         return changes
+
+
+def _log_odds(p: float) -> float:
+    """Return the least log odds against chance that a p leaves, at even odds (Sellke, Bayarri and Berger 2001)."""
+    return -math.log(-math.e * p * math.log(p)) if 0 < p < 1 / math.e else 0.0
 
 
 def _numbers(values: np.ndarray) -> tuple[float, ...]:

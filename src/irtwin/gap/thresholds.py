@@ -173,7 +173,7 @@ class Local:
         2.3,
         "least t, between stretches of time, of the shape that is tried",
         _ERRORS,
-        "as `selection.least_t`",
+        "decisions/gap-local-effects.md",
     )
     least_share: float = _threshold(
         0.04,
@@ -184,85 +184,16 @@ class Local:
 
 
 @dataclass(frozen=True)
-class Selection:
-    """Which hypothesis becomes a cause."""
+class Criterion:
+    """How likely a structure of effects is: see `docs/how-it-decides.md`."""
 
-    least_gain: float = _threshold(0.08, "least gain of a cause", _RESIDUAL, "decisions/gap-bounds-of-a-cause.md")
-    least_of_floor_in_power: float = _threshold(
-        0.25, "least gain of a cause of power", _FLOOR, "decisions/gap-least-cause-of-power.md"
+    misfit: float = _threshold(
+        0.063, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
     )
-    least_of_floor_imitated: float = _threshold(
-        0.5,
-        "least gain of an effect that friction of another form imitates",
-        _FLOOR,
-        "decisions/gap-effects-that-friction-imitates.md",
+    certainty: float = _threshold(
+        8.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
     )
-    alpha: float = _threshold(0.02, "largest p, adjusted for the catalogue", _P, "decisions/gap-bounds-of-a-cause.md")
-    large_gain: float = _threshold(0.3, "gain from which `alpha_of_large` holds", _RESIDUAL, _CASES)
-    alpha_of_large: float = _threshold(0.1, "largest p of a large gain", _P, "decisions/gap-bounds-of-a-cause.md")
-    alpha_where_remembered: float = _threshold(
-        0.1,
-        "largest p, adjusted for the catalogue, with blocks as alike as residuals are, where runs are few",
-        _P,
-        "decisions/gap-residuals-that-remember.md",
-    )
-    least_t: float = _threshold(2.3, "least t of the gain", _ERRORS, "decisions/gap-bounds-of-a-cause.md")
-    second_joint_gain: float = _threshold(
-        0.5, "least gain at a second joint", "share of `least_gain`", "decisions/gap-second-joints.md"
-    )
-    second_joint_t: float = _threshold(2.0, "least t at a second joint", _ERRORS, "decisions/gap-second-joints.md")
-    few_groups: float = _threshold(
-        3.0, "a rare effect speaks in no more groups", "groups, effectively", "decisions/gap-rare-effects.md"
-    )
-    rare_gain: float = _threshold(0.12, "least gain of a rare effect", _RESIDUAL, "decisions/gap-rare-effects.md")
-    rare_lead: float = _threshold(
-        3.0, "least gain of a rare effect", "times the best common effect's", "decisions/gap-rare-effects.md"
-    )
-    leads_too: float = _threshold(
-        0.9, "least gain at another joint where the same effect is taken along", "share of the best there", _CASES
-    )
-    plain_first: float = _threshold(
-        0.5,
-        "least gain of a plain form that goes before what refines it",
-        "share of the best",
-        "decisions/gap-plain-forms-first.md",
-    )
-    as_good: float = _threshold(
-        0.05, "of equals within it the least flexible is taken", _OF_GAIN, "decisions/gap-least-flexible-of-equals.md"
-    )
-    speaks: float = _threshold(
-        0.05,
-        "a group counts where a hypothesis adds so much",
-        "share of what it adds in its strongest group",
-        "decisions/gap-groups-that-count.md",
-    )
-    fewest_speaking: int = _threshold(3, "with fewer such groups all count", "groups", _JUDGEMENT)
-
-
-@dataclass(frozen=True)
-class Ambiguity:
-    """Which effects form an ambiguity group with a cause."""
-
-    rival_gain: float = _threshold(
-        0.8, "least gain of an effect of the group", _OF_GAIN, "decisions/gap-ambiguity-group.md"
-    )
-    apart: float = _threshold(2.0, "a gain so far behind is worse", _ERRORS, "decisions/gap-ambiguity-group.md")
-    no_difference: float = _threshold(0.01, "a smaller difference of gains is none", _OF_GAIN, _JUDGEMENT)
-    least_share: float = _threshold(
-        0.01,
-        "least gain to be named",
-        "share of what the largest cause gains in the same equations",
-        "decisions/gap-bounds-of-a-cause.md",
-    )
-
-
-@dataclass(frozen=True)
-class Changes:
-    """When an effect has changed since the reference runs."""
-
-    before: float = _threshold(
-        0.5, "with so much of its gain in the reference runs, they have it too", "share of the observed", _JUDGEMENT
-    )
+    least_rival: float = _threshold(0.1, "an effect is named as a rival of a cause from it", _P, _JUDGEMENT)
 
 
 @dataclass(frozen=True)
@@ -325,37 +256,6 @@ class Matters:
     )
 
 
-_LOGIT = "logit"
-_FITTED = "607 causes of 836 development cases; bench/blind/fit_confidence.py"
-
-
-@dataclass(frozen=True)
-class Confidence:
-    """The weights of the logistic regression that gives a cause's confidence."""
-
-    constant: float = _threshold(2.780, "constant", _LOGIT, _FITTED)
-    per_t: float = _threshold(0.023, "per unit of t, up to `most_t`", _LOGIT, _FITTED)
-    most_t: float = _threshold(10.0, "t counts up to it", "1", _JUDGEMENT)
-    per_closed: float = _threshold(1.513, "for all of the gap closed where the cause acts", _LOGIT, _FITTED)
-    per_gain: float = _threshold(0.982, "per natural logarithm of the gain, up to 1", _LOGIT, _FITTED)
-    least_gain: float = _threshold(1e-3, "the gain counts from it", "mean square of what was left", _JUDGEMENT)
-    per_share: float = _threshold(0.356, "per natural logarithm of the gain over the largest", _LOGIT, _FITTED)
-    per_count: float = _threshold(-2.416, "per natural logarithm of the number of causes", _LOGIT, _FITTED)
-    unexplained: float = _threshold(-2.640, "beside the verdict `unexplained`", _LOGIT, _FITTED)
-    least_of_repeats: float = _threshold(
-        0.1, "what is left of it where halves of the time contradict each other", "share", _JUDGEMENT
-    )
-    not_in_each_half: float = _threshold(
-        0.5, "what is left of it where not every half of the time shows a cause", "share", "even odds; judgement"
-    )
-    of_rivals: float = _threshold(
-        0.5, "what rivals have of what the cause's confidence leaves", "share", "judgement, not calibrated"
-    )
-    family_more: float = _threshold(
-        0.0, "a family beyond its likeliest cause", _LOGIT, "0 is the least there can be; decisions/gap-families.md"
-    )
-
-
 @dataclass(frozen=True)
 class Places:
     """Which joints and regimes are named."""
@@ -399,7 +299,7 @@ class NextExperiment:
         0.06,
         "least of a cause that its rival must not imitate",
         "share of its mean square",
-        "a little more than `selection.as_good`",
+        _JUDGEMENT,
     )
     identical: float = _threshold(1e-3, "less apart is the same in other words", "share of its mean square", _JUDGEMENT)
     helps: float = _threshold(1.1, "an experiment worth making separates so much", "times what is", _JUDGEMENT)
@@ -422,15 +322,12 @@ class Thresholds:
     some_payload: SomePayload = SomePayload()
     ripples: Ripples = Ripples()
     local: Local = Local()
-    selection: Selection = Selection()
-    ambiguity: Ambiguity = Ambiguity()
-    changes: Changes = Changes()
+    criterion: Criterion = Criterion()
     power_consistency: PowerConsistency = PowerConsistency()
     scale_of_torque: ScaleOfTorque = ScaleOfTorque()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()
     matters: Matters = Matters()
-    confidence: Confidence = Confidence()
     places: Places = Places()
     regimes: Regimes = Regimes()
     experiment: NextExperiment = NextExperiment()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -18,8 +17,6 @@ from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.confidence import as_large_as, confidence, of_rivals, where_runs_are_few
-from irtwin.gap.isolation.confidence import of_family as confidence_of_family
 from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
@@ -28,11 +25,11 @@ from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
-from irtwin.gap.thresholds import Confidence, Thresholds
+from irtwin.gap.thresholds import Criterion, Thresholds
 from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import TorqueScale
 
-_HALVES = ("first", "last")
+_TOLD = 0.01  # probability of a rival that is listed
 
 
 def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> document.Gap:
@@ -79,27 +76,19 @@ def cause(
     finding: Finding,
     one: Cause,
     name: str,
-    gains: Sequence[float],
-    weights: Confidence,
     scale: TorqueScale | None,
-    *,
-    unexplained: bool,
+    limits: Criterion,
 ) -> document.Cause:
-    """Return a cause, `name` its id, with its parameters and evidence; `gains`: of all that the search named.
-
-    `unexplained`: the gap stays so, however sure its causes are.
-    """
-    closed, share = finding.closed(one), min(one.gain / max(gains), 1.0)
-    sure = confidence(one.t, one.gain, closed, share, as_large_as(one.gain, gains), weights, unexplained=unexplained)
+    """Return a cause, `name` its id, with its parameters and evidence."""
     return document.Cause(
         id=name,
         effect=one.effect,
         joints=one.touched(robot),
         scope=one.scope,
-        confidence=where_runs_are_few(sure, one.p_remembered, one.repeats, one.in_halves, weights),
+        confidence=one.probability,
         parameters=parameters(robot, finding, one, scale),
-        indistinguishable_from=one.rivals,
-        evidence=_evidence(finding, one, closed),
+        indistinguishable_from=one.not_told_from(limits.least_rival),
+        evidence=_evidence(finding, one),
     )
 
 
@@ -121,7 +110,7 @@ def findings(
     ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
     found = []
     for (channel, branch), own, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
-        members = [_members(cause, limits.confidence) for cause in own]
+        members = [_members(cause) for cause in own]
         classes = [sum(one.confidence for one in some) for some in members]
         of_family = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
         found.append(
@@ -131,7 +120,7 @@ def findings(
                 joints=on,
                 scope=branch.scope,
                 channel=channel.name,
-                confidence=confidence_of_family(of_family, limits.confidence),
+                confidence=max(of_family),
                 share=branch.closing.share,
                 share_interval95=branch.closing.interval,
                 share_of=branch.closing.share_of,
@@ -155,36 +144,24 @@ def _joints(robot: Robot, causes: Sequence[document.Cause], likely: float) -> tu
     return tuple(joint for joint in robot.joint_names if joint in touched)
 
 
-def _members(cause: document.Cause, weights: Confidence) -> list[document.Member]:
-    """Return a cause and what the data cannot tell from it.
-
-    What few runs leave open is open for its rivals as well.
-    """
-    why = cause.evidence
-    shown = None if why.halves_that_show_it is None else [half in why.halves_that_show_it for half in _HALVES]
-    there = where_runs_are_few(1.0, why.p_where_residuals_remember, why.part_that_repeats, shown, weights)
-    of_form = of_rivals(min(cause.confidence / there, 1.0), cause.indistinguishable_from, why.gain_of_rivals, weights)
-    rivals = {rival: sure * there for rival, sure in of_form.items()}
+def _members(cause: document.Cause) -> list[document.Member]:
+    """Return a cause and what the data cannot tell from it."""
+    rivals = {rival: cause.evidence.probability_of_rivals[rival] for rival in cause.indistinguishable_from}
     return [
         document.Member(cause=cause.id, effect=effect, family=catalogue()[effect].family, confidence=sure)
         for effect, sure in {cause.effect: cause.confidence, **rivals}.items()
     ]
 
 
-def _evidence(finding: Finding, one: Cause, closed: float) -> document.Evidence:
+def _evidence(finding: Finding, one: Cause) -> document.Evidence:
     runs, window = acting(one.variants) or (None, None)
     return document.Evidence(
         channel=finding.name,
         share_of_what_is_closed=finding.share(one),
-        closed_where_it_acts=closed,
-        gain_on_groups_left_out=one.gain,
-        t_between_groups=one.t,
-        p_adjusted_for_the_catalogue=one.p,
-        p_where_residuals_remember=one.p_remembered,
-        part_that_repeats=one.repeats,
-        halves_that_show_it=None if one.in_halves is None else tuple(compress(_HALVES, one.in_halves)),
-        gain_of_rivals=one.rival_gains,
-        correlation_with_rivals=one.rival_correlations,
+        closed_where_it_acts=finding.closed(one),
+        gain=one.gain,
+        log_odds=one.log_odds,
+        probability_of_rivals={rival: chance for rival, chance in one.rivals.items() if chance >= _TOLD},
         **_balance(finding, one),
         runs=runs,
         window=window,

@@ -80,33 +80,25 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Why a cause is held responsible. Shares and correlations are 0 to 1, the other numbers have no unit.
+    """Why a cause is held responsible. Shares and probabilities are 0 to 1, the other numbers have no unit.
 
-    Gains are of weighted squares, a sample, on groups of runs left out; `t` is a gain's mean over its standard error,
-    between groups; `p` is adjusted for the whole catalogue. Rivals are all effects that compete, by id.
+    `gain`: what it explains beside the other causes, in mean squares of what all leave; `log_odds`, natural: that it is
+    there beside the others, against that nothing is in its place. Rivals are the effects that could be, by id.
     `power_says`: whether power takes what a cause adds to torque ("mechanical"), only the sensor shows it ("sensor"),
     or neither is sure ("undecided"); `power_on_explained_torque_says`: of a cause of power, "electrical" or "meter".
-    Where runs are few: `p_where_residuals_remember`, the less of what random signs and halves of the time say;
-    `part_that_repeats`: of what a cause closes in a half of the time, what it closes with the size that it has in the
-    other; `halves_that_show_it` by themselves.
     `runs` and `window` (s of the clock): where it acts in some runs, or for a while, only.
     """
 
     channel: Channel
     share_of_what_is_closed: float | None
     closed_where_it_acts: float
-    gain_on_groups_left_out: float
-    t_between_groups: float
-    p_adjusted_for_the_catalogue: float
-    gain_of_rivals: Mapping[str, float]
-    correlation_with_rivals: Mapping[str, float]
+    gain: float
+    log_odds: float
+    probability_of_rivals: Mapping[str, Share]
     power_on_explained_torque_says: str | None = None
     power_says: str | None = None
     gain_in_power_if_mechanical: float | None = None
     t_in_power_between_groups: float | None = None
-    p_where_residuals_remember: Share | None = None
-    part_that_repeats: Share | None = None
-    halves_that_show_it: tuple[Annotated[str, OneOf("first", "last")], ...] | None = None
     runs: tuple[str, ...] | None = None
     window: Interval | None = field(default=None, metadata=goes_with("runs"))
 

@@ -303,7 +303,8 @@ def _rivals(channel: PlannedEquations, cause: Cause) -> _Question | None:
     effects = [cause.effect]
     places: list[tuple[tuple[Shape, ...], ...]] = [tuple((variant.columns,) for variant in cause.variants)]
     others = tuple(k for k in channel.finding.chosen if k not in cause.columns)
-    for rival in cause.rivals[: channel.thresholds.experiment.most_rivals - 1]:
+    rivals = cause.not_told_from(channel.thresholds.criterion.least_rival)
+    for rival in rivals[: channel.thresholds.experiment.most_rivals - 1]:
         of_rival = known.get((rival, cause.scope)) or known.get((rival, _other(cause.scope))) or {}
         found = tuple(of_rival[joint] for joint in cause.joints if joint in of_rival)
         if not found or len(found) < len(cause.joints):

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.cross_validation import scores
 from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.projection import scores
 
 _LEAST = 1.0  # squares of a column in units of its prior: with less the prior decides
 

@@ -16,13 +16,12 @@ from irtwin.gap.isolation.estimates import BesidePower
 from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.finding import Finding, Without, attributed, finding_of
 from irtwin.gap.isolation.floor_left import floor_left
-from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
-from irtwin.gap.regression.cross_validation import attempt
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
-from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.regression.progress import Tell
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.power_line import power_slope
@@ -66,12 +65,11 @@ def find_beside_power(
     power = TwinPower(stack, case.with_power, case.grouping, explained)
     left = floor_left(case, floor, explained, power)
     if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * noise_before(power.system)[0]:
-        shapes = _best_shapes(equations.whole, both)
+        shapes = _best_shapes(both)
         del equations  # before as much memory is taken once more
         equations = about(explained, power, shapes)
-    elif left is floor:
-        return first, floor
-    return _find(case, equations, left, seed, without, tell)[0], left
+        return _find(case, equations, left, seed, without, tell)[0], left
+    return replace(first, floor=left.torque), left
 
 
 def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:
@@ -85,13 +83,9 @@ def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tup
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _best_shapes(system: System, found: Attribution) -> list[Effect]:
+def _best_shapes(found: Attribution) -> list[Effect]:
     """Return the effects on torque, each joint's in the shape that explains most beside what was found."""
-    chosen = [k for cause in found.causes for k in cause.columns]
-    every = [one.variants for one in found.hypotheses if one.variants[0].effect.signal == "torque"]
-    best = attempt(system, system.moments(found.noise), chosen, every).best
-    variants = [variant for own in every for variant in own]
-    kept = [*(variants[k] for k in best), *(variant for cause in found.causes for variant in cause.variants)]
+    kept = [*found.shapes, *(variant for cause in found.causes for variant in cause.variants)]
     shapes: dict[tuple[int, str | None], Effect] = {}
     for variant in kept:
         effect, joint = variant.effect, variant.terms[0].joint
@@ -109,8 +103,7 @@ def _find(
 ) -> tuple[Finding, Attribution]:
     """Return what both equations show of torque, and all that they show."""
     whole, torque = equations.whole, equations.torque
-    levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
-    both = attributed(case, whole, np.concatenate(levels), seed, without, tell)
+    both = attributed(case, whole, without, tell)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(equations, tuple(of_power), both.noise)
@@ -135,5 +128,5 @@ def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:
         both.noise[:-1],
         tuple(replace(one, variants=tuple(map(equations.in_torque, one.variants))) for one in mine),
         both.visible[inside],
-        both.share_visible[inside],
+        tuple(equations.in_torque(both.shapes[k]) for k in inside),
     )

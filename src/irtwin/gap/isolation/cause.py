@@ -1,38 +1,19 @@
-"""The cause: an effect that the data show beyond the twin's, and how sure its gain is."""
+"""The cause: an effect that the data show beyond the twin's, and how sure that is."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from irtwin.gap.regression.cross_validation import Trial
-from irtwin.gap.regression.hypotheses import CHANGED, Hypothesis, Variant
-from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.thresholds import Selection
+from irtwin.gap.regression.hypotheses import Variant
 from irtwin.robot.description import Robot
 
 
 @dataclass(frozen=True)
-class Find:
-    """A hypothesis taken in one shape; gain, t and p as a cause's."""
-
-    hypothesis: Hypothesis
-    variant: Variant
-    gain: float
-    t: float
-    p: float
-
-
-@dataclass(frozen=True)
 class Cause:
-    """An effect in one or more joints (the variants chosen), with what it explains on groups left out.
+    """An effect in one or more joints (the variants chosen), with what it explains beside the other causes.
 
-    gain: of weighted squares, a row; t: of the gain, between groups; p: adjusted for the whole catalogue; `rivals`: the
-    effects that explain it as well; `rival_gains` and `rival_correlations` (canonical, 0 to 1) of all that compete.
-    Where runs are few: `p_remembered` as p, where residuals remember; `repeats`, 0 to 1: of what it closes in a half of
-    the time, what it closes with the other half's size; `in_halves`: whether the first and the last half show it by
-    themselves. None: not judged.
+    gain: of weighted squares, a row of each equation; log_odds: that it is there beside the other causes, against that
+    nothing is in its place; probability: against all that could be; `rivals`: each other effect's, all scopes.
     """
 
     effect: str
@@ -40,14 +21,14 @@ class Cause:
     joints: tuple[str, ...]
     variants: tuple[Variant, ...]
     gain: float
-    t: float
-    p: float
-    rivals: tuple[str, ...] = ()
-    rival_gains: dict[str, float] = field(default_factory=dict)
-    rival_correlations: dict[str, float] = field(default_factory=dict)
-    p_remembered: float | None = None
-    repeats: float | None = None
-    in_halves: tuple[bool, bool] | None = None
+    log_odds: float
+    probability: float
+    rivals: dict[str, float] = field(default_factory=dict)
+
+    def not_told_from(self, least: float) -> tuple[str, ...]:
+        """Return the effects that the data do not tell from it: as likely as `least`, the likeliest first."""
+        named = [rival for rival, chance in self.rivals.items() if chance >= least]
+        return tuple(sorted(named, key=lambda rival: -self.rivals[rival]))
 
     @property
     def of_bodies(self) -> bool:
@@ -69,33 +50,3 @@ class Cause:
     def columns(self) -> tuple[int, ...]:
         """The indices of its columns."""
         return tuple(k for variant in self.variants for k in variant.columns)
-
-
-def gains(system: System, trial: Trial) -> np.ndarray:
-    """Return each hypothesis' gain per row in each group, (H, G)."""
-    return np.asarray((trial.start - trial.loss) / rows(system))
-
-
-def rows(system: System) -> np.ndarray:
-    """Return how many rows each group has, (G,)."""
-    return np.asarray(np.maximum(system.rows.max(axis=1), 1.0))
-
-
-def judged(system: System, scope: str) -> np.ndarray:
-    """Return whether a group counts for a hypothesis of a scope, (G,)."""
-    return np.asarray(system.group_observed if scope == CHANGED else np.ones(system.groups, dtype=bool))
-
-
-def between_groups(gain: np.ndarray, said: np.ndarray, limits: Selection) -> float:
-    """Return the t of the gain between groups, (G,): mean over standard error of its signed root; 0 of one group.
-
-    The root, since a group in which much happens gains more than others: that speaks not against an effect. Nor does
-    a group in which it has nothing to say: of what it adds, `said` (G,), there is next to nothing.
-    """
-    speaks = said >= limits.speaks * said.max(initial=0.0)
-    if speaks.sum() >= limits.fewest_speaking:
-        gain = gain[speaks]
-    if len(gain) < 2:
-        return 0.0
-    root = np.sign(gain) * np.sqrt(np.abs(gain))
-    return float(root.mean() / max(root.std(ddof=1) / np.sqrt(len(root)), 1e-12))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.effects.effect import Effect
-from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.thresholds import Detectability
 from irtwin.signals.motion import Motion
 
@@ -42,8 +42,8 @@ def untestable(
     for _, found in channels:
         for k, hypothesis in enumerate(found.hypotheses):
             name = hypothesis.effect
-            if found.visible[k] > visible.get(name, -np.inf):
-                visible[name], share[name] = float(found.visible[k]), float(found.share_visible[k])
+            if found.visible[k, 0] > visible.get(name, -np.inf):
+                visible[name], share[name] = found.visible[k].tolist()
     reasons = []
     for effect in known:
         if effect.id in inside:

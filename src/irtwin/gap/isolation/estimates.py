@@ -32,10 +32,6 @@ class BesidePower:
         covariance, noise = fitted.covariance[np.ix_(used, used)], fitted.noise[: len(torque.pattern)]
         return Estimate(fitted.values[used], covariance, noise, fitted.blocks)
 
-    def keeping(self, chosen: Sequence[int]) -> BesidePower:
-        """Return the same where `chosen` columns of torque alone are left."""
-        return replace(self, noise=self.equations.whole.residual_rms(self._columns(chosen), self.noise))
-
     def _columns(self, chosen: Sequence[int]) -> list[int]:
         return [*map(self.equations.in_whole, chosen), *self.columns]
 

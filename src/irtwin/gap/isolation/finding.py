@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,13 +11,12 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.changes import shown_before
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.estimates import BesidePower, estimate_of
-from irtwin.gap.isolation.forward_selection import Attribution, attribute
 from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.isolation.shares import closed_squares, shares
+from irtwin.gap.isolation.structure_search import Attribution, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
@@ -37,8 +36,7 @@ class Finding:
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
     each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
     of each; `part`: theirs of all that is closed, beside what does not repeat; `plain`: power's equation on the torque
-    of the twin as it is, where `system` stands on torque that causes explain; `beside`: power's, if both were fitted;
-    `fallen`: causes that the search named and chance reaches.
+    of the twin as it is, where `system` stands on torque that causes explain; `beside`: power's, if both were fitted.
     """
 
     name: str
@@ -54,7 +52,6 @@ class Finding:
     part: float = 1.0
     plain: System | None = None
     beside: BesidePower | None = None
-    fallen: tuple[Cause, ...] = ()
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -150,29 +147,8 @@ def find(
     `plain` as a finding's; `tell` as for `attribute`.
     """
     places = (None,) if name == "power" else case.robot.joint_names
-    found = attributed(case, system, floor, seed, without, tell)
+    found = attributed(case, system, without, tell)
     return finding_of(name, places, case.observed, system, found, floor, seed, plain)
-
-
-def keeping(finding: Finding, causes: Sequence[Cause], seed: int) -> Finding:
-    """Return a finding with some of its causes alone, each perhaps at more joints, all fitted again."""
-    system, found = finding.system, finding.attribution
-    chosen = [k for cause in causes for k in cause.columns]
-    if chosen == finding.chosen:
-        return replace(finding, attribution=replace(found, causes=tuple(causes)))
-    places = {(cause.effect, cause.scope) for cause in causes}
-    fallen = tuple(cause for cause in finding.causes if (cause.effect, cause.scope) not in places)
-    beside = finding.beside and finding.beside.keeping(chosen)
-    noise = system.residual_rms(chosen, found.noise) if beside is None else beside.noise[:-1]
-    found = replace(found, causes=tuple(causes), noise=noise)
-    where = finding.name, finding.places, finding.observed
-    kept = finding_of(*where, system, found, finding.floor, seed, finding.plain, beside)
-    said = tuple(
-        balance
-        for cause, balance in zip(finding.causes, finding.power_balances, strict=False)
-        if (cause.effect, cause.scope) in places
-    )
-    return replace(kept, power_balances=said, fallen=fallen)
 
 
 def finding_of(
@@ -195,25 +171,10 @@ def finding_of(
 
 
 def attributed(
-    case: Case,
-    system: System,
-    floor: np.ndarray | None,
-    seed: int,
-    without: Set[Without] = frozenset(),
-    tell: Tell | None = None,
+    case: Case, system: System, without: Set[Without] = frozenset(), tell: Tell | None = None
 ) -> Attribution:
-    """Attribute the gap of a system, `without` some effects; floor: (g,) RMS.
-
-    What the reference runs show as well has not changed.
-    """
-    inside = _inside(case, system)
-    candidates = _hypotheses(system, inside, without)
-    found = attribute(system, candidates, seed, case.thresholds, floor, tell)
-    known = {effect for effect, _ in inside}
-    while old := shown_before(system, found.causes, found.noise, known, case.thresholds.changes):
-        candidates = [one for one in candidates if not (one.effect in old and one.scope == CHANGED)]
-        found = attribute(system, candidates, seed, case.thresholds, floor, tell)
-    return found
+    """Attribute the gap of a system, `without` some effects."""
+    return attribute(system, _hypotheses(system, _inside(case, system), without), case.thresholds.criterion, tell)
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:

@@ -9,7 +9,7 @@ from math import factorial
 
 import numpy as np
 
-from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before
 

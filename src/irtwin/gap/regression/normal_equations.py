@@ -62,6 +62,10 @@ class System:
         """The index of the first candidate column that is zero outside observed runs."""
         return self.base + len(self.columns)
 
+    def column(self, k: int) -> Column:
+        """Return the candidate column of an index, as it is or as a change."""
+        return self.columns[(k - self.base) % len(self.columns)]
+
     def equations(self, columns: Sequence[int]) -> np.ndarray:
         """Return (g,) whether an equation of their own signal has any of some candidate columns of one effect."""
         own = [k - len(self.columns) if k >= self.changed else k for k in columns]

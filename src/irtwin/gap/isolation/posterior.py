@@ -1,0 +1,160 @@
+"""The posterior of structures: how likely hypotheses are beside others, by what they explain.
+
+What a structure leaves along a hypothesis' columns is noise, disagreement between groups, and a misfit that no effect
+names. Its variance, a row, is `v = misfit^2 + disagreement / rows`, known as from `certainty` earlier looks; what is
+left is then Student's, and what explains it has a Gaussian prior. The odds of k coefficients that explain `gain` a row,
+of the information `A`, are
+
+    prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) / sqrt(det(1 + A / (rows v)))
+
+over the shapes of an effect, each as likely. An effect is at one of its joints as likely as at another; where it is at
+one, it is at a further one with even odds. Docs: `docs/how-it-decides.md`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from irtwin.gap.regression.evidence import Evidence, evidence
+from irtwin.gap.regression.hypotheses import Hypothesis, Variant
+from irtwin.gap.regression.moments import Moments
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.thresholds import Criterion
+
+
+@dataclass(frozen=True)
+class Prior:
+    """The prior of hypotheses: `effects` in each scope and `joints` are as likely as others."""
+
+    effects: int
+    joints: int
+
+    @classmethod
+    def of(cls, candidates: Sequence[Hypothesis]) -> Prior:
+        """Take it from all candidates of a search."""
+        joints = {one.joint for one in candidates if one.joint}
+        return cls(len({(one.effect, one.scope) for one in candidates}), max(len(joints), 1))
+
+    def log_odds(self, one: Hypothesis, found: Sequence[Hypothesis]) -> float:
+        """Return the log odds of a hypothesis beside those that were found."""
+        if one.joint and any((one.effect, one.scope) == (each.effect, each.scope) for each in found):
+            return 0.0
+        return -float(np.log(self.effects * (self.joints if one.joint else 1)))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """H hypotheses beside a structure; `owner` (V,): whose each variant of the `evidence` is."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    owner: np.ndarray
+    prior: np.ndarray
+    evidence: Evidence
+    limits: Criterion
+
+    @classmethod
+    def beside(
+        cls,
+        system: System,
+        moments: Sequence[Moments],
+        found: Sequence[tuple[Hypothesis, Variant]],
+        candidates: Sequence[Hypothesis],
+        prior: Prior,
+        limits: Criterion,
+    ) -> Posterior:
+        """Try candidates beside what was found, everything refitted."""
+        variants = [variant for one in candidates for variant in one.variants]
+        owner = np.repeat(np.arange(len(candidates)), [len(one.variants) for one in candidates])
+        chosen = [k for _, variant in found for k in variant.columns]
+        known = [one for one, _ in found]
+        log_prior = [
+            prior.log_odds(one, known) - np.log(len(one.variants) * one.variants[0].effect.found_among)
+            for one in candidates
+        ]
+        seen = evidence(system, moments, chosen, variants)
+        return cls(tuple(candidates), owner, np.array(log_prior), seen, limits)
+
+    @cached_property
+    def variance(self) -> np.ndarray:
+        """(V,) of what is left along a variant's columns, a row, in units of the noise."""
+        noise = self.evidence.disagreement / self.evidence.rows_that_speak
+        return np.asarray(self.limits.misfit**2 + noise)
+
+    @cached_property
+    def log_odds(self) -> np.ndarray:
+        """(H,) log odds that a hypothesis is true beside the structure, against that nothing more is."""
+        by_shape = np.array(
+            [
+                self._explaining(self.evidence.gain[k], self.variance[k], len(information)) - self._size(k, variance)
+                for k, (information, variance) in enumerate(zip(self.evidence.information, self.variance, strict=True))
+            ]
+        )
+        return np.asarray(self.prior + np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes]))
+
+    @cached_property
+    def shape(self) -> np.ndarray:
+        """(H,) the index of each hypothesis' variant that explains most, its freedom counted."""
+        size = np.array([self._size(k, variance) for k, variance in enumerate(self.variance)])
+        said = np.array(
+            [
+                self._explaining(gain, variance, len(own)) - less
+                for gain, variance, own, less in zip(
+                    self.evidence.gain, self.variance, self.evidence.information, size, strict=True
+                )
+            ]
+        )
+        return np.array([own[np.argmax(said[own])] for own in self._shapes])
+
+    def variant(self, place: int) -> Variant:
+        """Return the shape of a hypothesis that explains most."""
+        return self.evidence.variants[int(self.shape[place])]
+
+    def leader(self) -> int | None:
+        """Return the place of the hypothesis to take: of those likelier than nothing, the one that explains most,
+        or what is more likely in its place; None where none is.
+        """
+        likely = np.flatnonzero(self.log_odds > 0)
+        if not len(likely):
+            return None
+        most = int(likely[np.argmax(self.evidence.explained[self.shape[likely]])])
+        near = [int(k) for k in likely if overlap(self.hypotheses[k], self.hypotheses[most])]
+        return near[int(np.argmax(self.weights(near)[0]))]
+
+    def weights(self, near: Sequence[int]) -> tuple[np.ndarray, float]:
+        """Return the log weights of hypotheses that compete for one place, and of none of them.
+
+        Each by what it leaves of what the best explains: the best tells how well that can be explained.
+        """
+        shape, seen = self.shape[list(near)], self.evidence
+        best = int(shape[np.argmax(seen.explained[shape])])
+        variance, rows, count = float(self.variance[best]), seen.rows_that_speak[best], len(seen.information[best])
+
+        def left(squares: np.ndarray) -> np.ndarray:
+            return -np.asarray(self._explaining(squares / rows, variance, count))
+
+        size = [self._size(int(k), variance) for k in shape]
+        behind = seen.explained[best] - seen.explained[shape]
+        return self.prior[list(near)] - size + left(behind), float(left(seen.explained[best]))
+
+    def _explaining(self, gain: np.ndarray | float, variance: float, count: int) -> np.ndarray | float:
+        certainty = self.limits.certainty
+        return 0.5 * (certainty + count) * np.log1p(gain / (certainty * variance))
+
+    def _size(self, variant: int, variance: float) -> float:
+        """Return the log of how much room a variant's coefficients have, in units of what the data leave open."""
+        information = self.evidence.information[variant]
+        room = np.eye(len(information)) + information / (self.evidence.rows_that_speak[variant] * variance)
+        return 0.5 * float(np.linalg.slogdet(room)[1])
+
+    @cached_property
+    def _shapes(self) -> list[np.ndarray]:
+        return [np.flatnonzero(self.owner == place) for place in range(len(self.hypotheses))]
+
+
+def overlap(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether two hypotheses are at one joint, or one of them anywhere."""
+    return one.joint == other.joint or None in (one.joint, other.joint)

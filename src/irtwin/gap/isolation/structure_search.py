@@ -1,0 +1,168 @@
+"""The search for the likeliest structure: which effects, at which joints, explain what the twin leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.posterior import Posterior, Prior, overlap
+from irtwin.gap.regression.evidence import visibility
+from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.progress import Tell, paced
+from irtwin.gap.thresholds import Criterion
+
+_MOST = 16  # hypotheses of a structure
+_SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
+
+Found = tuple[Hypothesis, Variant]
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """The causes found, ranked by gain; `noise` (g,) what they leave; `visible` (H, 2) of each hypothesis before any:
+    what it adds beyond what the twin imitates, as a mean square in units of the noise, and as a part of all it adds;
+    `shapes` of each beside the causes.
+    """
+
+    causes: tuple[Cause, ...]
+    noise: np.ndarray
+    hypotheses: tuple[Hypothesis, ...]
+    visible: np.ndarray
+    shapes: tuple[Variant, ...]
+
+
+def attribute(
+    system: System, candidates: Sequence[Hypothesis], limits: Criterion, tell: Tell | None = None
+) -> Attribution:
+    """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
+
+    Hypotheses are added one by one while one is likelier than not, everything refitted; then each in turn is taken out
+    and looked for anew. `tell` is told how far that has come, where it takes long.
+    """
+    candidates = in_scope(candidates, both=system.both)
+    search = _Search(system, candidates, Prior.of(candidates), limits, paced(tell))
+    noise = system.residual_rms((), system.residual_rms((), np.ones(len(system.pattern))))
+    before = search.beside((), noise)
+    shapes = [before.variant(place) for place in range(len(before.hypotheses))]
+    visible = visibility(system, system.moments(noise), shapes)
+    found, noise = search.settled(*search.forward(before, noise))
+    known = {(one.effect, one.scope, one.joint): variant for one, variant in found}
+    after = search.beside(found, noise)
+    known |= {(one.effect, one.scope, one.joint): after.variant(k) for k, one in enumerate(after.hypotheses)}
+    best = [known.get((one.effect, one.scope, one.joint), shape) for one, shape in zip(candidates, shapes, strict=True)]
+    return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, tuple(best))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The search on one system."""
+
+    system: System
+    candidates: Sequence[Hypothesis]
+    prior: Prior
+    limits: Criterion
+    tell: Tell
+
+    def beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
+        """Try what may stand beside a structure; equations are weighed by `noise` (g,)."""
+        taken = {k for _, variant in found for k in variant.columns}
+        left = [
+            one
+            for one in self.candidates
+            if not any(set(variant.columns) & taken for variant in one.variants)
+            and not any(_same_place(one, each) for each, _ in found)
+        ]
+        self.tell(f"  {len(left)} hypotheses, beside {len(found)} that are found")
+        return Posterior.beside(self.system, self.system.moments(noise), found, left, self.prior, self.limits)
+
+    def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+        """Add what is likelier than nothing, the one that explains most first; return it and what it leaves, (g,)."""
+        found: list[Found] = []
+        while len(found) < _MOST and (place := posterior.leader()) is not None:
+            found.append((posterior.hypotheses[place], posterior.variant(place)))
+            noise = self.left(found, noise)
+            posterior = self.beside(found, noise)
+        return found, noise
+
+    def settled(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+        """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
+        for _ in range(_SWEEPS):
+            before = list(found)
+            for one in before:
+                rest = [each for each in found if each is not one]
+                posterior = self.beside(rest, noise)
+                place = posterior.leader()
+                new = [] if place is None else [(posterior.hypotheses[place], posterior.variant(place))]
+                found = [*rest, *new]
+            noise = self.left(found, noise)
+            if {_place(one) for one, _ in found} == {_place(one) for one, _ in before}:
+                break
+        return found, noise
+
+    def left(self, found: Sequence[Found], noise: np.ndarray) -> np.ndarray:
+        """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations."""
+        return self.system.residual_rms([k for _, variant in found for k in variant.columns], noise)
+
+    def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[Cause, ...]:
+        """Join what was found of one effect and scope into causes, and rank them by what they explain."""
+        parts: dict[tuple[str, str], list[Cause]] = {}
+        for one in found:
+            rest = [each for each in found if each is not one]
+            parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.beside(rest, noise)))
+        return tuple(sorted(map(_joined, parts.values()), key=lambda cause: -cause.gain))
+
+
+def _cause(found: Found, posterior: Posterior) -> Cause:
+    """Return one hypothesis of a structure as a cause, with what could stand in its place."""
+    hypothesis, variant = found
+    own = next(k for k, one in enumerate(posterior.hypotheses) if _place(one) == _place(hypothesis))
+    near = [k for k, one in enumerate(posterior.hypotheses) if overlap(one, hypothesis)]
+    weights, none = posterior.weights(near)
+    whole = np.logaddexp.reduce([*weights, none])
+    sure: dict[tuple[str, str], float] = {}
+    for k, weight in zip(near, weights, strict=True):
+        key = posterior.hypotheses[k].effect, posterior.hypotheses[k].scope
+        sure[key] = sure.get(key, 0.0) + float(np.exp(weight - whole))
+    probability = sure.pop((hypothesis.effect, hypothesis.scope))
+    rivals: dict[str, float] = {}
+    for (effect, _), chance in sure.items():
+        rivals[effect] = rivals.get(effect, 0.0) + chance
+    rivals.pop(hypothesis.effect, None)
+    return Cause(
+        effect=hypothesis.effect,
+        scope=hypothesis.scope,
+        joints=(hypothesis.joint,) if hypothesis.joint else (),
+        variants=(variant,),
+        gain=float(posterior.evidence.explained[posterior.shape[own]] / posterior.evidence.rows.sum()),
+        log_odds=float(posterior.log_odds[own]),
+        probability=probability,
+        rivals=rivals,
+    )
+
+
+def _joined(parts: Sequence[Cause]) -> Cause:
+    """Return causes of one effect at several joints as one: as sure as at the joint where it is most."""
+    first = max(parts, key=lambda one: one.probability)
+    return Cause(
+        effect=first.effect,
+        scope=first.scope,
+        joints=tuple(joint for one in parts for joint in one.joints),
+        variants=tuple(variant for one in parts for variant in one.variants),
+        gain=sum(one.gain for one in parts),
+        log_odds=first.log_odds,
+        probability=first.probability,
+        rivals=first.rivals,
+    )
+
+
+def _place(one: Hypothesis) -> tuple[str, str, str | None]:
+    return one.effect, one.scope, one.joint
+
+
+def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether both are one effect at one place, in any scope or shape."""
+    return one.effect == other.effect and overlap(one, other)

@@ -1,0 +1,169 @@
+"""What hypotheses explain beside a fit, and how far groups of runs agree on it.
+
+A variant's columns, less what the fit imitates of them, have the information `A` and the score `b` in units of the
+noise. Its coefficients `x` are those of least squares with the prior, within their bounds; they explain
+`2 x.b - x.A.x - x.x` squares. In each group the score that is left over, `x.(b_g - A_g x)`, is what the group says
+against them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from irtwin.gap.regression.hypotheses import Variant, bounds
+from irtwin.gap.regression.moments import Moments, summed
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.projection import Projected, asked_columns, fitted_columns, projected, projected_in
+
+_SPEAKS = 1e-3  # of what a variant says in its strongest group: a group with less says nothing of it
+_FEW = 4.0  # groups' worth of weight that the spread of the other variants has beside a variant's own
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """V variants beside a fit, G groups; squares in units of the noise.
+
+    explained (V,); said, missed (V, G): what each adds to a group, and the score that this leaves there; information
+    (V, k, k each); rows (G,).
+    """
+
+    variants: tuple[Variant, ...]
+    explained: np.ndarray
+    said: np.ndarray
+    missed: np.ndarray
+    information: tuple[np.ndarray, ...]
+    rows: np.ndarray
+
+    @cached_property
+    def rows_that_speak(self) -> np.ndarray:
+        """(V,) how many rows a variant acts in, effectively: an effect of one run has that run's."""
+        total = self.said.sum(axis=1)
+        squares = (self.said**2 / self.rows).sum(axis=1)
+        return np.asarray(np.where(total > 0, total**2 / np.maximum(squares, 1e-300), self.rows.sum()))
+
+    @cached_property
+    def gain(self) -> np.ndarray:
+        """(V,) squares explained, a row that speaks."""
+        return np.asarray(self.explained / self.rows_that_speak)
+
+    @cached_property
+    def disagreement(self) -> np.ndarray:
+        """(V,) how much more groups disagree on a variant than noise makes them, 1 at least.
+
+        A variant's own, moderated by that of the others, as groups are few (Smyth 2004).
+        """
+        speaks = self.said > _SPEAKS * np.maximum(self.said.max(axis=1, keepdims=True), 1e-300)
+        more = np.maximum(speaks.sum(axis=1) - 1, 0)
+        squares = np.where(speaks, self.missed**2 / np.maximum(self.said, 1e-300), 0.0).sum(axis=1)
+        own = squares / np.maximum(more, 1)
+        known = own[more >= 2]
+        typical = max(float(np.median(known)), 1.0) if len(known) else 1.0
+        return np.asarray(np.maximum((more * own + _FEW * typical) / (more + _FEW), 1.0))
+
+
+def evidence(
+    system: System, moments: Sequence[Moments], chosen: Sequence[int], variants: Sequence[Variant]
+) -> Evidence:
+    """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
+    total = summed(moments)
+    asked = asked_columns(total, [k for variant in variants for k in variant.columns])
+    inside = fitted_columns(system, chosen)
+    whole = projected(system, total, inside, asked)
+    explained, (said, missed) = np.zeros(len(variants)), np.zeros((2, len(variants), len(moments)))
+    information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
+    values: list[np.ndarray] = []
+    known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
+    batches = _batches(system, variants, known)
+    for batch in batches:
+        products, right = _parted(whole, batch.columns)
+        solved = _bounded(products + np.eye(products.shape[1]), right, batch.lowest)
+        explained[batch.place] = 2 * (solved * right).sum(axis=1) - _squares(products, solved) - (solved**2).sum(axis=1)
+        values.append(solved)
+        for place, own in zip(batch.place, products, strict=True):
+            information[place] = own
+    for group, part in enumerate(moments):
+        seen = projected_in(part, whole, inside)
+        for batch, solved in zip(batches, values, strict=True):
+            products, right = _parted(seen, batch.columns)
+            said[batch.place, group] = _squares(products, solved)
+            missed[batch.place, group] = (solved * right).sum(axis=1) - said[batch.place, group]
+    rows = np.maximum(system.rows.max(axis=1), 1.0)
+    return Evidence(
+        tuple(variants), np.maximum(explained, 0.0), np.maximum(said, 0.0), missed, tuple(information), rows
+    )
+
+
+def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Variant]) -> np.ndarray:
+    """Return (V, 2) what each variant adds, with coefficients as large as expected, beyond what the twin imitates.
+
+    As a mean square in units of the noise, and as the part of its columns' squares.
+    """
+    total = summed(moments)
+    columns = [k for variant in variants for k in variant.columns]
+    whole = projected(system, total, fitted_columns(system, ()), asked_columns(total, columns))
+    ends = np.cumsum([len(variant.columns) for variant in variants])[:-1]
+    rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
+    both = zip(*(np.split(each.squares(columns), ends) for each in (whole, total)), strict=True)
+    return np.array([[left.sum() / rows, left.sum() / max(every.sum(), 1e-300)] for left, every in both])
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Variants of one number of coefficients: `place` (V,) in all variants, `columns` (V, k), `lowest` (V, k)."""
+
+    place: np.ndarray
+    columns: np.ndarray
+    lowest: np.ndarray
+
+
+def _batches(system: System, variants: Sequence[Variant], known: Set[str]) -> list[_Batch]:
+    sizes: dict[int, list[int]] = {}
+    for place, variant in enumerate(variants):
+        sizes.setdefault(len(variant.columns), []).append(place)
+    batches = []
+    for places in sizes.values():
+        columns = np.array([variants[place].columns for place in places])
+        lowest = np.array([_lowest(system, variants[place], known) for place in places])
+        batches.append(_Batch(np.array(places), columns, lowest / system.scale[columns]))
+    return batches
+
+
+def _lowest(system: System, variant: Variant, known: Set[str]) -> np.ndarray:
+    """Return (k,) the lowest values: what is not `known` was nothing before, so that a change cannot take from it."""
+    if system.both and variant.columns[0] >= system.changed and variant.effect.id in known:
+        return np.full(len(variant.columns), -np.inf)
+    return bounds(variant)
+
+
+def _parted(projected: Projected, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the products among columns (V, k), (V, k, k), and with the measurement, (V, k)."""
+    target = np.full((len(columns), 1), projected.whole.size - 1)
+    products = projected.of(np.concatenate([columns, target], axis=1))
+    return products[:, :-1, :-1], products[:, :-1, -1]
+
+
+def _squares(products: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("vi,vij,vj->v", values, products, values))
+
+
+def _bounded(normal: np.ndarray, right: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """Solve V small systems (V, k, k); what falls below its bound is put there, the rest solved again."""
+    solved = np.linalg.solve(normal, right[..., None])[..., 0]
+    fixed = np.zeros(solved.shape, dtype=bool)
+    for _ in range(normal.shape[1]):
+        below = (solved < lowest) & ~fixed
+        if not below.any():
+            break
+        fixed |= below
+        held = np.where(fixed, lowest, 0.0)
+        held[~np.isfinite(held)] = 0.0
+        free = ~fixed
+        system = normal * (free[:, :, None] & free[:, None, :])
+        system[:, range(normal.shape[1]), range(normal.shape[1])] += fixed
+        target = np.where(fixed, held, right - np.einsum("vij,vj->vi", normal, held))
+        solved = np.linalg.solve(system, target[..., None])[..., 0]
+    return solved
