@@ -19,7 +19,7 @@ from irtwin.gap.experiment.programmes import programmes
 from irtwin.gap.experiment.separation import fitted, projected, unimitated
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.isolation.forward_selection import Attribution
+from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.held_out import held_out
@@ -70,8 +70,8 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
     causes = ()
     if cause:
         own = next(h for h in found if (h.effect, h.joint) == (cause, "joint_2"))
-        causes = (Cause(cause, MISSING, ("joint_2",), own.variants[-1:], 1.0, 9.0, 0.0, tuple(rivals)),)
-    attribution = Attribution(causes, noise, found, np.zeros(len(found)), np.zeros(len(found)))
+        causes = (Cause(cause, MISSING, ("joint_2",), own.variants[-1:], 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
+    attribution = Attribution(causes, noise, found, np.zeros((len(found), 2)), ())
     nothing = Estimate.__new__(Estimate)
     observed = frozenset(m.run for m in motions)
     judged = held_out(system, noise, noise, ())

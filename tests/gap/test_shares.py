@@ -10,8 +10,8 @@ import pytest
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.forward_selection import Attribution
 from irtwin.gap.isolation.shares import closed_squares, shares
+from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, Column, Variant
 from irtwin.gap.regression.normal_equations import System, noise_before
@@ -41,7 +41,7 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
         Cause(f"effect_{k}", MISSING, (), (Variant(EFFECT, (1 + k,), (column.term,)),), 1.0, 9.0, 0.0)
         for k, column in enumerate(columns)
     )
-    return system, Attribution(causes, np.array([noise]), (), np.zeros(0), np.zeros(0))
+    return system, Attribution(causes, np.array([noise]), (), np.zeros((0, 2)), ())
 
 
 def shared(system, attribution):

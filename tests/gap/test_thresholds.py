@@ -30,12 +30,12 @@ def test_the_code_reads_each(name):
 
 
 def test_one_is_changed_and_the_others_stay():
-    changed = DEFAULT.changed("selection.least_t", 3.0)
-    assert changed.selection.least_t == 3.0
-    assert dataclasses.replace(changed, selection=DEFAULT.selection) == Thresholds() == DEFAULT
+    changed = DEFAULT.changed("criterion.misfit", 3.0)
+    assert changed.criterion.misfit == 3.0
+    assert dataclasses.replace(changed, criterion=DEFAULT.criterion) == Thresholds() == DEFAULT
 
 
-@pytest.mark.parametrize("name", ["selection.least", "least_t", "selection", "selection.", ""])
+@pytest.mark.parametrize("name", ["criterion.least", "misfit", "criterion", "criterion.", ""])
 def test_an_unknown_name_is_refused(name):
     with pytest.raises(
         InputError, match=f'there is no threshold "{re.escape(name)}"; choose from admission.least_time'
@@ -45,4 +45,4 @@ def test_an_unknown_name_is_refused(name):
 
 def test_they_cannot_be_changed_in_place():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        DEFAULT.selection.least_t = 1.0
+        DEFAULT.criterion.misfit = 1.0

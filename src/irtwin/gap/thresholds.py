@@ -190,6 +190,15 @@ class Criterion:
     misfit: float = _threshold(
         0.063, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
     )
+    misfit_unexplained: float = _threshold(
+        0.2, "the same of what is left above the floor", "share of its RMS", "decisions/gap-criterion.md"
+    )
+    excess: float = _threshold(
+        3.5,
+        "what is left beyond is no noise, whatever the floor missed",
+        _FLOOR,
+        "decisions/gap-unexplained-verdict.md",
+    )
     certainty: float = _threshold(
         8.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
     )

@@ -103,7 +103,8 @@ def _find(
 ) -> tuple[Finding, Attribution]:
     """Return what both equations show of torque, and all that they show."""
     whole, torque = equations.whole, equations.torque
-    both = attributed(case, whole, without, tell)
+    levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
+    both = attributed(case, whole, np.concatenate(levels), without, tell)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(equations, tuple(of_power), both.noise)

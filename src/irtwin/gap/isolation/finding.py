@@ -147,7 +147,7 @@ def find(
     `plain` as a finding's; `tell` as for `attribute`.
     """
     places = (None,) if name == "power" else case.robot.joint_names
-    found = attributed(case, system, without, tell)
+    found = attributed(case, system, floor, without, tell)
     return finding_of(name, places, case.observed, system, found, floor, seed, plain)
 
 
@@ -171,10 +171,15 @@ def finding_of(
 
 
 def attributed(
-    case: Case, system: System, without: Set[Without] = frozenset(), tell: Tell | None = None
+    case: Case,
+    system: System,
+    floor: np.ndarray | None,
+    without: Set[Without] = frozenset(),
+    tell: Tell | None = None,
 ) -> Attribution:
-    """Attribute the gap of a system, `without` some effects."""
-    return attribute(system, _hypotheses(system, _inside(case, system), without), case.thresholds.criterion, tell)
+    """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
+    candidates = _hypotheses(system, _inside(case, system), without)
+    return attribute(system, candidates, case.thresholds.criterion, floor, tell)
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:

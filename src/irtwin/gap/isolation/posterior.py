@@ -7,7 +7,7 @@ of the information `A`, are
 
     prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) / sqrt(det(1 + A / (rows v)))
 
-over the shapes of an effect, each as likely. An effect is at one of its joints as likely as at another; where it is at
+over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; where it is at
 one, it is at a further one with even odds. Docs: `docs/how-it-decides.md`.
 """
 
@@ -24,6 +24,8 @@ from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
+
+_SIZES = (1.0, 0.3, 0.1, 0.03)  # of an effect, in units of what is expected
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,13 @@ class Prior:
 
 @dataclass(frozen=True)
 class Posterior:
-    """H hypotheses beside a structure; `owner` (V,): whose each variant of the `evidence` is."""
+    """H hypotheses beside a structure; `owner` (V,): whose each variant of the `evidence` is; `misfit` (V,): RMS."""
 
     hypotheses: tuple[Hypothesis, ...]
     owner: np.ndarray
     prior: np.ndarray
     evidence: Evidence
+    misfit: np.ndarray
     limits: Criterion
 
     @classmethod
@@ -65,8 +68,9 @@ class Posterior:
         candidates: Sequence[Hypothesis],
         prior: Prior,
         limits: Criterion,
+        unexplained: np.ndarray,
     ) -> Posterior:
-        """Try candidates beside what was found, everything refitted."""
+        """Try candidates beside what was found, everything refitted; `unexplained` (g,) is as of `_Search`."""
         variants = [variant for one in candidates for variant in one.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(one.variants) for one in candidates])
         chosen = [k for _, variant in found for k in variant.columns]
@@ -76,13 +80,15 @@ class Posterior:
             for one in candidates
         ]
         seen = evidence(system, moments, chosen, variants)
-        return cls(tuple(candidates), owner, np.array(log_prior), seen, limits)
+        left = [float(np.mean(unexplained[system.equations(variant.columns)])) for variant in variants]
+        misfit = np.hypot(limits.misfit, limits.misfit_unexplained * np.sqrt(left))
+        return cls(tuple(candidates), owner, np.array(log_prior), seen, misfit, limits)
 
     @cached_property
     def variance(self) -> np.ndarray:
         """(V,) of what is left along a variant's columns, a row, in units of the noise."""
         noise = self.evidence.disagreement / self.evidence.rows_that_speak
-        return np.asarray(self.limits.misfit**2 + noise)
+        return np.asarray(self.misfit**2 + noise)
 
     @cached_property
     def log_odds(self) -> np.ndarray:
@@ -113,15 +119,14 @@ class Posterior:
         """Return the shape of a hypothesis that explains most."""
         return self.evidence.variants[int(self.shape[place])]
 
-    def leader(self) -> int | None:
-        """Return the place of the hypothesis to take: of those likelier than nothing, the one that explains most,
-        or what is more likely in its place; None where none is.
-        """
-        likely = np.flatnonzero(self.log_odds > 0)
-        if not len(likely):
-            return None
-        most = int(likely[np.argmax(self.evidence.explained[self.shape[likely]])])
-        near = [int(k) for k in likely if overlap(self.hypotheses[k], self.hypotheses[most])]
+    def first(self) -> int | None:
+        """Return the place of the hypothesis that explains most; None where none explains anything."""
+        explained = self.evidence.explained[self.shape]
+        return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
+
+    def likeliest_at(self, one: Hypothesis) -> int:
+        """Return the place of the likeliest hypothesis of those that could be where one is."""
+        near = [k for k, other in enumerate(self.hypotheses) if overlap(other, one)]
         return near[int(np.argmax(self.weights(near)[0]))]
 
     def weights(self, near: Sequence[int]) -> tuple[np.ndarray, float]:
@@ -145,10 +150,15 @@ class Posterior:
         return 0.5 * (certainty + count) * np.log1p(gain / (certainty * variance))
 
     def _size(self, variant: int, variance: float) -> float:
-        """Return the log of how much room a variant's coefficients have, in units of what the data leave open."""
-        information = self.evidence.information[variant]
-        room = np.eye(len(information)) + information / (self.evidence.rows_that_speak[variant] * variance)
-        return 0.5 * float(np.linalg.slogdet(room)[1])
+        """Return the log of how much room a variant's coefficients have, in units of what the data leave open.
+
+        They are as large as expected, or as `_SIZES` of that, each as likely.
+        """
+        seen = self.evidence
+        open_ones = np.linalg.eigvalsh(seen.information[variant]) / (seen.rows_that_speak[variant] * variance)
+        squares = float(seen.values[variant] @ seen.values[variant])
+        each = [0.5 * (np.log1p(size**2 * np.maximum(open_ones, 0.0)).sum() + squares / size**2) for size in _SIZES]
+        return float(np.log(len(_SIZES)) - np.logaddexp.reduce(-np.array(each)))
 
     @cached_property
     def _shapes(self) -> list[np.ndarray]:

@@ -36,15 +36,20 @@ class Attribution:
 
 
 def attribute(
-    system: System, candidates: Sequence[Hypothesis], limits: Criterion, tell: Tell | None = None
+    system: System,
+    candidates: Sequence[Hypothesis],
+    limits: Criterion,
+    floor: np.ndarray | None = None,
+    tell: Tell | None = None,
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
     Hypotheses are added one by one while one is likelier than not, everything refitted; then each in turn is taken out
-    and looked for anew. `tell` is told how far that has come, where it takes long.
+    and looked for anew. floor: (g,) RMS, 0 or None where unknown; `tell` is told how far it has come, where it takes
+    long.
     """
     candidates = in_scope(candidates, both=system.both)
-    search = _Search(system, candidates, Prior.of(candidates), limits, paced(tell))
+    search = _Search(system, candidates, Prior.of(candidates), limits, floor, paced(tell))
     noise = system.residual_rms((), system.residual_rms((), np.ones(len(system.pattern))))
     before = search.beside((), noise)
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
@@ -59,12 +64,13 @@ def attribute(
 
 @dataclass(frozen=True)
 class _Search:
-    """The search on one system."""
+    """The search on one system; floor: (g,) RMS."""
 
     system: System
     candidates: Sequence[Hypothesis]
     prior: Prior
     limits: Criterion
+    floor: np.ndarray | None
     tell: Tell
 
     def beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
@@ -77,16 +83,35 @@ class _Search:
             and not any(_same_place(one, each) for each, _ in found)
         ]
         self.tell(f"  {len(left)} hypotheses, beside {len(found)} that are found")
-        return Posterior.beside(self.system, self.system.moments(noise), found, left, self.prior, self.limits)
+        moments = self.system.moments(noise)
+        return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.unexplained(noise))
+
+    def unexplained(self, noise: np.ndarray) -> np.ndarray:
+        """Return (g,) which part of the mean square that is left, `noise`, no floor explains; all where unknown."""
+        floor = np.zeros_like(noise) if self.floor is None else self.floor
+        return np.asarray(1 - np.minimum((1 + self.limits.excess) * (floor / noise) ** 2, 1.0))
 
     def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
-        """Add what is likelier than nothing, the one that explains most first; return it and what it leaves, (g,)."""
+        """Add what explains most while it is likelier than nothing; return it and what it leaves, (g,)."""
         found: list[Found] = []
-        while len(found) < _MOST and (place := posterior.leader()) is not None:
-            found.append((posterior.hypotheses[place], posterior.variant(place)))
+        while len(found) < _MOST and (new := self.likely(posterior, found, noise)) is not None:
+            found.append(new)
             noise = self.left(found, noise)
             posterior = self.beside(found, noise)
         return found, noise
+
+    def likely(self, posterior: Posterior, found: Sequence[Found], noise: np.ndarray) -> Found | None:
+        """Return what explains most beside a structure, or is likelier in its place; None where nothing is likely.
+
+        All are judged by what the first leaves: noise that holds its own effect would hide it.
+        """
+        first = posterior.first()
+        if first is None:
+            return None
+        new = posterior.hypotheses[first], posterior.variant(first)
+        judged = self.beside(found, self.left([*found, new], noise))
+        place = judged.likeliest_at(new[0])
+        return (judged.hypotheses[place], judged.variant(place)) if judged.log_odds[place] > 0 else None
 
     def settled(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
@@ -94,10 +119,8 @@ class _Search:
             before = list(found)
             for one in before:
                 rest = [each for each in found if each is not one]
-                posterior = self.beside(rest, noise)
-                place = posterior.leader()
-                new = [] if place is None else [(posterior.hypotheses[place], posterior.variant(place))]
-                found = [*rest, *new]
+                new = self.likely(self.beside(rest, noise), rest, noise)
+                found = rest if new is None else [*rest, new]
             noise = self.left(found, noise)
             if {_place(one) for one, _ in found} == {_place(one) for one, _ in before}:
                 break

@@ -27,14 +27,15 @@ _FEW = 4.0  # groups' worth of weight that the spread of the other variants has 
 class Evidence:
     """V variants beside a fit, G groups; squares in units of the noise.
 
-    explained (V,); said, missed (V, G): what each adds to a group, and the score that this leaves there; information
-    (V, k, k each); rows (G,).
+    explained (V,); said, missed (V, G): what each adds to a group, and the score that this leaves there; values (V, k
+    each), in units of the prior; information (V, k, k each); rows (G,).
     """
 
     variants: tuple[Variant, ...]
     explained: np.ndarray
     said: np.ndarray
     missed: np.ndarray
+    values: tuple[np.ndarray, ...]
     information: tuple[np.ndarray, ...]
     rows: np.ndarray
 
@@ -75,26 +76,25 @@ def evidence(
     whole = projected(system, total, inside, asked)
     explained, (said, missed) = np.zeros(len(variants)), np.zeros((2, len(variants), len(moments)))
     information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
-    values: list[np.ndarray] = []
+    values: list[np.ndarray] = [np.zeros(0)] * len(variants)
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
     batches = _batches(system, variants, known)
     for batch in batches:
         products, right = _parted(whole, batch.columns)
         solved = _bounded(products + np.eye(products.shape[1]), right, batch.lowest)
         explained[batch.place] = 2 * (solved * right).sum(axis=1) - _squares(products, solved) - (solved**2).sum(axis=1)
-        values.append(solved)
-        for place, own in zip(batch.place, products, strict=True):
-            information[place] = own
+        for place, own, value in zip(batch.place, products, solved, strict=True):
+            information[place], values[place] = own, value
     for group, part in enumerate(moments):
         seen = projected_in(part, whole, inside)
-        for batch, solved in zip(batches, values, strict=True):
+        for batch in batches:
             products, right = _parted(seen, batch.columns)
+            solved = np.array([values[place] for place in batch.place])
             said[batch.place, group] = _squares(products, solved)
             missed[batch.place, group] = (solved * right).sum(axis=1) - said[batch.place, group]
     rows = np.maximum(system.rows.max(axis=1), 1.0)
-    return Evidence(
-        tuple(variants), np.maximum(explained, 0.0), np.maximum(said, 0.0), missed, tuple(information), rows
-    )
+    shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
+    return Evidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
 
 
 def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Variant]) -> np.ndarray:

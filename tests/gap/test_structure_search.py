@@ -1,0 +1,204 @@
+"""Which causes are found, in systems whose columns and coefficients are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Term
+from irtwin.gap.isolation.structure_search import attribute
+from irtwin.gap.regression.evidence import evidence
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Column, Hypothesis, Variant
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.identification.accumulate import Block, triangle
+
+ROWS, RUNS = 300, 12
+EFFECT = catalogue()["cable_drag"]
+
+
+def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
+    """Columns that are mixtures (rows of `mix`) of independent ones, and what `coefficients` of these add up to.
+
+    In `silent` runs the first `sparse` of the independent ones are zero.
+    """
+    generator = np.random.default_rng(1)
+    blocks = []
+    for run in range(RUNS):
+        independent = np.linalg.qr(generator.standard_normal((ROWS, len(coefficients))))[0] * np.sqrt(ROWS)
+        independent[:, :sparse] *= run not in silent
+        columns = size * independent @ np.array(mix).T
+        measured = size * independent @ coefficients + generator.standard_normal(ROWS)
+        factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+    columns = tuple(Column(EFFECT, k, Term(f"k{k}", "1")) for k in range(len(mix)))
+    pattern = np.ones((1, 1 + len(mix)), dtype=bool)
+    terms = ((EFFECT, Term("constant", "1")),)
+    system = System(terms, columns, pattern, tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
+    candidates = [
+        Hypothesis(f"effect_{k}", None, MISSING, (Variant(EFFECT, (1 + k,), (column.term,)),))
+        for k, column in enumerate(columns)
+    ]
+    return system, candidates
+
+
+def causes(system, candidates):
+    return attribute(system, candidates, DEFAULT.criterion).causes
+
+
+def found(mix, coefficients):
+    return [cause.effect for cause in causes(*system_of(mix, coefficients))]
+
+
+def changing(before, now, twin=()):
+    """What is said of a cable's drag of so many noises in the reference runs, and in the observed ones."""
+    generator = np.random.default_rng(0)
+    blocks = []
+    for run in range(RUNS):
+        column = generator.standard_normal((ROWS, 1))
+        size = before if run < RUNS // 2 else now
+        measured = size * column[:, 0] + generator.standard_normal(ROWS)
+        own = [column] if twin else [np.ones((ROWS, 1))]
+        factor = triangle(np.column_stack([*own, column, measured]))
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+    column = Column(EFFECT, 0, Term("k", "1"))
+    observed = np.arange(RUNS) >= RUNS // 2
+    known = (catalogue()["torque_offset"], Term("constant", "1"))
+    terms = (twin or known,)
+    system = System(terms, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), np.arange(RUNS), observed)
+    scopes = [(CHANGED, system.changed)] if twin else [(MISSING, system.base), (CHANGED, system.changed)]
+    candidates = [
+        Hypothesis("cable_drag", None, scope, (Variant(EFFECT, (place,), (column.term,)),)) for scope, place in scopes
+    ]
+    return [cause.scope for cause in causes(system, candidates)]
+
+
+def test_what_is_there_is_found_and_nothing_else():
+    assert found(np.eye(4), [0.0, 0.3, 0.0, 0.1]) == ["effect_1", "effect_3"]
+    assert found(np.eye(4), np.zeros(4)) == []
+
+
+def test_a_crumb_within_the_misfit_that_no_effect_names_is_no_cause():
+    assert found(np.eye(2), [0.3, 0.01]) == ["effect_0"]  # seven standard errors, a tenth of the noise
+
+
+@given(st.floats(0.1, 1.0))
+def test_a_crumb_does_not_unsay_what_explains_nearly_everything(crumb):
+    (first, *_) = causes(*system_of(np.eye(2), [3.0, crumb]))
+    assert first.effect == "effect_0" and first.probability > 0.99
+
+
+def test_groups_that_disagree_speak_against_an_effect():
+    generator = np.random.default_rng(2)
+
+    def odds(sizes):
+        blocks = []
+        for run, size in enumerate(sizes):
+            column = generator.standard_normal((ROWS, 1))
+            measured = size * column[:, 0] + generator.standard_normal(ROWS)
+            factor = triangle(np.column_stack([np.ones((ROWS, 1)), column, measured]))
+            blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+        column = Column(EFFECT, 0, Term("k", "1"))
+        known = ((catalogue()["torque_offset"], Term("constant", "1")),)
+        every = np.arange(len(sizes)), np.ones(len(sizes), dtype=bool)
+        system = System(known, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), *every)
+        one = Hypothesis("cable_drag", None, MISSING, (Variant(EFFECT, (1,), (column.term,)),))
+        return [cause.log_odds for cause in causes(system, [one])]
+
+    (agreed,), mixed = odds([0.5] * 8), odds([2.0, -1.0] * 4)
+    assert agreed > 5
+    assert not mixed or mixed[0] < agreed / 2
+
+
+def test_what_the_reference_runs_show_as_well_is_missing_and_has_not_changed():
+    assert changing(before=3.0, now=3.0) == [MISSING]
+    assert changing(before=0.0, now=3.0) == [CHANGED]
+
+
+def test_a_change_takes_nothing_from_what_was_not_there():
+    friction = catalogue()["coulomb_friction"]
+    assert changing(before=0.0, now=-3.0, twin=(friction, Term("Fc", "1"))) == [CHANGED]
+    lowest = replace_lowest(0.0)
+    assert [cause.effect for cause in causes(*lowest)] == []
+
+
+def replace_lowest(lowest):
+    """A column that can only add, where it would have to take away."""
+    system, candidates = system_of(np.eye(2), [-0.5, 0.0])
+    terms = (replace(candidates[0].variants[0].terms[0], lowest=lowest),)
+    candidates[0] = replace(candidates[0], variants=(replace(candidates[0].variants[0], terms=terms),))
+    return system, candidates[:1]
+
+
+def test_what_few_runs_show_is_found_where_it_is_much():
+    def few(coefficient, speaking):
+        system, candidates = system_of(np.eye(4), [coefficient, 0.0, 0.0, 0.0], silent=range(RUNS - speaking))
+        return [cause.effect for cause in causes(system, candidates)]
+
+    assert few(1.0, speaking=2) == ["effect_0"]
+    assert few(0.005, speaking=2) == []
+
+
+def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
+    system, candidates = system_of(np.eye(8), [0.3, 0.03, *np.zeros(6)])
+    assert [cause.effect for cause in causes(system, candidates)] == ["effect_0"]
+    alike = [replace(one, effect="effect", joint=f"joint_{k}") for k, one in enumerate(candidates)]
+    (cause,) = causes(system, alike)
+    assert cause.joints == ("joint_0", "joint_1")
+
+
+def test_a_mixture_that_comes_first_gives_way_to_the_two_that_it_stands_for():
+    mix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.7, 0.7, 0.08]]
+    assert sorted(found(mix, [0.3, 0.2, 0.0])) == ["effect_0", "effect_1"]
+
+
+def test_effects_that_cannot_be_told_apart_share_the_probability():
+    (cause,) = causes(*system_of([[1.0, 0.0], [1.0, 1e-3]], [0.3, 0.0]))
+    rival = "effect_1" if cause.effect == "effect_0" else "effect_0"
+    assert cause.not_told_from(0.1) == (rival,)
+    assert cause.probability == pytest.approx(0.5, abs=0.1)
+    assert cause.probability + cause.rivals[rival] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_of_equals_that_is_not_taken_whose_place_screening_chose():
+    system, candidates = system_of([[1.0, 0.0], [1.0, 0.001]], [0.3, 0.0])
+    placed = replace(candidates[0].variants[0], effect=catalogue()["local_wear"])
+    (cause,) = causes(system, [replace(candidates[0], variants=(placed,)), candidates[1]])
+    assert cause.effect == "effect_1" and cause.probability > 0.5
+
+
+def test_effects_that_share_nothing_are_no_rivals():
+    (cause,) = causes(*system_of(np.eye(2), [0.3, 0.0]))
+    assert cause.rivals["effect_1"] < 1e-6
+
+
+@given(st.floats(0.1, 10))
+def test_the_unit_of_noise_does_not_matter(unit):
+    system, candidates = system_of(np.eye(2), [0.3, 0.1])
+    variants = [one.variants[0] for one in candidates]
+    plain = evidence(system, system.moments(np.array([1.0])), (), variants)
+    other = evidence(system, system.moments(np.array([unit])), (), variants)
+    np.testing.assert_allclose(other.explained, plain.explained / unit**2, rtol=1e-3)
+    np.testing.assert_allclose(other.rows_that_speak, plain.rows_that_speak, rtol=1e-3)
+
+
+def test_products_and_scores_are_those_of_the_factors():
+    system, _ = system_of(np.eye(3), np.array([1.0, -2.0, 0.5]))
+    term = Term("constant", "1", expected=2.0, spread=3.0)
+    system = replace(system, terms=((EFFECT, term),), observed=np.arange(RUNS) >= RUNS // 2)
+    weights = np.arange(1.0, 9.0)  # of the constant, three columns, what of these changed, and the measurement
+    for run, moments in enumerate(system.moments(np.array([0.5]))):
+        factor, used = system.factor(run, 0)
+        places = np.append(used, 7)
+        expected = np.zeros((8, 8))
+        expected[np.ix_(places, places)] = factor.T @ factor / 0.25
+        np.testing.assert_allclose(moments.whole, expected, rtol=1e-9, atol=1e-6)
+        left, products = system.scored(run, 0, weights)
+        np.testing.assert_allclose(left, factor @ weights[places], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(products[places], factor.T @ left, rtol=1e-9, atol=1e-6)
+        assert not np.delete(products, places).any()
