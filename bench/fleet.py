@@ -238,7 +238,7 @@ def _causes(draw: random.Random, robot_id: str, verdict: str, of: dict[str, Any]
         yield "gap_cause", named | {
             "robot_id": robot_id, "rank": rank, "effect": effect, "scope": scope, "channel": "torque",
             "confidence": confidence, "share_of_closed": 0.5, "closed_where_it_acts": 0.8,
-            "gain_on_groups_left_out": 2.0, "t_between_groups": 5.0, "p_adjusted": 0.01,
+            "gain": 2.0, "log_odds": 5.0,
         }  # fmt: skip
         if joint:
             yield "gap_cause_joint", named | {"robot_id": robot_id, "joint": joint}

@@ -363,10 +363,7 @@ _SURE = {  # of a location
 def _diagnoses() -> Iterator[Base]:
     yield from _diagnosis("Arm_A", "attributed", 12.0)
     yield from _cause("Arm_A", 1, "coulomb_friction", "j2", "changed", 0.9, ("Fc", 0.8, "N m", 0.4, 1.2))
-    yield from _cause(
-        "Arm_A", 2, "viscous_friction", "j1", "changed", 0.6, ("Fv", 0.1, "N m s/rad", -0.1, 0.3),
-        p_remembered=0.03, part_that_repeats=0.75, first_half_shows_it=True, last_half_shows_it=False,
-    )  # fmt: skip
+    yield from _cause("Arm_A", 2, "viscous_friction", "j1", "changed", 0.6, ("Fv", 0.1, "N m s/rad", -0.1, 0.3))
     of = {"diagnosis_id": "Arm_A.d1", "activity_id": "diagnosis.Arm_A"}
     yield gap.GapLocation(
         **of,
@@ -401,6 +398,8 @@ def _diagnoses() -> Iterator[Base]:
     yield from _cause("Arm_B", 2, "torque_constant_error", "j2", "missing", 0.4, ("g", 0.1, "1", 0.05, 0.15))
     yield gap.GapCauseRival(**of, cause_id="payload", effect="torque_constant_error")
     yield gap.GapCauseRival(**of, cause_id="torque_constant_error@j2", effect="payload")
+    yield gap.GapCauseCompetitor(**of, cause_id="payload", effect="torque_constant_error", probability=0.4)
+    yield gap.GapCauseCompetitor(**of, cause_id="torque_constant_error@j2", effect="payload", probability=0.5)
     yield experiment.GapExperiment(
         **of, purpose="tell payload from torque_constant_error", separation_now=1.5, expected_separation=8.0, enough=5.0
     )
@@ -429,13 +428,12 @@ def _cause(
     scope: str,
     confidence: float,
     parameter: tuple[Any, ...],
-    **halves: float,
 ) -> Iterator[Base]:
     cause_id = f"{effect}@{joint}" if joint else effect
     of: dict[str, Any] = {"diagnosis_id": f"{robot}.d1", "cause_id": cause_id, "activity_id": f"diagnosis.{robot}"}
     yield gap.GapCause(
         **of, robot_id=robot, rank=rank, effect=effect, scope=scope, confidence=confidence, channel="torque",
-        closed_where_it_acts=0.8, gain_on_groups_left_out=2.0, t_between_groups=5.0, p_adjusted=0.01, **halves,
+        closed_where_it_acts=0.8, gain=2.0, log_odds=5.0,
     )  # fmt: skip
     if joint is not None:
         yield gap.GapCauseJoint(**of, robot_id=robot, joint=joint)

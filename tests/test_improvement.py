@@ -6,6 +6,7 @@ import csv
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -13,6 +14,7 @@ import pytest
 
 from irtwin import asking, workflow
 from irtwin.gap.document import form
+from irtwin.gap.document.document import Document
 from irtwin.gap.experiment.programmes import Programme, programmes
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -111,6 +113,24 @@ def test_the_motion_is_that_of_the_programme_that_a_diagnosis_designed(
         words = said(ladder, far)
         assert "The robot cannot make the motion of that (" in words
         assert f"Play {file} on the robot, 20 s from rest to rest" in words
+
+
+def test_an_experiment_is_read_of_a_diagnosis_by_an_earlier_criterion(
+    flagged: tuple[Path, list[str], list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def of_earlier(document: Document) -> dict[str, Any]:
+        said: dict[str, Any] = form.to_json(document)
+        for cause in said["causes"]:
+            cause["evidence"] = {"channel": "torque", "t_between_groups": 7.0}
+        return said
+
+    monkeypatch.setattr(Document, "to_json", of_earlier)
+    shutil.copytree(flagged[0] / "workspace", tmp_path / "w")
+    with Workspace(tmp_path / "w") as place, KnowledgeGraph.of_workspace(place) as graph:
+        proposed = form.to_json(experiment(None, "hang a known mass"))
+        record(place, "arm_2", diagnosis(next_experiment=proposed), NOTHING)
+        following = next_experiment(place, graph, "arm_2")
+        assert following is not None and any("hang a known mass" in line for line in following.words)
 
 
 def test_rounds_go_on_until_the_limit_holds(improved: tuple[Path, Said]) -> None:

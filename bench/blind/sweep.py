@@ -1,8 +1,8 @@
 """`python -m blind.sweep CASES LABELS OUT THRESHOLD VALUE...`: what a threshold trades, misses against false alarms.
 
-Diagnoses every case once a value, into OUT/THRESHOLD=VALUE (resumable), and prints the scores side by side. Use cases
-of a development split: a threshold that was set on a test split makes that split worthless. `--list` prints every
-threshold with its value, unit, meaning and origin.
+THRESHOLD is one by which the diagnosis decides, as `criterion.misfit`; `--list` prints them all with value, unit,
+meaning and origin. Diagnoses every case once a value, into OUT/THRESHOLD=VALUE (resumable), and prints the scores side
+by side. Use cases of a development split: a threshold that was set on a test split makes that split worthless.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from sqlalchemy import select
 from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.gap.document.document import Document
+from irtwin.gap.document import form
 from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.identification.excitation import excite
 from irtwin.json_text import parse_json
@@ -32,6 +32,13 @@ from irtwin.storage.gap_schema import GapDiagnosis
 _FOLDER = "next_experiment"
 _SECONDS = 20.0
 _ITERATIONS = 5  # a motion that moves everything; `irtwin excite` refines one
+
+
+@dataclass(frozen=True)
+class _Proposed:
+    """What is read of a stored diagnosis: what made it may have judged causes by another criterion."""
+
+    next_experiment: Experiment | None
 
 
 @dataclass(frozen=True)
@@ -116,7 +123,8 @@ def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
         found = session.scalars(of_robot).one_or_none()
     if found is None:
         return []
-    proposed = Document.from_json(parse_json(place.read_document(found.file, found.sha256))).next_experiment
+    said = parse_json(place.read_document(found.file, found.sha256))
+    proposed = form.from_json(_Proposed, said, "diagnosis").next_experiment
     if proposed is None:
         return []
     if proposed.programme is None or found.motion_file is None or found.motion_sha256 is None:

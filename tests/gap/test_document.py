@@ -129,7 +129,7 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("shrink", None, "diagnosis.shrink must be given"),
         ("causes.0.confidence", 1.5, r"diagnosis.causes\[0\].confidence must be from 0 to 1"),
         ("causes.0.confidence", True, r"diagnosis.causes\[0\].confidence must be a finite number"),
-        ("causes.0.evidence.p_adjusted_for_the_catalogue", float("nan"), "must be a finite number"),
+        ("causes.0.evidence.log_odds", float("nan"), "must be a finite number"),
         ("causes.0.parameters.0.interval95", [1.0], r"parameters\[0\].interval95 must be an array of 2"),
         ("causes.0.parameters.0.value", 10**400, r"parameters\[0\].value must be a finite number"),
         ("causes", {}, "diagnosis.causes must be an array"),

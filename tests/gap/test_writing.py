@@ -4,23 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
 from tests.gap_cases import document
 from tests.synthetic import arm
 
-from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import _joints, _members, folded
 
 
-def test_what_few_runs_leave_open_is_open_for_rivals_too():
+def test_members_are_the_cause_and_its_rivals_each_with_its_probability():
     cause = next(one for one in document("ambiguous").causes if one.indistinguishable_from)
-    sure = replace(cause, confidence=0.8)
-    once = replace(sure.evidence, halves_that_show_it=("first",), part_that_repeats=0.5)
-    open_still = replace(sure, confidence=0.2, evidence=once)
-    told = [member.confidence for member in _members(sure, DEFAULT.confidence)]
-    assert [member.confidence for member in _members(open_still, DEFAULT.confidence)] == pytest.approx(
-        [one / 4 for one in told]
-    )
+    likely = dict.fromkeys(cause.indistinguishable_from, 0.3)
+    one = replace(cause, evidence=replace(cause.evidence, probability_of_rivals=likely | {"backlash": 0.02}))
+    told = {member.effect: member.confidence for member in _members(one)}
+    assert told == {cause.effect: cause.confidence} | likely
 
 
 def test_a_cause_that_no_finding_that_matters_has_is_marked():

@@ -36,11 +36,9 @@ def diagnosis(**changes: Any) -> Document:
         "channel": "torque",
         "share_of_what_is_closed": 1.0,
         "closed_where_it_acts": 0.9,
-        "gain_on_groups_left_out": 4.0,
-        "t_between_groups": 7.0,
-        "p_adjusted_for_the_catalogue": 0.001,
-        "gain_of_rivals": {"stribeck_friction": 3.9, "payload": 0.1},
-        "correlation_with_rivals": {"stribeck_friction": 0.99},
+        "gain": 4.0,
+        "log_odds": 7.0,
+        "probability_of_rivals": {"stribeck_friction": 0.12, "payload": 0.01},
         "runs": ["swing_3"],
         "window": [1.5, 2.5],
     }
@@ -157,8 +155,8 @@ def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> Non
         weighed = session.scalars(select(gap_schema.GapCauseCompetitor)).all()
     assert (cause.acts_from_s, cause.acts_until_s, run.run_id) == (1.5, 2.5, f"{ROBOT}.swing_3")
     assert cause.cause_id == run.cause_id == "coulomb_friction@all"
-    found = {one.effect: (one.gain, one.correlation) for one in weighed}
-    assert found == {"stribeck_friction": (3.9, 0.99), "payload": (0.1, None)}
+    assert (cause.gain, cause.log_odds) == (4.0, 7.0)
+    assert {one.effect: one.probability for one in weighed} == {"stribeck_friction": 0.12, "payload": 0.01}
 
 
 def test_a_finding_is_kept_with_its_joints_and_members(workspace: Workspace) -> None:

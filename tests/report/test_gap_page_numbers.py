@@ -98,9 +98,8 @@ def test_every_number_that_matters_is_shown(tmp_path: Path) -> None:
     plain: list[float] = [experiment.questions[0].separation_now, experiment.separation_that_is_enough]
     for cause in document.causes:
         why = cause.evidence
-        shares += [cause.confidence, why.share_of_what_is_closed or 0.0]
-        plain += [why.gain_on_groups_left_out, why.t_between_groups, why.p_adjusted_for_the_catalogue]
-        plain += [why.closed_where_it_acts, *why.gain_of_rivals.values(), *why.correlation_with_rivals.values()]
+        shares += [cause.confidence, why.share_of_what_is_closed or 0.0, *why.probability_of_rivals.values()]
+        plain += [why.gain, why.log_odds, why.closed_where_it_acts]
         plain += [number for one in cause.parameters for number in (one.value, *(one.interval95 or ()))]
     for place in document.locations:
         shares += [place.share, *place.share_interval95]
@@ -123,7 +122,7 @@ def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, 
     name = f"stribeck_friction@{joint}"
     cause |= {"id": name, "joints": [joint], "confidence": confidence}
     cause["parameters"] = [{"name": "Fs", "joint": joint, "value": 10 * share, "unit": "N m", "interval95": None}]
-    cause["evidence"] |= {"share_of_what_is_closed": share, "t_between_groups": 100 * share}
+    cause["evidence"] |= {"share_of_what_is_closed": share, "log_odds": 100 * share}
     change |= {
         "cause": name,
         "joints": [joint],

@@ -17,6 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
 from alembic.migration import MigrationContext
 from alembic.operations import Operations
 from sqlalchemy import create_engine, insert, inspect, select, text
@@ -37,6 +38,7 @@ from irtwin.storage.revisions.versions import (
     r0007_scale_of_torque,
     r0008_times_of_runs,
     r0009_no_consumption,
+    r0010_log_odds,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -84,11 +86,16 @@ AFTER_0_1 = {  # columns that revisions have added
     "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles", "started", "ended"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
     "gap_diagnosis": ("unexplained_because",),
-    "gap_cause": ("p_remembered", "part_that_repeats", "first_half_shows_it", "last_half_shows_it"),
+    "gap_cause": ("gain", "log_odds"),
+    "gap_cause_competitor": ("probability",),
     "activity_use": ("relation",),
     "twin": ("torque_scale_uncertainty", "torque_scale_why"),
     "parameter": ("scaled_lower", "scaled_upper"),
     "base_parameter": ("scaled_lower", "scaled_upper"),
+}
+OF_0_1 = {  # columns that revisions have dropped, and whether they may be empty
+    "gap_cause": {"gain_on_groups_left_out": False, "t_between_groups": False, "p_adjusted": False},
+    "gap_cause_competitor": {"gain": True, "correlation": True},
 }
 
 
@@ -109,6 +116,8 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
             with operations.batch_alter_table(table, recreate=recreate) as of:
                 for column in gone:
                     of.drop_column(column)
+                for column, nullable in OF_0_1.get(table, {}).items():
+                    of.add_column(sa.Column(column, sa.Float(), nullable=nullable))
         if of_0_1:
             connection.execute(text("DROP TABLE robot_note"))
             connection.execute(text("DROP TABLE individuals"))
@@ -142,6 +151,7 @@ def test_each_revision_follows_another() -> None:
     assert r0007_scale_of_torque.down_revision == r0006_notes_of_robots.revision
     assert r0008_times_of_runs.down_revision == r0007_scale_of_torque.revision
     assert r0009_no_consumption.down_revision == r0008_times_of_runs.revision
+    assert r0010_log_odds.down_revision == r0009_no_consumption.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -249,6 +259,28 @@ def test_what_a_simulator_wrote_loses_its_consumption() -> None:
             r0009_no_consumption.upgrade()
         found = connection.execute(text("SELECT run_id, energy_consumption_j FROM run_energy ORDER BY run_id")).all()
         assert [*map(tuple, found)] == [("Arm_A.1", 5.0), ("Arm_A.2", None)]
+
+
+def test_causes_of_an_earlier_criterion_keep_their_gain_and_have_no_log_odds() -> None:
+    judged = ("t_between_groups", "p_adjusted", "p_remembered", "part_that_repeats")
+    with create_engine("sqlite://").begin() as connection:
+        told = ", ".join(f"{name} FLOAT" for name in judged)
+        connection.execute(
+            text(
+                "CREATE TABLE gap_cause (cause_id VARCHAR PRIMARY KEY, confidence FLOAT, gain_on_groups_left_out FLOAT "
+                f"NOT NULL, {told}, first_half_shows_it BOOLEAN, last_half_shows_it BOOLEAN)"
+            )
+        )
+        connection.execute(text("INSERT INTO gap_cause VALUES ('payload', 0.9, 2.5, 7.0, 0.01, NULL, NULL, 1, 0)"))
+        connection.execute(text("CREATE TABLE gap_cause_competitor (effect VARCHAR, gain FLOAT, correlation FLOAT)"))
+        connection.execute(text("INSERT INTO gap_cause_competitor VALUES ('backlash', 1.5, 0.8)"))
+        with Operations.context(MigrationContext.configure(connection)):
+            r0010_log_odds.upgrade()
+        (cause,) = connection.execute(text("SELECT * FROM gap_cause")).mappings()
+        assert cause == {"cause_id": "payload", "confidence": 0.9, "gain": 2.5, "log_odds": None}
+        rivals = {column["name"] for column in inspect(connection).get_columns("gap_cause_competitor")}
+        assert rivals == {"effect", "probability"}
+        assert connection.execute(text("SELECT count(*) FROM gap_cause_competitor")).scalar() == 0
 
 
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:

@@ -198,7 +198,6 @@ def _disturbance(said: NotRepeating, rank: int, at: Place) -> Iterator[OfDiagnos
 def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
     why, key = said.evidence, {"cause_id": said.id}
     start, stop = why.window or (None, None)
-    halves = why.halves_that_show_it
     yield gap_schema.GapCause(
         **key,
         rank=rank,
@@ -208,17 +207,12 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
         channel=why.channel,
         share_of_closed=why.share_of_what_is_closed,
         closed_where_it_acts=why.closed_where_it_acts,
-        gain_on_groups_left_out=why.gain_on_groups_left_out,
-        t_between_groups=why.t_between_groups,
-        p_adjusted=why.p_adjusted_for_the_catalogue,
+        gain=why.gain,
+        log_odds=why.log_odds,
         power_on_explained_torque_says=why.power_on_explained_torque_says,
         power_says=why.power_says,
         gain_in_power=why.gain_in_power_if_mechanical,
         t_in_power=why.t_in_power_between_groups,
-        p_remembered=why.p_where_residuals_remember,
-        part_that_repeats=why.part_that_repeats,
-        first_half_shows_it=None if halves is None else "first" in halves,
-        last_half_shows_it=None if halves is None else "last" in halves,
         acts_from_s=start,
         acts_until_s=stop,
     )
@@ -226,11 +220,8 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
         yield gap_schema.GapCauseJoint(**key, joint=joint)
     for rival in dict.fromkeys(said.indistinguishable_from):
         yield gap_schema.GapCauseRival(**key, effect=rival)
-    gains, correlations = why.gain_of_rivals, why.correlation_with_rivals
-    for effect in dict.fromkeys([*gains, *correlations]):
-        yield gap_schema.GapCauseCompetitor(
-            **key, effect=effect, gain=gains.get(effect), correlation=correlations.get(effect)
-        )
+    for effect, probability in why.probability_of_rivals.items():
+        yield gap_schema.GapCauseCompetitor(**key, effect=effect, probability=probability)
     for name in dict.fromkeys(why.runs or ()):
         yield gap_schema.GapCauseRun(**key, run_id=at.run_id(name))
     for number, one in enumerate(said.parameters, start=1):

@@ -233,17 +233,12 @@ class GapCause(OfCause):
     channel: Mapped[str]  # "torque" or "power"
     share_of_closed: Mapped[float | None]  # of what the causes of its channel close together; may be below 0
     closed_where_it_acts: Mapped[float]  # share of the gap there, 0 to 1, that all causes close
-    gain_on_groups_left_out: Mapped[float]  # of weighted squares, a sample
-    t_between_groups: Mapped[float]
-    p_adjusted: Mapped[float]  # for the whole catalogue
+    gain: Mapped[float]  # beside the other causes, in mean squares of what all leave; of old, on groups left out
+    log_odds: Mapped[float | None]  # natural, against nothing in its place; none where it was judged before there were
     power_on_explained_torque_says: Mapped[str | None]  # of a cause of power: "electrical" or "meter"
     power_says: Mapped[str | None]  # of a cause of torque: "mechanical", "sensor" or "undecided"
     gain_in_power: Mapped[float | None]  # if it is mechanical
     t_in_power: Mapped[float | None]
-    p_remembered: Mapped[float | None]  # of few runs: as p, where residuals remember
-    part_that_repeats: Mapped[float | None]  # 0 to 1, of what it closes in a half of the time with the other's size
-    first_half_shows_it: Mapped[bool | None]  # by itself
-    last_half_shows_it: Mapped[bool | None]
     acts_from_s: Mapped[float | None]  # of the run's clock, where it acts for a while only
     acts_until_s: Mapped[float | None]
 
@@ -258,7 +253,7 @@ class GapCauseJoint(OfCause):
 
 
 class GapCauseRival(OfCause):
-    """An effect that explains the data as well as a cause does."""
+    """An effect that the data do not tell from a cause."""
 
     __tablename__ = "gap_cause_rival"
 
@@ -266,13 +261,12 @@ class GapCauseRival(OfCause):
 
 
 class GapCauseCompetitor(OfCause):
-    """An effect that was weighed against a cause, whether it explains the data as well or not."""
+    """An effect that could be in a cause's place, whether the data tell it from the cause or not."""
 
     __tablename__ = "gap_cause_competitor"
 
     effect: Mapped[str] = mapped_column(primary_key=True)
-    gain: Mapped[float | None]  # on groups left out, as the cause's
-    correlation: Mapped[float | None]  # with the cause, 0 to 1
+    probability: Mapped[float]  # 0 to 1, beside the cause's confidence
 
 
 class GapCauseRun(OfCause):

@@ -107,8 +107,8 @@ class Evidence:
 class Cause:
     """An effect held responsible for part of the gap; `joints` none: it acts on the whole robot.
 
-    `id` names it within the document; `confidence`: the share of causes given with this number that are right, however
-    little they close; `folded_away`: where no finding that matters has it, so that the verdict passes it by.
+    `id` names it within the document; `confidence`: its probability against all that could be in its place, nothing
+    there included; `folded_away`: where no finding that matters has it, so that the verdict passes it by.
     """
 
     id: str
@@ -126,7 +126,7 @@ class Cause:
 class Member:
     """An effect that a finding may be: that of a cause, by its id, or one that the data cannot tell from it.
 
-    `confidence`: of a cause as there; of others not calibrated, and never more than the cause's.
+    `confidence`: of a cause as there; of others their probability in its place.
     """
 
     cause: str

@@ -35,8 +35,6 @@ from irtwin.storage.files import write
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 
-_FEW = 3  # of many rivals the foremost are shown; the graph has them all
-
 
 def render_gap(
     graph: Graph, robot: str, read_document: ReadDocument, out: Path, resources: Resources | None = None
@@ -122,11 +120,10 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
         "parameters": _of(cause, answers, "cause_parameters"),
-        "halves": gap_verdict.halves(row["first_half"], row["last_half"], row["repeats"]),
         "evidence": [
             ("channel", row["channel"]),
             *((one["name"], _said(one["value"], one["unit"])) for one in _of(cause, answers, "evidence")),
-            *_competitors(_of(cause, answers, "competitors")),
+            ("probability of rivals", _competitors(_of(cause, answers, "competitors"))),
             ("runs", ", ".join(one["run_name"] for one in _of(cause, answers, "cause_runs"))),
         ],
     }
@@ -136,14 +133,9 @@ def _of(cause: str, answers: Answers, question: str) -> list[Row]:
     return [row for row in answers[question].rows if row["cause"] == cause]
 
 
-def _competitors(rows: Sequence[Row]) -> list[tuple[str, str]]:
-    """Return the effects that come nearest to a cause, by what they gain and by how they correlate with it."""
-    said = []
-    for name, variable in (("gain of rivals", "gain"), ("correlation with rivals", "correlation")):
-        known = sorted((row for row in rows if row[variable] is not None), key=lambda row: -row[variable])
-        foremost = [f"{effect_name(row)} {wording.number(row[variable])}" for row in known[:_FEW]]
-        said.append((name, "; ".join(foremost)))
-    return said
+def _competitors(rows: Sequence[Row]) -> str:
+    """Return the effects that could be in a cause's place, with their probabilities."""
+    return "; ".join(f"{effect_name(row)} {wording.share(row['probability'])}" for row in rows)
 
 
 def _said(value: float | str, unit: str | None) -> str:

@@ -83,27 +83,6 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
     return said if not more else f"{said}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
-def halves(first: bool | None, last: bool | None, repeats: float | None) -> str | None:
-    """Say how a cause fares in halves of the time, which are asked where runs are few; None where they were not.
-
-    first, last: whether a half shows it by itself; repeats: of what it closes in one, what it closes with the size that
-    it has in the other.
-    """
-    if first is None or last is None:
-        return None
-    shown = {
-        (True, True): "Found in both halves of the time, in each by itself",
-        (True, False): "Found by itself in the first half of the time only",
-        (False, True): "Found by itself in the second half of the time only",
-        (False, False): "Found in all of the time together, in neither half of it by itself",
-    }[first, last]
-    if repeats is None:
-        return f"{shown}."
-    if repeats <= 0:
-        return f"{shown}; the halves contradict each other on its size."
-    return f"{shown}; with the size found in one half it closes {wording.share(repeats)} of what it can in the other."
-
-
 def closes(share: float, interval: Sequence[float] | None) -> str:
     """Say how much of a gap closes."""
     within = "" if interval is None else f" (95 % interval {' to '.join(map(wording.share, interval))})"
@@ -122,5 +101,10 @@ def joints_of(cause: str, answers: Answers) -> list[str]:
 
 
 def rivals_of(cause: str, answers: Answers) -> list[str]:
-    """Return the effects that explain the data as well as a cause (its IRI) does."""
-    return [effect_name(row, "rival") for row in answers["rivals"].rows if row["cause"] == cause]
+    """Return the effects that the data do not tell from a cause (its IRI), with their probabilities if known."""
+    return [_rival(row) for row in answers["rivals"].rows if row["cause"] == cause]
+
+
+def _rival(row: Row) -> str:
+    sure = row["probability"]
+    return effect_name(row, "rival") + ("" if sure is None else f" ({wording.share(sure)})")
