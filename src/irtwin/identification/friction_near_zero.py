@@ -122,7 +122,7 @@ def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequ
     if not factors:
         return None
     whole = combine(factors, pattern[joint])[:, np.append(pattern[joint], True)]
-    left = [_left(whole, factors, [*range(own), own + k]) for k in range(len(shapes) + 1)]
+    left = _left(whole, factors, own)
     best = min(range(1, len(left)), key=lambda k: float(left[k].sum()))
     return shapes[best - 1] if _everywhere(left[0] - left[best]) else None
 
@@ -133,11 +133,24 @@ def _everywhere(saved: np.ndarray) -> bool:
     return bool(ranks[saved > 0].sum() >= _NEARLY_ALL * ranks.sum())
 
 
-def _left(whole: np.ndarray, factors: Sequence[np.ndarray], columns: Sequence[int]) -> np.ndarray:
-    """Return the squares that some columns leave in each block."""
-    used = whole[:, columns]
-    size = np.linalg.norm(used, axis=0)
+def _left(whole: np.ndarray, factors: Sequence[np.ndarray], own: int) -> np.ndarray:
+    """Return the squares that the first `own` columns and each of the S others leave in each block, (S, B).
+
+    The first are decomposed once for all others: of many joints they are many.
+    """
+    beside = _fitted(whole[:, :own], whole[:, own:])
+    shapes, measured = np.split(whole[:, own:] - whole[:, :own] @ beside, [-1], axis=1)
+    squares = (shapes**2).sum(axis=0)
+    told = squares > _NOTHING**2 * (whole[:, own:-1] ** 2).sum(axis=0)
+    values = np.where(told, measured[:, 0] @ shapes, 0.0) / np.where(told, squares, 1.0)
+    weights = np.concatenate([beside[:, :-1] * values - beside[:, -1:], -np.diag(values), np.ones((1, len(values)))])
+    return np.array([((factor @ weights) ** 2).sum(axis=0) for factor in factors]).T
+
+
+def _fitted(columns: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the least coefficients (K, S) by which columns (r, K) explain others (r, S)."""
+    size = np.linalg.norm(columns, axis=0)
     shown = size > _NOTHING * size.max(initial=0.0)
-    values = np.zeros(len(columns))
-    values[shown] = np.linalg.lstsq(used[:, shown] / size[shown], whole[:, -1], rcond=_NOTHING)[0] / size[shown]
-    return np.array([np.sum((factor[:, -1] - factor[:, columns] @ values) ** 2) for factor in factors])
+    found = np.zeros((columns.shape[1], others.shape[1]))
+    found[shown] = np.linalg.lstsq(columns[:, shown] / size[shown], others, rcond=_NOTHING)[0] / size[shown, None]
+    return found

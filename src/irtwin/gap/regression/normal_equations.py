@@ -258,6 +258,11 @@ class System:
         products = total.among(inside, np.append(inside, self._size))
         return self._solved(inside, products[:, :-1], products[:, -1])
 
+    @cached_property
+    def noise_before(self) -> np.ndarray:
+        """(g,) RMS that the twin alone leaves of each equation, equations weighted alike."""
+        return self.residual_rms((), np.ones(len(self.pattern)))
+
     def _inside(self, chosen: Sequence[int]) -> np.ndarray:
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))
 
@@ -283,7 +288,7 @@ def least_noise(squares: float) -> float:
 
 def noise_before(system: System) -> np.ndarray:
     """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
-    return system.residual_rms((), np.ones(len(system.pattern)))
+    return system.noise_before
 
 
 def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
