@@ -13,6 +13,7 @@ from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.thresholds import Ambiguity, Thresholds
+from irtwin.identification.progress import Tell, paced
 
 _Parts = tuple[Variant, ...]
 
@@ -24,6 +25,7 @@ def causes(
     candidates: Sequence[Hypothesis],
     found: Sequence[Find],
     limits: Thresholds,
+    tell: Tell | None = None,
 ) -> tuple[Cause, ...]:
     """Join the finds of one effect and scope into causes, look for rivals of each, and rank them.
 
@@ -35,22 +37,25 @@ def causes(
     for key in keys:
         members = [one for one in found if (one.hypothesis.effect, one.hypothesis.scope) == key]
         others = [k for one in found if one not in members for k in one.variant.columns]
-        joined.append(_cause(system, moments, candidates, members, others, limits))
+        joined.append(_cause(system, moments, candidates, members, others, limits, tell))
     if not joined:
         return ()
     joined.sort(key=lambda one: -one.gain)
-    alone = _in_equations(system, moments, noise, joined)
+    alone = _in_equations(system, moments, noise, joined, paced(tell))
     least = [limits.ambiguity.least_share * float(alone[system.equations(one.columns)].sum()) for one in joined]
     return tuple(one for one, needed in zip(joined, least, strict=True) if one is joined[0] or one.gain >= needed)
 
 
-def _in_equations(system: System, moments: Sequence[Moments], noise: np.ndarray, named: Sequence[Cause]) -> np.ndarray:
+def _in_equations(
+    system: System, moments: Sequence[Moments], noise: np.ndarray, named: Sequence[Cause], told: Tell
+) -> np.ndarray:
     """Return (g,) what the first cause explains of each equation beside the others, a row, on groups left out."""
     rest = [k for cause in named[1:] for k in cause.columns]
     every = [*named[0].columns, *rest]
     total = summed(moments)
     gain = np.zeros(len(system.pattern))
     for group in np.flatnonzero(judged(system, named[0].scope)).tolist():
+        told(f"  what the first cause explains, group {group + 1} of {len(moments)} left out")
         train = total - moments[group]
         gain += system.squares(system.solution(rest, train), group) - system.squares(
             system.solution(every, train), group
@@ -65,13 +70,14 @@ def _cause(
     members: Sequence[Find],
     others: Sequence[int],
     limits: Thresholds,
+    tell: Tell | None,
 ) -> Cause:
     effect, scope = members[0].hypothesis.effect, members[0].hypothesis.scope
     mine: _Parts = tuple(one.variant for one in members)
-    competing = _competing(system, moments, candidates, members, others)
+    competing = _competing(system, moments, candidates, members, others, tell)
     sides = [mine, *(parts for _, parts in competing)]
     own = judged(system, scope)
-    trial = attempt(system, moments, others, [[as_one(parts)] for parts in sides])
+    trial = attempt(system, moments, others, [[as_one(parts)] for parts in sides], tell)
     gain, said = gains(system, trial)[:, own], (trial.said[0] / rows(system))[own]
     mean = np.average(gain, axis=1, weights=rows(system)[own])
     alike = canonical_correlation(system, summed(moments), others, [as_one(parts).columns for parts in sides])
@@ -118,12 +124,13 @@ def _competing(
     candidates: Sequence[Hypothesis],
     members: Sequence[Find],
     others: Sequence[int],
+    tell: Tell | None,
 ) -> list[tuple[str, _Parts]]:
     """Return what could stand where the members do: other effects at the same joints, or of the whole robot."""
     joints = tuple(one.hypothesis.joint for one in members if one.hypothesis.joint)
     mine = (members[0].hypothesis.effect, members[0].hypothesis.scope)
     free = [h for h in candidates if not any(set(v.columns) & set(others) for v in h.variants)]
-    best = attempt(system, moments, others, [h.variants for h in free]).best
+    best = attempt(system, moments, others, [h.variants for h in free], tell).best
     variants = [variant for h in free for variant in h.variants]
     choice = {(h.effect, h.scope, h.joint): variants[k] for h, k in zip(free, best, strict=True)}
     competing: list[tuple[str, _Parts]] = []

@@ -15,10 +15,10 @@ from irtwin.gap.regression.cross_validation import Trial, attempt, scores
 from irtwin.gap.regression.hypotheses import MISSING, Hypothesis, in_scope
 from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.progress import Tell, paced
 from irtwin.gap.regression.significance import p_values
 from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.thresholds import Selection, Thresholds
+from irtwin.identification.progress import Tell, paced
 
 _ROUNDS = 12
 
@@ -52,7 +52,7 @@ def attribute(
     noise = system.residual_rms((), np.ones(len(system.pattern)))
     noise = system.residual_rms((), noise)
     moments = system.moments(noise)
-    first = attempt(system, moments, (), [h.variants for h in candidates])
+    first = attempt(system, moments, (), [h.variants for h in candidates], tell)
     search = _Search(system, candidates, seed, floor, limits, paced(tell))
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
@@ -60,7 +60,7 @@ def attribute(
     least = search.matters(noise, [one.hypothesis for one in found]) / 2
     found = _backward(system, moments, found, least, limits.selection)
     search.tell(f"  rivals of the {len(found)} that are found")
-    named = causes(system, moments, noise, candidates, found, limits)
+    named = causes(system, moments, noise, candidates, found, limits, search.tell)
     noise = system.residual_rms([k for cause in named for k in cause.columns], noise)
     return Attribution(named, noise, tuple(candidates), first.visible, first.share_visible)
 
@@ -121,7 +121,7 @@ class _Search:
         left = self._left(found)
         if not left:
             return []
-        trial = attempt(self.system, moments, chosen, [h.variants for h in left])
+        trial = attempt(self.system, moments, chosen, [h.variants for h in left], self.tell)
         gain, t, speaks = _judged(self.system, trial, left, self.limits.selection)
         transient = self.system.transient
         short = [k for k, one in enumerate(left) if transient and any(is_transient(v.effect) for v in one.variants)]
@@ -130,7 +130,9 @@ class _Search:
         plausible = (gain >= self.matters(noise, left)) & ((t >= limits.least_t) | alone)
         if not plausible.any():
             return []
+        self.tell("  whether chance reaches what they gain")
         block_scores, products = scores(self.system, moments, noise, chosen)
+        self.tell("  whether chance reaches what they gain")
         p = p_values(block_scores, products, left, self.seed)
         p[short] = transient.p if transient else 1.0
         sure = np.flatnonzero(plausible & (_sure(p, gain, left, limits) | alone))
@@ -146,7 +148,7 @@ class _Search:
         if not left:
             return []
         chosen, limits = _columns(found), self.limits.selection
-        trial = attempt(self.system, moments, chosen, [h.variants for h in left])
+        trial = attempt(self.system, moments, chosen, [h.variants for h in left], self.tell)
         gain, t, _ = _judged(self.system, trial, left, self.limits.selection)
         p = p_values(*scores(self.system, moments, noise, chosen), left, self.seed)
         enough = np.where(

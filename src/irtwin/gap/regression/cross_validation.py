@@ -12,6 +12,7 @@ from irtwin.gap.regression.hypotheses import Variant, bounds
 from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.transient import is_transient
+from irtwin.identification.progress import Tell, paced
 
 _PANEL = 256  # rows of a product of matrices, at least
 _QUIET = 0.3  # of the noise: what is left of a block is never taken for less
@@ -46,16 +47,23 @@ class _Batch:
 
 
 def attempt(
-    system: System, moments: Sequence[Moments], chosen: Sequence[int], candidates: Sequence[Sequence[Variant]]
+    system: System,
+    moments: Sequence[Moments],
+    chosen: Sequence[int],
+    candidates: Sequence[Sequence[Variant]],
+    tell: Tell | None = None,
 ) -> Trial:
     """Try hypotheses, each a list of variants, beside the twin's terms and the `chosen` columns.
 
     Everything is refitted without each group in turn; the shape (variant) is chosen inside the training groups. What is
     brief has its coefficients from all groups: other runs cannot tell them, and joints have told that they agree.
+    `tell` is told how far that has come, where it takes long.
     """
     variants = [variant for group in candidates for variant in group]
     owner = np.repeat(np.arange(len(candidates)), [len(group) for group in candidates])
     batches = _batches(system, variants)
+    told = paced(tell)
+    told(f"  {len(candidates)} hypotheses, in all groups")
     total = summed(moments)
     asked = _asked(total, [k for variant in variants for k in variant.columns])
     whole, _ = _project(system, total, None, chosen, asked)
@@ -63,6 +71,7 @@ def attempt(
     start = np.empty(len(moments))
     loss, said = np.empty((2, len(candidates), len(moments)))
     for group, part in enumerate(moments):
+        told(f"  {len(candidates)} hypotheses, group {group + 1} of {len(moments)} left out")
         train, test = _project(system, total, part, chosen, asked)
         start[group] = test.squares([total.size - 1])[0]
         inner, left_out, adds, _ = _fit(train, test, batches, len(variants))
@@ -71,6 +80,7 @@ def attempt(
                 left_out[place] = _left(test, variant.columns, values[place])
         best = _best(inner, owner, len(candidates))
         loss[:, group], said[:, group] = left_out[best], adds[best]
+    told(f"  {len(candidates)} hypotheses, what each adds")
     best = _best(objective, owner, len(candidates))
     columns = [k for place in best for k in variants[place].columns]
     ends = np.cumsum([len(variants[place].columns) for place in best])[:-1]
