@@ -16,7 +16,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
-from irtwin.gap.data.baseline import said_of_twin
+from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import REPEATS, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
@@ -29,6 +29,7 @@ from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
 from irtwin.gap.experiment.planned_equations import planned_equations
 from irtwin.gap.experiment.programmes import excitation_of
+from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
@@ -175,6 +176,9 @@ def diagnose(
     diagnosed.
     """
     tell = Told(progress or (lambda line: None))
+    expected = forecast(data_set, baseline(data_set, withhold, twin, thresholds.given_twin))
+    if expected.long:
+        tell(expected.line)
     tell(f"Filtering {len(data_set.runs)} runs")
     case = case_of(data_set, withhold, thresholds, twin, tell)
     for line in said_of_twin(data_set, twin) if twin else ():
