@@ -49,11 +49,14 @@ def attribute(
     `tell` is told how far that has come, where it takes long.
     """
     candidates = in_scope(candidates, both=system.both)
+    told = paced(tell)
+    told("  what the twin leaves")
     noise = system.residual_rms((), np.ones(len(system.pattern)))
+    told("  what the twin leaves")
     noise = system.residual_rms((), noise)
     moments = system.moments(noise)
     first = attempt(system, moments, (), [h.variants for h in candidates], tell)
-    search = _Search(system, candidates, seed, floor, limits, paced(tell))
+    search = _Search(system, candidates, seed, floor, limits, told)
     found = _swapped(search, search.forward([], noise), noise)
     noise = search.noise(found, noise)
     moments = system.moments(noise)
@@ -106,6 +109,7 @@ class _Search:
         """Add to the finds, round by round, until nothing more is sure."""
         all_found = list(found)
         for _ in range(_ROUNDS):
+            self.tell(f"  what the {len(all_found)} that are found leave")
             if all_found:
                 noise = self.noise(all_found, noise)
             moments = self.system.moments(noise)
@@ -131,7 +135,7 @@ class _Search:
         if not plausible.any():
             return []
         self.tell("  whether chance reaches what they gain")
-        block_scores, products = scores(self.system, moments, noise, chosen)
+        block_scores, products = scores(self.system, moments, noise, chosen, self.tell)
         self.tell("  whether chance reaches what they gain")
         p = p_values(block_scores, products, left, self.seed)
         p[short] = transient.p if transient else 1.0
@@ -150,7 +154,7 @@ class _Search:
         chosen, limits = _columns(found), self.limits.selection
         trial = attempt(self.system, moments, chosen, [h.variants for h in left], self.tell)
         gain, t, _ = _judged(self.system, trial, left, self.limits.selection)
-        p = p_values(*scores(self.system, moments, noise, chosen), left, self.seed)
+        p = p_values(*scores(self.system, moments, noise, chosen, self.tell), left, self.seed)
         enough = np.where(
             [self.share_of_floor(one.variants[0].effect) > 0 for one in left], 1.0, limits.second_joint_gain
         )

@@ -67,6 +67,7 @@ def attempt(
     total = summed(moments)
     asked = _asked(total, [k for variant in variants for k in variant.columns])
     whole, _ = _project(system, total, None, chosen, asked)
+    told(f"  {len(candidates)} hypotheses, in all groups")
     objective, _, _, values = _fit(whole, whole, batches, len(variants))
     start = np.empty(len(moments))
     loss, said = np.empty((2, len(candidates), len(moments)))
@@ -92,11 +93,16 @@ def attempt(
 
 
 def scores(
-    system: System, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]
+    system: System,
+    moments: Sequence[Moments],
+    noise: np.ndarray,
+    chosen: Sequence[int],
+    tell: Tell | None = None,
 ) -> tuple[np.ndarray, Projected]:
     """Return each block's score of each column (B, D), and the products of what the fit leaves of columns.
 
-    A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
+    A block's equations count by the inverse of what is left of them, so that no few blocks decide alone. `tell` as
+    for `attempt`.
     """
     total = summed(moments)
     inside = _inside(system, chosen)
@@ -106,7 +112,9 @@ def scores(
     rest[-1] = 1.0
     rest[inside] = -weights[:, -1]
     found = np.empty((len(system.blocks), total.size - 1))
+    told = paced(tell)
     for block in range(len(system.blocks)):
+        told(f"  whether chance reaches what they gain, block {block + 1} of {len(system.blocks)}")
         vector = np.zeros(total.size)
         for equation, level in enumerate(noise):
             left, own = system.scored(block, equation, rest)
