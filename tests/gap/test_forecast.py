@@ -19,7 +19,8 @@ MEASURED = {  # s of processor and bytes of `bench/diagnosis_speed.py` 12x1000xJ
     6: (13.8, 467e6),
     12: (57.5, 710e6),
     20: (112.9, 1388e6),
-    30: (179.2, 2027e6),
+    30: (157.6, 1960e6),
+    40: (431.5, 3265e6),
 }
 
 

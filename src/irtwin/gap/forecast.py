@@ -22,8 +22,9 @@ LONG = 30.0  # s: of less nothing is said
 _GROUPS = 8  # at least: few runs are cut in time
 _BLOCKS = 40  # at least
 
-# Fitted to `bench/diagnosis_speed.py`: 12x1000 and 12x5000 of 6 joints, 12x1000 of 12, 20, 30 and 40, with power
-# (docs/findings/gap-diagnosis.md, "Many joints"); how often is searched depends on what is found.
+# Set by hand to what `bench/diagnosis_speed.py` took, with power: 12x1000 and 12x5000 of 6 joints, 12x1000 of 12 and of
+# 30; 20 and 40 were measured after (docs/findings/gap-diagnosis.md, "Many joints"). How often is searched depends on
+# what is found.
 _PER_SAMPLE = 4e-5  # s, of each sample and joint
 _PER_PRODUCT = 4.5e-6  # s, of each product of a term of the twin with a column, in each group
 _PER_FIT = 4e-9  # s, of each of these and each term of the twin: fits carried over to all columns
