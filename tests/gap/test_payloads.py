@@ -15,12 +15,13 @@ from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.payloads import untold_payload
 from irtwin.gap.thresholds import DEFAULT
+from irtwin.identification import progress
 
 ROBOT = arm(4)
 LOAD = np.array([0.6, 0.0, 0.02, 0.05, 0, 0, 0, 0, 0, 0])
 
 
-def search(loaded, observed=range(8), added=None):
+def search(loaded, observed=range(8), added=None, tell=None):
     motions = []
     for seed in range(8):
         motion = replace(swing(ROBOT, seed, seconds=6.0, rate=50.0), run=f"run_{seed}")
@@ -32,7 +33,7 @@ def search(loaded, observed=range(8), added=None):
         {m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed), DEFAULT.admission.fewest_groups
     )
     system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
-    return untold_payload(ROBOT, system, noise_before(system), DEFAULT.some_payload, seed=0)
+    return untold_payload(ROBOT, system, noise_before(system), DEFAULT.some_payload, seed=0, tell=tell)
 
 
 def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():
@@ -40,6 +41,14 @@ def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():
     assert found.effect.runs == ("run_1", "run_4", "run_5")
     assert found.gain > 0.03
     assert found.p <= 0.01
+
+
+def test_the_search_says_how_far_it_has_come(monkeypatch):
+    monkeypatch.setattr(progress, "_EVERY", 0.0)
+    lines = []
+    search((1, 4, 5), tell=lines.append)
+    assert "  payloads in run_7" in lines
+    assert "  payloads without group 8" in lines
 
 
 def test_of_six_runs_joints_tell_what_signs_of_runs_cannot():

@@ -13,6 +13,7 @@ import click
 from irtwin.cli.options import (
     DAY,
     Number,
+    announce,
     database_option,
     graph_option,
     payload_com_option,
@@ -26,6 +27,7 @@ from irtwin.errors import InputError
 if TYPE_CHECKING:
     from irtwin.plans import Kept
 
+_LONG = 30.0  # s: of less nothing is said before
 _PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
@@ -246,6 +248,9 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
             upper=(max(x, other[0]), max(y, other[1]), max(z, other[2])),
         )
     checks_itself = CollisionModel(robot).checks_itself
+    expected = excitation.expected_seconds(len(robot.joints), seconds)
+    if expected > _LONG:
+        announce(f"{len(robot.joints)} joints: about {10 * round(expected / 10)} s of processor")
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
     _say_unchecked(checks_itself)

@@ -8,14 +8,16 @@ from irtwin.effects.effect import Effect
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import CHANGED, place_of
+from irtwin.identification.progress import Tell
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 
 
-def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
+def closed_twin(case: Case, causes: Sequence[Cause], tell: Tell | None = None) -> Twin:
     """Return the twin with the causes added; where some effect changed, fitted to the observed runs alone.
 
-    A changed effect that the twin has needs no second one; a load at the flange is one with the last body.
+    A changed effect that the twin has needs no second one; a load at the flange is one with the last body. `tell` is
+    told how far that has come, where it takes long.
     """
     added: list[Effect] = []
     for cause in causes:
@@ -32,4 +34,4 @@ def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
     changed = any(cause.scope == CHANGED for cause in causes)
     robot, motions = case.given
     used = [motion for run, motion in motions.items() if run in case.observed or not changed]
-    return identify(robot, used, [*case.effects, *added], case.prior)
+    return identify(robot, used, [*case.effects, *added], case.prior, tell)

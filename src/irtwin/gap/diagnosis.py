@@ -16,7 +16,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin
-from irtwin.gap.data.baseline import said_of_twin
+from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
@@ -29,6 +29,7 @@ from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
 from irtwin.gap.experiment.planned_equations import planned_equations
 from irtwin.gap.experiment.programmes import excitation_of
+from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
@@ -52,6 +53,7 @@ from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
 from irtwin.gap.thresholds import DEFAULT, Thresholds
+from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.two_processes import begun
 from irtwin.robot.description import Robot
@@ -165,25 +167,29 @@ def diagnose(
     an effect that the catalogue lacks or the twin has not, on a twin of another robot, and where the data set cannot be
     diagnosed.
     """
-    tell = progress or (lambda line: None)
+    tell = Told(progress or (lambda line: None))
+    expected = forecast(data_set, baseline(data_set, withhold, twin, thresholds.given_twin))
+    if expected.long:
+        tell(expected.line)
     tell(f"Filtering {len(data_set.runs)} runs")
-    case = case_of(data_set, withhold, thresholds, twin)
+    case = case_of(data_set, withhold, thresholds, twin, tell)
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
-    excitation = begun(lambda: excitation_of(case.robot), worth=case.long)  # the next experiment's
+    excitation = begun(lambda: excitation_of(case.robot, tell), worth=case.long)  # the next experiment's
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = _plain(case, stack, tell)
     differ = disturbances(case)
     case, taken = removed(case, stack, plain, differ)
     if taken:
-        case = case.with_friction_near_zero()
+        case = case.with_friction_near_zero(tell)
         stack = case.stack.with_effects(stack.effects)
         plain = _plain(case, stack, tell)
+    tell.step("  the noise floor")
     floor = noise_floor(case.runs, case.motions, thresholds.repeats)
     if case.shows("torque") and plain is not None:
         _check_observed(plain)
-    power_stack, predicted, below = _torque_source(case, stack, plain)
+    power_stack, predicted, below = _torque_source(case, stack, plain, tell)
     loaded = with_load(case.robot, below)
 
     @cache
@@ -207,7 +213,7 @@ def diagnose(
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
     causes = [cause for one in explained for cause in one.finding.causes]
-    twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
+    twin_with_causes = begun(partial(closed_twin, case, causes, tell), worth=case.long)
     if case.shows("power"):
         tell("Trying every effect on power")
         of_twin = None if torque is predicted else before
@@ -220,7 +226,7 @@ def diagnose(
     if len(every := [cause for finding in findings for cause in finding.causes]) > len(causes):
         twin_with_causes.drop()
         causes = every
-        twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
+        twin_with_causes = begun(partial(closed_twin, case, causes, tell), worth=case.long)
     blamed = {cause.effect for cause in causes}
     screened = (LocalEffect,) if case.shows("torque") else ()
     silent = [
@@ -231,7 +237,9 @@ def diagnose(
     lacking = untestable(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
     )
-    left = [channel_residual(case, one, predicted if one.finding.name == "torque" else torque) for one in explained]
+    left = [
+        channel_residual(case, one, predicted if one.finding.name == "torque" else torque, tell) for one in explained
+    ]
     open_because = left_open(
         findings,
         thresholds,
@@ -240,19 +248,20 @@ def diagnose(
         differing=differ,
         explained=[one.disturbance for one in taken],
     )
-    located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
+    located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None, tell)
     tell("Designing the next experiment")
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
-    measures = {channel.finding.name: flexible_regression(channel, case.seen, seed) for channel in planned}
+    measures = {channel.finding.name: flexible_regression(channel, case.seen, seed, tell) for channel in planned}
     proposal = next_experiment(
         case.robot,
         planned,
         [catalogue()[one.effect] for one in lacking],
         case.seen,
         thresholds.experiment,
-        excitation,
+        lambda: excitation(lambda: tell.step("  waiting for the exciting motion")),
         tell,
     )
+    identified = twin_with_causes(lambda: tell.step("  waiting for the twin with its causes"))
     return Diagnosis(
         description=case.robot,
         left_open=open_because,
@@ -265,7 +274,7 @@ def diagnose(
         experiment=None if proposal is None else proposal.experiment,
         planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
         curves=drawn(left, located, None if proposal is None else proposal.curve),
-        twin=replace(twin_with_causes(), torque_scale=scale),
+        twin=replace(identified, torque_scale=scale),
         energies=energies,
         not_repeating=tuple(differ),
         removed=tuple(taken),
@@ -286,7 +295,7 @@ def _check_observed(system: System) -> None:
         raise InputError("in no observed run does a joint move for longer than the filter; log longer runs")
 
 
-def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stack, Torque, Below]:
+def _torque_source(case: Case, stack: Stack, plain: System | None, tell: Progress) -> tuple[Stack, Torque, Below]:
     """Return the effects that explain power, the joint torque that they are given, and what those of torque stand on.
 
     It is that of a fit to torque (`plain`: the twin's equations) without the run's group; where no run shows torque,
@@ -297,7 +306,7 @@ def _torque_source(case: Case, stack: Stack, plain: System | None) -> tuple[Stac
         return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
     if case.shows("torque"):
         check_same_robot(case.runs, stack, plain, case.thresholds.same_robot)
-    left_out = LeftOut(stack, plain)
+    left_out = LeftOut(stack, plain, tell)
     return stack, left_out.torque, left_out.below
 
 
@@ -317,7 +326,7 @@ def _torque(
 
     `before` gives the power that the twin takes by the joint torque `predicted`.
     """
-    found = screen(case, stack, plain, seed)
+    found = screen(case, stack, plain, seed, tell)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
             below(motion)

@@ -16,6 +16,7 @@ from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.fits import fit_torque
+from irtwin.identification.progress import Tell
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import Run
@@ -26,11 +27,11 @@ _FEWEST_PERIODS = 20  # of the cutoff in what is fitted, and in what is held out
 _BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, in the mean: less is chance
 
 
-def cutoff_for(robot: Robot, runs: Sequence[Run]) -> float:
+def cutoff_for(robot: Robot, runs: Sequence[Run], tell: Tell | None = None) -> float:
     """Return the cutoff, Hz, for runs that are to be treated alike.
 
     It is ten times the band of the motion (`choose_cutoff`), or that halved as long as the torque of what is held out
-    is told better so. Without torque nothing tells it.
+    is told better so. Without torque nothing tells it. `tell` is told how far that has come, where it takes long.
     """
     cutoff = choose_cutoff(runs)
     measured = [run for run in runs if run.signals.torque is not None]
@@ -41,9 +42,9 @@ def cutoff_for(robot: Robot, runs: Sequence[Run]) -> float:
     halved = 1 if len(looked_at) > 1 else 2
     seconds = min(float(run.signals.time[-1] - run.signals.time[0]) for run in looked_at) / halved
     try:
-        error = _held_out(robot, looked_at, cutoff)
+        error = _held_out(robot, looked_at, cutoff, tell)
         while cutoff / 2 * seconds >= _FEWEST_PERIODS:
-            lower = _held_out(robot, looked_at, cutoff / 2)
+            lower = _held_out(robot, looked_at, cutoff / 2, tell)
             if lower > error + np.log(1 - _BETTER):
                 break
             cutoff, error = cutoff / 2, lower
@@ -52,14 +53,14 @@ def cutoff_for(robot: Robot, runs: Sequence[Run]) -> float:
     return cutoff
 
 
-def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float) -> float:
+def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None) -> float:
     """Return the mean over joints of the logarithm of the squares left in torque as logged, by a fit to the rest."""
     stack = Stack(robot, EXCITED)
     motions = [condition(run, robot, cutoff) for run in runs]
     logged = {run.name: run.signals for run in runs}
     squares, count = np.zeros(len(robot.joints)), np.zeros(len(robot.joints))
     for fitted, judged in _halves(motions):
-        values = fit_torque(stack, fitted)[1].values
+        values = fit_torque(stack, fitted, tell)[1].values
         for motion in judged:
             torque = make_interp_spline(logged[motion.run].time, logged[motion.run].torque, k=1)(motion.time)
             decided = ~stack.undecided(motion)

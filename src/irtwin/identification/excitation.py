@@ -31,6 +31,8 @@ _RESERVE = 0.99  # share of the joint limits that is used: controllers round, to
 _STARTS = 10
 _POSTURES = 300
 _MOST_WORK = 3e8  # products of regressors' numbers, an iteration asked for: tens of times what seven joints take
+_PER_POINT = 3e-5  # s, of each joint at each point of the grid in an iteration, and
+_PER_WORK = 4e-10  # s, of each product: chains of 7, 12 and 30 joints took 17, 34 and 91 s, with others beside them
 _MOST = 100_000_000  # numbers that a motion is worked out from: 3600 s at 500 Hz of six joints, 0.8 GB
 
 
@@ -70,6 +72,28 @@ class Excitation:
             part.replace(path)
         except OSError as error:
             raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def expected_seconds(joints: int, seconds: float, iterations: int = 200) -> float:
+    """Return about how many seconds of processor `excite` takes for so many joints, at its most.
+
+    An iteration takes as long as its joints are many, until the search reaches its most work; its starts take as long
+    as some more.
+    """
+    grid = len(_rest_of(seconds).grid)
+    work = _work(grid, joints)
+    count = min(iterations, iterations * _MOST_WORK / work) + 2 * _STARTS
+    return (_PER_POINT * grid * joints + _PER_WORK * work) * count
+
+
+def _rest_of(seconds: float) -> RestSeries:
+    period = seconds / math.ceil(seconds / _LONGEST_PERIOD)
+    return RestSeries(period, min(10, max(5, math.ceil(period / 2))))
+
+
+def _work(grid: int, joints: int) -> float:
+    """Return the products of a cost and its gradient: those of all columns, 10 n, of regressors with n rows each."""
+    return float(grid * joints * (10 * joints) ** 2)
 
 
 @one_blas_thread()
@@ -133,8 +157,7 @@ class _Search:
         self._body = OwnBody(robot)
         self._regressor = BaseRegressor(robot)
         self._random = random
-        period = seconds / math.ceil(seconds / _LONGEST_PERIOD)
-        self._rest = RestSeries(period, min(10, max(5, math.ceil(period / 2))))
+        self._rest = _rest_of(seconds)
         factor = between_samples(self._rest.harmonics, len(self._rest.grid))
         self._ranges = tuple(_RESERVE * limit / factor for limit in self._limits.ranges)
         self._box = box
@@ -194,9 +217,8 @@ class _Search:
         )
 
     def _spend(self, most: float) -> None:
-        """Count the products of a cost and its gradient: those of all columns, 10 n, of regressors with n rows each."""
-        n = len(self._robot.joints)
-        self._work += len(self._rest.grid) * n * (10 * n) ** 2
+        """Count the products of a cost and its gradient."""
+        self._work += _work(len(self._rest.grid), len(self._robot.joints))
         if self._work > most:
             raise _MostWork
 

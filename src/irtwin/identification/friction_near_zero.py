@@ -17,6 +17,7 @@ from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
+from irtwin.identification.progress import Tell, paced, with_progress
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -29,10 +30,13 @@ _NEARLY_ALL = 0.85  # of the ranks: real turns have 0.87 and more, forms of fric
 _NOTHING = 1e-9  # of the largest column: less is not shown
 
 
-def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> Robot:
+def with_friction_near_zero(
+    robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect], tell: Tell | None = None
+) -> Robot:
     """Return the robot with the turn of each joint's dry friction, as its torque shows it beside some effects.
 
-    A joint whose torque shows none, or in which it makes no sure difference, has friction that turns at once.
+    A joint whose torque shows none, or in which it makes no sure difference, has friction that turns at once. `tell` is
+    told how far that has come, where it takes long.
     """
     measured = [motion for motion in motions if motion.torque is not None]
     plain = replace(robot, joints=tuple(replace(j, friction_width=None, friction_exponent=None) for j in robot.joints))
@@ -52,9 +56,10 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
         for shape in effect.candidates(plain)
         if isinstance(shape, JointEffect) and shape != effect
     ]
-    found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints))
+    found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints), tell)
     if any(found):
-        found = _found(stack, open_shapes, measured, [[] if one is None else _around(one) for one in found])
+        finer = [[] if one is None else _around(one) for one in found]
+        found = _found(stack, open_shapes, measured, finer, tell)
     return replace(
         plain,
         joints=tuple(
@@ -65,11 +70,19 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
 
 
 def _found(
-    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+    stack: Stack,
+    open_shapes: Sequence[JointEffect],
+    motions: Sequence[Motion],
+    tried: Sequence[Sequence[Turn]],
+    tell: Tell | None,
 ) -> list[Turn | None]:
     """Return the best of the turns that are tried in each joint; None where there is none."""
-    blocks, pattern = _reduced(stack, open_shapes, motions, tried)
-    return [_best(blocks, pattern, joint, turns) if turns else None for joint, turns in enumerate(tried)]
+    blocks, pattern = _reduced(stack, open_shapes, motions, tried, tell)
+    found, told = [], paced(tell)
+    for joint, turns in enumerate(tried):
+        told(f"  friction near zero speed, joint {joint + 1} of {len(tried)}")
+        found.append(_best(blocks, pattern, joint, turns) if turns else None)
+    return found
 
 
 def _around(found: Turn) -> list[Turn]:
@@ -79,7 +92,11 @@ def _around(found: Turn) -> list[Turn]:
 
 
 def _reduced(
-    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+    stack: Stack,
+    open_shapes: Sequence[JointEffect],
+    motions: Sequence[Motion],
+    tried: Sequence[Sequence[Turn]],
+    tell: Tell | None,
 ) -> tuple[list[Block], np.ndarray]:
     """Reduce the equations of torque.
 
@@ -106,7 +123,7 @@ def _reduced(
         undecided = stack.undecided(motion) | sticking.undecided(motion)
         return Rows(columns, stack.shift_torque(motion, own), motion.torque, undecided)
 
-    return accumulate(motions, equations, pattern), pattern
+    return accumulate(motions, with_progress(equations, motions, tell), pattern), pattern
 
 
 def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
@@ -122,7 +139,7 @@ def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequ
     if not factors:
         return None
     whole = combine(factors, pattern[joint])[:, np.append(pattern[joint], True)]
-    left = [_left(whole, factors, [*range(own), own + k]) for k in range(len(shapes) + 1)]
+    left = _left(whole, factors, own)
     best = min(range(1, len(left)), key=lambda k: float(left[k].sum()))
     return shapes[best - 1] if _everywhere(left[0] - left[best]) else None
 
@@ -133,11 +150,24 @@ def _everywhere(saved: np.ndarray) -> bool:
     return bool(ranks[saved > 0].sum() >= _NEARLY_ALL * ranks.sum())
 
 
-def _left(whole: np.ndarray, factors: Sequence[np.ndarray], columns: Sequence[int]) -> np.ndarray:
-    """Return the squares that some columns leave in each block."""
-    used = whole[:, columns]
-    size = np.linalg.norm(used, axis=0)
+def _left(whole: np.ndarray, factors: Sequence[np.ndarray], own: int) -> np.ndarray:
+    """Return the squares that the first `own` columns and each of the S others leave in each block, (S, B).
+
+    The first are decomposed once for all others: of many joints they are many.
+    """
+    beside = _fitted(whole[:, :own], whole[:, own:])
+    shapes, measured = np.split(whole[:, own:] - whole[:, :own] @ beside, [-1], axis=1)
+    squares = (shapes**2).sum(axis=0)
+    told = squares > _NOTHING**2 * (whole[:, own:-1] ** 2).sum(axis=0)
+    values = np.where(told, measured[:, 0] @ shapes, 0.0) / np.where(told, squares, 1.0)
+    weights = np.concatenate([beside[:, :-1] * values - beside[:, -1:], -np.diag(values), np.ones((1, len(values)))])
+    return np.array([((factor @ weights) ** 2).sum(axis=0) for factor in factors]).T
+
+
+def _fitted(columns: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the least coefficients (K, S) by which columns (r, K) explain others (r, S)."""
+    size = np.linalg.norm(columns, axis=0)
     shown = size > _NOTHING * size.max(initial=0.0)
-    values = np.zeros(len(columns))
-    values[shown] = np.linalg.lstsq(used[:, shown] / size[shown], whole[:, -1], rcond=_NOTHING)[0] / size[shown]
-    return np.array([np.sum((factor[:, -1] - factor[:, columns] @ values) ** 2) for factor in factors])
+    found = np.zeros((columns.shape[1], others.shape[1]))
+    found[shown] = np.linalg.lstsq(columns[:, shown] / size[shown], others, rcond=_NOTHING)[0] / size[shown, None]
+    return found

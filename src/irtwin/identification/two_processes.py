@@ -14,6 +14,8 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
+_A_WHILE = 1.0  # s
+
 _copied = False
 
 
@@ -53,12 +55,12 @@ class Begun(Generic[Made]):
     def __init__(self, work: Callable[[], Made], other: _Copy[Made] | None):
         self._work, self._other = work, other
 
-    def __call__(self) -> Made:
-        """Return the result."""
+    def __call__(self, waiting: Callable[[], None] | None = None) -> Made:
+        """Return the result; `waiting` is called now and then as long as the copy is at work."""
         if self._other is None:
             return self._work()
         with self._other as other:
-            return other.made()[0]
+            return other.made(waiting)[0]
 
     def drop(self) -> None:
         """End the work: nobody will ask."""
@@ -85,9 +87,11 @@ class _Copy(Generic[Made]):
     def __enter__(self) -> _Copy[Made]:
         return self
 
-    def made(self) -> list[Made]:
-        """Wait for what the work makes."""
+    def made(self, waiting: Callable[[], None] | None = None) -> list[Made]:
+        """Wait for what the work makes; `waiting` is called meanwhile."""
         try:
+            while waiting is not None and not self._from.poll(_A_WHILE):
+                waiting()
             count = self._from.recv()
             if isinstance(count, BaseException):
                 raise count

@@ -26,6 +26,7 @@ from irtwin.identification.fits import (
     real_terms,
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
+from irtwin.identification.progress import Tell
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
 from irtwin.identification.uncertainty import half_widths, normal_covariance
@@ -42,6 +43,7 @@ def identify(
     motions: Sequence[Motion],
     effects: Sequence[str | Effect] = BASELINE,
     prior: Prior | None = None,
+    tell: Tell | None = None,
 ) -> Twin:
     """Return the twin of a robot that fits the motions.
 
@@ -54,7 +56,8 @@ def identify(
     Effects are ids, for which the data choose among the candidates of shape (joint by joint), or effects of a shape.
     Those that nothing measured can show are listed as `unidentified`, and left out. Where columns depend on what other
     effects predict, fit and prediction are repeated until they agree. `prior` is what is known before the motions;
-    None: what the catalogue expects. Raises InputError where there is nothing to fit.
+    None: what the catalogue expects. `tell` is told how far that has come, where it takes long. Raises InputError where
+    there is nothing to fit.
     """
     if not motions:
         raise InputError("there is no run to fit a twin to; give at least one")
@@ -66,20 +69,21 @@ def identify(
     measured = [motion for motion in motions if motion.torque is not None or motion.power is not None]
     if not with_torque and not with_power:
         raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
-    robot = with_friction_near_zero(robot, with_torque, effects)
+    robot = with_friction_near_zero(robot, with_torque, effects, tell)
     stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
     base: tuple[BaseParameter, ...] = ()
     condition: float | None = None
     if with_torque:
-        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque)[1])
-        blocks, torque = fit_torque(stack, with_torque)
+        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque, tell)[1])
+        blocks, torque = fit_torque(stack, with_torque, tell)
         of_power: list[Found] = []
         if with_power and not stack.fixed.all():
             values = torque.values
             stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values))
             if any(effect.carries_torque for effect in stack.effects):
-                torque = fit_both(stack, measured, values, blocks if len(with_torque) == len(measured) else None)
+                known = blocks if len(with_torque) == len(measured) else None
+                torque = fit_both(stack, measured, values, known, tell)
             of_power = [(free_terms(stack), fit_power(stack, with_power, torque.values))]
         found: list[Found] = [(stack.torque_terms, torque), *of_power]
         base, condition = _base(stack, blocks, torque)

@@ -19,6 +19,7 @@ from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.friction_near_zero import with_friction_near_zero
+from irtwin.identification.progress import Tell
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition
@@ -123,22 +124,29 @@ class Case:
         runs = [motion.run for motion in self.with_torque]
         return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
 
-    def with_friction_near_zero(self) -> Case:
+    def with_friction_near_zero(self, tell: Tell | None = None) -> Case:
         """Return the case with the turn of each joint's dry friction as its motions show it."""
-        return replace(self, robot=with_friction_near_zero(self.robot, list(self.motions.values()), self.effects))
+        motions = list(self.motions.values())
+        return replace(self, robot=with_friction_near_zero(self.robot, motions, self.effects, tell))
 
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""
         return any(getattr(motion, signal) is not None for motion in self.seen)
 
 
-def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, twin: Twin | None = None) -> Case:
+def case_of(
+    data_set: DataSet,
+    withhold: Sequence[str],
+    thresholds: Thresholds,
+    twin: Twin | None = None,
+    tell: Tell | None = None,
+) -> Case:
     """Prepare a data set; `withhold` takes effects out of the twin, which is `twin` or what the data set says.
 
-    Raises InputError where `baseline` and `admit` do.
+    `tell` is told how far that has come, where it takes long. Raises InputError where `baseline` and `admit` do.
     """
     begun = baseline(data_set, withhold, twin, thresholds.given_twin)
-    cutoff = cutoff_for(begun.robot, data_set.runs)
+    cutoff = cutoff_for(begun.robot, data_set.runs, tell)
     given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
@@ -152,7 +160,7 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
         begun.prior,
         _stated(data_set),
     )
-    return case.with_friction_near_zero()
+    return case.with_friction_near_zero(tell)
 
 
 def _stated(data_set: DataSet) -> Stated:

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from irtwin.gap.document.document import Closeable
 from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.identification.progress import Tell, paced
 from irtwin.signals.filter import decimation, low_pass
 from irtwin.signals.motion import Motion
 
@@ -72,14 +73,18 @@ class FlexibleRegression:
         )
 
 
-def flexible_regression(channel: PlannedEquations, motions: Sequence[Motion], seed: int) -> FlexibleRegression | None:
+def flexible_regression(
+    channel: PlannedEquations, motions: Sequence[Motion], seed: int, tell: Tell | None = None
+) -> FlexibleRegression | None:
     """Regress what the twin leaves on what the motion is, groups of runs left out in turn.
 
     motions: the observed ones. A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed,
     acceleration, load, temperature, time and what went before, of the joint and of its neighbours, each also times the
     direction, as friction jumps with it. None where there are fewer than two groups or too few samples.
+    `tell` is told how far that has come, where it takes long.
     """
-    parts = list(_parts(channel, motions))
+    told = paced(tell)
+    parts = list(_parts(channel, motions, told))
     if not parts:
         return None
     group = np.concatenate([part.group for part in parts])
@@ -89,6 +94,7 @@ def flexible_regression(channel: PlannedEquations, motions: Sequence[Motion], se
     generator = np.random.default_rng(seed)
     sums = []
     for equation in range(plain.shape[1]):
+        told(f"  how much of {channel.finding.name} could be closed, {equation + 1} of {plain.shape[1]}")
         variables = np.concatenate([part.variables[equation] for part in parts])
         signs = np.concatenate([part.signs[:, equation] for part in parts])
         features = _features(variables, signs, generator)
@@ -108,7 +114,7 @@ class _Part:
     group: np.ndarray
 
 
-def _parts(channel: PlannedEquations, motions: Sequence[Motion]) -> Iterator[_Part]:
+def _parts(channel: PlannedEquations, motions: Sequence[Motion], told: Tell) -> Iterator[_Part]:
     """Yield stretches of the runs, thinned, with what the twin leaves of them.
 
     Temperature is a variable where all runs have it.
@@ -118,6 +124,7 @@ def _parts(channel: PlannedEquations, motions: Sequence[Motion]) -> Iterator[_Pa
     share = max(1, _SAMPLES // max(len(own), 1))
     total = min(share * len(own), sum(len(motion.time) for motion in own))
     for motion in own:
+        told(f"  how much of {channel.finding.name} could be closed, {motion.run}")
         length = min(share, len(motion.time))
         count = _STRETCHES if length < len(motion.time) else 1
         starts = np.linspace(0, len(motion.time) - length // count, count).astype(int)

@@ -17,9 +17,9 @@ from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
-from irtwin.gap.regression.progress import Tell, paced
 from irtwin.gap.thresholds import NextExperiment, Thresholds
 from irtwin.identification.excitation import Excitation
+from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -260,7 +260,9 @@ def _weigh(programme: Programme, questions: Sequence[_Question], tell: Tell) -> 
     for channel in {q.channel.finding.name: q.channel for q in questions}.values():
         name = channel.finding.name
         tried = set().union(*(q.tried for q in questions if q.channel.finding.name == name))
-        products[name] = channel.products(programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))))
+        products[name] = channel.products(
+            programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))), tell
+        )
     return [w for q in questions for w in q.weigh(products[q.channel.finding.name], programme.seconds)]
 
 

@@ -23,6 +23,7 @@ from irtwin.gap.regression.normal_equations import System, least_noise
 from irtwin.gap.regression.residuals import as_filtered
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.accumulate import Rows, accumulate_any
+from irtwin.identification.progress import Tell, with_progress
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -85,11 +86,11 @@ class PlannedEquations:
     def _total(self) -> Moments:
         return summed(self._moments)
 
-    def products(self, programme: Programme, tried: Sequence[int | Column]) -> Products:
+    def products(self, programme: Programme, tried: Sequence[int | Column], tell: Tell | None = None) -> Products:
         """Return the products of the twin's columns and those tried.
 
         A column that the system lacks is zero in its data: nothing that it depends on was measured. What a programme
-        will measure is yet to come: zero.
+        will measure is yet to come: zero. `tell` is told how far that has come, where it takes long.
         """
         system, base = self.finding.system, self.finding.system.base
         inside = [k for k in tried if isinstance(k, int)]
@@ -98,7 +99,7 @@ class PlannedEquations:
         existing = np.zeros((base + len(tried) + 1,) * 2)
         existing[np.ix_(into, into)] = self._total.among(places, places)
         at = {column: base + place for place, column in enumerate(tried)}
-        return Products(existing, existing + self._planned(programme, tried), at, system)
+        return Products(existing, existing + self._planned(programme, tried, tell), at, system)
 
     def residuals(self, part: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return what the twin leaves of a measured part of a run, what it leaves with its causes, (N, g) each.
@@ -143,7 +144,7 @@ class PlannedEquations:
         values = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
         return np.asarray(stack.power_columns(part, self.load(part))[:, stack.fixed] @ values)[:, None]
 
-    def _planned(self, programme: Programme, tried: Sequence[int | Column]) -> np.ndarray:
+    def _planned(self, programme: Programme, tried: Sequence[int | Column], tell: Tell | None) -> np.ndarray:
         system, base = self.finding.system, self.finding.system.base
         columns = [system.columns[self._plain(k) - base] if isinstance(k, int) else k for k in tried]
         pattern = np.ones((len(system.pattern), base + len(columns)), dtype=bool)
@@ -155,7 +156,11 @@ class PlannedEquations:
             replace(motion, run=f"{programme.kind} {k} {' '.join(programme.joints)}")
             for k, motion in enumerate(programme.motions)
         ]
-        blocks = accumulate_any(motions, lambda part: self._of_joints(part, columns, programme, pattern), pattern)
+
+        def equations(part: Motion) -> Rows:
+            return self._of_joints(part, columns, programme, pattern)
+
+        blocks = accumulate_any(motions, with_progress(equations, motions, tell), pattern)
         scale = np.append([*system.scale[:base], *(column.term.spread for column in columns)], 0.0)
         found = np.zeros((len(scale), len(scale)))
         places = [np.append(np.flatnonzero(row), len(scale) - 1) for row in pattern]

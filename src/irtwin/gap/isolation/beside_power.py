@@ -22,9 +22,9 @@ from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.gap.regression.normal_equations import noise_before
-from irtwin.gap.regression.progress import Tell
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.power_line import power_slope
+from irtwin.identification.progress import Tell
 
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
@@ -109,7 +109,7 @@ def _find(
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(equations, tuple(of_power), both.noise)
     where = "torque", case.robot.joint_names, case.observed
-    found = finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
+    found = finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside, tell=tell)
     return found, both
 
 

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 from irtwin.gap.regression.joint_equations import JointEquations
 from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.estimators import Estimate, estimate
+from irtwin.identification.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,10 @@ class BesidePower:
     columns: tuple[int, ...]
     noise: np.ndarray
 
-    def estimate(self, chosen: Sequence[int]) -> Estimate:
+    def estimate(self, chosen: Sequence[int], tell: Tell | None = None) -> Estimate:
         """Estimate the twin's terms of torque and `chosen` columns, as torque's equations count them, by both."""
         whole, torque = self.equations.whole, self.equations.torque
-        fitted = estimate_of(whole, self._columns(chosen))
+        fitted = estimate_of(whole, self._columns(chosen), tell)
         used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
         covariance, noise = fitted.covariance[np.ix_(used, used)], fitted.noise[: len(torque.pattern)]
         return Estimate(fitted.values[used], covariance, noise, fitted.blocks)
@@ -36,7 +37,7 @@ class BesidePower:
         return [*map(self.equations.in_whole, chosen), *self.columns]
 
 
-def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
+def estimate_of(system: System, chosen: Sequence[int], tell: Tell | None = None) -> Estimate:
     """Estimate the twin's terms and the causes' together, with bounds and intervals."""
     used = [*range(system.base), *chosen]
     terms = [system.all_terms[k] for k in used]
@@ -56,4 +57,4 @@ def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
         blocks.append(replace(block, factors=tuple(factors)))
     rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
     signals = [*[0] * (len(pattern) - 1), 1] if system.beside_power else None
-    return estimate(blocks, pattern, terms, rows, signals)
+    return estimate(blocks, pattern, terms, rows, signals, tell)

@@ -20,8 +20,8 @@ from irtwin.gap.isolation.structure_search import Attribution, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
-from irtwin.gap.regression.progress import Tell
 from irtwin.identification.estimators import Estimate
+from irtwin.identification.progress import Tell
 
 _NO_NOISE = 1e-9
 Without = str | tuple[str, str | None]
@@ -148,7 +148,7 @@ def find(
     """
     places = (None,) if name == "power" else case.robot.joint_names
     found = attributed(case, system, floor, without, tell)
-    return finding_of(name, places, case.observed, system, found, floor, seed, plain)
+    return finding_of(name, places, case.observed, system, found, floor, seed, plain, tell=tell)
 
 
 def finding_of(
@@ -161,12 +161,13 @@ def finding_of(
     seed: int,
     plain: System | None = None,
     beside: BesidePower | None = None,
+    tell: Tell | None = None,
 ) -> Finding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
-    judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain)
-    closed = closed_squares(system, found, seed)
-    fitted = estimate_of(system, chosen) if beside is None else beside.estimate(chosen)
+    judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain, tell)
+    closed = closed_squares(system, found, seed, tell)
+    fitted = estimate_of(system, chosen, tell) if beside is None else beside.estimate(chosen, tell)
     return Finding(name, places, observed, system, found, judged, floor, fitted, closed, plain=plain, beside=beside)
 
 

@@ -7,8 +7,8 @@ of the information `A`, are
 
     prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) / sqrt(det(1 + A / (rows v)))
 
-over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; where it is at
-one, it is at a further one with even odds. Docs: `docs/how-it-decides.md`.
+over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; where
+it is at one, it is at a further one with even odds. In words: `docs/how-it-decides.md`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
 
+_HOPELESS = -6.0  # log odds, by noise that holds the effect: less noise may raise them so much
 _SIZES = (1.0, 0.3, 0.1, 0.03)  # of an effect, in units of what is expected
 
 
@@ -119,10 +120,14 @@ class Posterior:
         """Return the shape of a hypothesis that explains most."""
         return self.evidence.variants[int(self.shape[place])]
 
-    def first(self) -> int | None:
-        """Return the place of the hypothesis that explains most; None where none explains anything."""
+    def first_at_each_joint(self) -> list[int]:
+        """Return the place of the hypothesis that explains most at each joint, and of the whole robot, in that order.
+
+        What is hopeless is left out.
+        """
         explained = self.evidence.explained[self.shape]
-        return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
+        order = [int(k) for k in np.argsort(-explained) if explained[k] > 0 and self.log_odds[k] > _HOPELESS]
+        return list({self.hypotheses[k].joint: k for k in reversed(order)}.values())[::-1]
 
     def likeliest_at(self, one: Hypothesis) -> int:
         """Return the place of the likeliest hypothesis of those that could be where one is."""

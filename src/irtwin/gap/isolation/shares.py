@@ -12,12 +12,13 @@ import numpy as np
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.identification.progress import Tell, paced
 
 _EXACT = 8  # causes: 256 subsets
 _ORDERS = 40  # drawn, and each reversed, where there are more
 
 
-def closed_squares(system: System, found: Attribution, seed: int) -> np.ndarray:
+def closed_squares(system: System, found: Attribution, seed: int, tell: Tell | None = None) -> np.ndarray:
     """Return what each cause closes of the squares of each observed group left out and equation, (C, G, g).
 
     Its Shapley value: everything is refitted with every set of causes, up to eight causes exactly, beyond from random
@@ -26,14 +27,18 @@ def closed_squares(system: System, found: Attribution, seed: int) -> np.ndarray:
     players = [cause.columns for cause in found.causes]
     judged = np.flatnonzero(system.group_observed)
     weighed = {True: system.moments(found.noise), False: system.moments(noise_before(system))}
+    told = paced(tell)
     totals = {some: summed(moments) for some, moments in weighed.items()}
 
     @cache
     def left(members: frozenset[int]) -> np.ndarray:
         chosen = [k for player in sorted(members) for k in players[player]]
         total, moments = totals[bool(members)], weighed[bool(members)]
-        fitted = [(int(group), system.solution(chosen, total - moments[group])) for group in judged]
-        return np.array([system.squares(vector, group) for group, vector in fitted])
+        found = []
+        for group in judged:
+            told(f"  what {len(members)} of {len(players)} causes leave, group {group + 1} of {len(moments)}")
+            found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
+        return np.array(found)
 
     count = len(players)
     values = np.zeros((count, len(judged), len(system.pattern)))

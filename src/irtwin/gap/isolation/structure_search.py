@@ -12,8 +12,8 @@ from irtwin.gap.isolation.posterior import Posterior, Prior, overlap
 from irtwin.gap.regression.evidence import visibility
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.progress import Tell, paced
 from irtwin.gap.thresholds import Criterion
+from irtwin.identification.progress import Tell, paced
 
 _MOST = 16  # hypotheses of a structure
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
@@ -103,15 +103,15 @@ class _Search:
     def likely(self, posterior: Posterior, found: Sequence[Found], noise: np.ndarray) -> Found | None:
         """Return what explains most beside a structure, or is likelier in its place; None where nothing is likely.
 
-        All are judged by what the first leaves: noise that holds its own effect would hide it.
+        At each joint in turn. All are judged by what the first there leaves: noise that holds its own effect hides it.
         """
-        first = posterior.first()
-        if first is None:
-            return None
-        new = posterior.hypotheses[first], posterior.variant(first)
-        judged = self.beside(found, self.left([*found, new], noise))
-        place = judged.likeliest_at(new[0])
-        return (judged.hypotheses[place], judged.variant(place)) if judged.log_odds[place] > 0 else None
+        for first in posterior.first_at_each_joint():
+            new = posterior.hypotheses[first], posterior.variant(first)
+            judged = self.beside(found, self.left([*found, new], noise))
+            place = judged.likeliest_at(new[0])
+            if judged.log_odds[place] > 0:
+                return judged.hypotheses[place], judged.variant(place)
+        return None
 
     def settled(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""

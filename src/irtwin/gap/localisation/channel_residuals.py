@@ -21,6 +21,7 @@ from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
 from irtwin.gap.thresholds import Places
+from irtwin.identification.progress import Tell, paced
 from irtwin.signals.motion import Motion
 
 
@@ -54,14 +55,23 @@ class ChannelResidual:
         return np.array([any(_among(place, joints) for joints in self.touched) for place in places])
 
 
-def channel_residual(case: Case, explained: Explained, torque: Torque) -> ChannelResidual:
-    """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes)."""
+def channel_residual(case: Case, explained: Explained, torque: Torque, tell: Tell | None = None) -> ChannelResidual:
+    """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes).
+
+    `tell` is told how far that has come, where it takes long.
+    """
     finding = explained.finding
     power = finding.name == "power"
     reference, limits = against_reference(finding), case.thresholds.places
 
+    told = paced(tell)
+
     def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
-        return (power_traces if power else torque_traces)(explained.stack, runs, values, torque)
+        found = []
+        for run in runs:
+            told(f"  {finding.name} that is left of {run.run}")
+            found += (power_traces if power else torque_traces)(explained.stack, [run], values, torque)
+        return found
 
     before = traces(case.seen, fitted_values(finding, reference=reference))
     others = traces(case.others, fitted_values(finding, reference=True)) if reference else []
@@ -100,13 +110,16 @@ def against_reference(finding: Finding) -> bool:
     return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
 
 
-def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None) -> list[Location]:
+def places(
+    left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None, tell: Tell | None = None
+) -> list[Location]:
     """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess.
 
-    `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not.
+    `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not. `tell` is
+    told how far that has come, where it takes long.
     """
     channel, place = leaving or (None, None)
-    found = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
+    found = [(one, _places(one, seed, place if one.finding.name == channel else None, paced(tell))) for one in left]
 
     def order(pair: tuple[ChannelResidual, list[Location]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
@@ -158,9 +171,12 @@ def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.nda
     return found
 
 
-def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[Location]:
+def _places(left: ChannelResidual, seed: int, leaving: int | None, told: Tell) -> list[Location]:
     names = left.finding.places
-    best = [followed(left.before, k, joint) for k, joint in enumerate(names)]
+    best = []
+    for k, joint in enumerate(names):
+        told(f"  what {left.finding.name} follows{f' at {joint}' if joint else ''}")
+        best.append(followed(left.before, k, joint))
     located = locate(
         left.finding.name,
         names,

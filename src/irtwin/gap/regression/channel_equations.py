@@ -15,8 +15,8 @@ from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.progress import Tell, with_progress
 from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.identification.progress import Tell, with_progress
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 

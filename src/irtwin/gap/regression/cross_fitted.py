@@ -13,6 +13,7 @@ from irtwin.gap.regression.channel_equations import Torque, power_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.identification.progress import Tell, paced
 from irtwin.signals.motion import Motion
 
 _PIECE = 32768  # samples whose columns are held at once
@@ -23,14 +24,19 @@ PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
 class LeftOut:
     """What the twin says of a run, fitted without that run's group; of a run it was not fitted to, by all groups."""
 
-    def __init__(self, stack: Stack, system: System):
-        """Fit the twin's terms to the equations of torque without each group in turn."""
+    def __init__(self, stack: Stack, system: System, tell: Tell | None = None):
+        """Fit the twin's terms to the equations of torque without each group in turn.
+
+        `tell` is told how far that has come, where it takes long.
+        """
         moments = system.moments(noise_before(system))
         total = summed(moments)
         self._stack = stack
         self._all = twin_values(system, system.solution((), total))
         self._without: dict[str, np.ndarray] = {}
+        told = paced(tell)
         for run in {block.run for block in system.blocks}:
+            told(f"  the twin without {run}")
             groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
             rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
             self._without[run] = twin_values(system, system.solution((), rest))

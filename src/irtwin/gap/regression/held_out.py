@@ -10,6 +10,7 @@ from scipy.stats import t as student_t
 
 from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System
+from irtwin.identification.progress import Tell, paced
 
 _RESAMPLED = 1000
 
@@ -28,17 +29,22 @@ class HeldOut:
 
 
 def held_out(
-    system: System, noise: np.ndarray, noise_after: np.ndarray, chosen: Sequence[int], plain: System | None = None
+    system: System,
+    noise: np.ndarray,
+    noise_after: np.ndarray,
+    chosen: Sequence[int],
+    plain: System | None = None,
+    tell: Tell | None = None,
 ) -> HeldOut:
     """Refit everything without each observed group in turn, with the chosen columns and without them.
 
     Equations are weighted by what each model leaves, `noise` and `noise_after` (g,). `plain`: those of the same groups
-    before anything was added, if others.
+    before anything was added, if others. `tell` is told how far that has come, where it takes long.
     """
     judged = np.flatnonzero(system.group_observed)
-    before = _left_out(plain or system, (plain or system).moments(noise), (), judged)
+    before = _left_out(plain or system, (plain or system).moments(noise), (), judged, tell)
     anything = len(chosen) > 0 or plain is not None
-    after = _left_out(system, system.moments(noise_after), chosen, judged) if anything else before
+    after = _left_out(system, system.moments(noise_after), chosen, judged, tell) if anything else before
     return HeldOut(before, after, system.rows[judged])
 
 
@@ -84,6 +90,11 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
     return [float(value) for value in np.quantile(drawn, [0.025, 0.975])]
 
 
-def _left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
-    total = summed(moments)
-    return np.array([system.squares(system.solution(chosen, total - moments[group]), int(group)) for group in judged])
+def _left_out(
+    system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray, tell: Tell | None
+) -> np.ndarray:
+    total, told, found = summed(moments), paced(tell), []
+    for group in judged:
+        told(f"  how far the gap closes, group {group + 1} of {len(moments)} left out")
+        found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
+    return np.array(found)

@@ -15,9 +15,9 @@ from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Variant, candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.progress import Tell, with_progress
 from irtwin.identification.accumulate import Given, Rows, accumulate
 from irtwin.identification.power_line import carried, power_line, rows_of_both
+from irtwin.identification.progress import Tell, with_progress
 from irtwin.signals.motion import Motion
 
 

@@ -91,7 +91,7 @@ class Products:
         """Return the products (r, c) of some held columns with others."""
         if self.as_rows:
             return np.asarray(self.held[:, rows].T @ self.held[:, columns])
-        return np.asarray(self.held[rows[:, None], columns])
+        return self.held.take(rows, axis=0).take(columns, axis=1)
 
     def blocks(self, columns: np.ndarray) -> np.ndarray:
         """Return the products (V, k, k) among each row of held columns (V, k)."""
@@ -149,13 +149,20 @@ class GroupMoments(Moments):
         self._weighed = [(products[equation], weights[equation]) for equation in order]
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Add up the equations that have any of both."""
-        found = np.zeros((len(rows), len(columns)))
+        """Add up the equations that have any of both: of mostly more columns than rows, each column's side by side."""
+        found = np.zeros((len(columns), len(rows)))
         for products, weight in self._weighed:
-            down, across = products.places.at[rows], products.places.at[columns]
+            down, across = products.places.at[columns], products.places.at[rows]
             here, there = np.flatnonzero(down >= 0), np.flatnonzero(across >= 0)
-            found[here[:, None], there] += products.among(down[here], across[there]) * weight
-        return found
+            own = products.among(down[here], across[there])
+            own *= weight
+            if own.shape == found.shape:
+                found += own
+            else:
+                part = found[here]  # whole rows are picked faster than numbers one by one
+                part[:, there] += own
+                found[here] = part
+        return found.T
 
     def blocks(self, columns: np.ndarray) -> np.ndarray:
         """Add up the equations: of most blocks they have one column alone, the measurement, and so its square."""

@@ -27,6 +27,29 @@ _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of 
 
 
 @dataclass(frozen=True)
+class Sizes:
+    """How large equations are: `rows` (B, g) of each block, `columns` (g,) with the measurement, `group` (B,).
+
+    `base`: how many terms the twin has; `size`: all columns of all equations.
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    group: np.ndarray
+    base: int
+    size: int
+
+    @property
+    def bytes(self) -> float:
+        """What the blocks, all groups' products and what is worked out of these take of memory."""
+        held = float((np.minimum(self.rows, self.columns) * self.columns).sum())
+        for group in range(int(self.group.max()) + 1):
+            own = np.minimum(self.rows, self.columns)[self.group == group].sum(axis=0)
+            held += sum(numbers(int(rows), int(columns)) for rows, columns in zip(own, self.columns, strict=True))
+        return 8 * (held + _AT_WORK * self.base * self.size)
+
+
+@dataclass(frozen=True)
 class System:
     """g equations a sample, B blocks; K terms of the twin, M candidate columns.
 
@@ -201,12 +224,8 @@ class System:
 
     def _fits_in_memory(self) -> None:
         """Refuse what would take too much, before more is taken."""
-        held = sum(factor.size for block in self.blocks for factor in block.factors)
-        for group in range(self.groups):
-            blocks = [self.blocks[k] for k in np.flatnonzero(self.group == group)]
-            for own in zip(*(block.factors for block in blocks), strict=True):
-                held += numbers(sum(map(len, own)), own[0].shape[1])
-        taken = 8 * (held + _AT_WORK * self.base * self._size)
+        rows = np.array([[len(factor) for factor in block.factors] for block in self.blocks])
+        taken = Sizes(rows, self.pattern.sum(axis=1) + 1, self.group, self.base, self._size).bytes
         if taken > _MOST_BYTES:
             raise InputError(
                 f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {taken / 1e9:.1f} GB of "
@@ -242,6 +261,11 @@ class System:
         found = self.rms(chosen, noise, range(self.groups), range(self.groups))
         found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
         return np.asarray(np.maximum(found, self.quietest))
+
+    @cached_property
+    def noise_before(self) -> np.ndarray:
+        """(g,) RMS that the twin alone leaves of each equation, equations weighted alike."""
+        return self.residual_rms((), np.ones(len(self.pattern)))
 
     def rms(
         self,
@@ -287,7 +311,7 @@ def least_noise(squares: float) -> float:
 
 def noise_before(system: System) -> np.ndarray:
     """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
-    return system.residual_rms((), np.ones(len(system.pattern)))
+    return system.noise_before
 
 
 def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.thresholds import Contact
+from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Robot
 
 _LENGTHS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)  # s
@@ -32,18 +33,25 @@ Clock = tuple[float, float]
 """Start and stop of the run's clock, s."""
 
 
-def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray, limits: Contact) -> Transient | None:
+def contact(
+    robot: Robot, left: Sequence[Remainder], noise: np.ndarray, limits: Contact, tell: Tell | None = None
+) -> Transient | None:
     """Return the clearest contact, in all observed runs that show its force at its clock; None where none stands out.
 
     noise: (n,) RMS of each joint's residual, N m. Of an arm of one or two joints nothing is said: hardly any agree.
+    `tell` is told how far that has come, where it takes long.
     """
     if len(robot.joints) < limits.fewest_joints:
         return None
-    return _contact([_Run(one, ExternalContact().columns(robot, one.motion), noise, limits) for one in left], limits)
+    runs, told = [], paced(tell)
+    for one in left:
+        told(f"  contacts in {one.motion.run}")
+        runs.append(_Run(one, ExternalContact().columns(robot, one.motion), noise, limits))
+    return _contact(runs, limits, told)
 
 
-def _contact(runs: Sequence[_Run], limits: Contact) -> Transient | None:
-    found = _leader(runs)
+def _contact(runs: Sequence[_Run], limits: Contact, told: Tell) -> Transient | None:
+    found = _leader(runs, told)
     if found is None:
         return None
     run, gain, clock = found
@@ -54,10 +62,11 @@ def _contact(runs: Sequence[_Run], limits: Contact) -> Transient | None:
     return transient if transient.p <= limits.alpha and worse <= limits.harm * better else None
 
 
-def _leader(runs: Sequence[_Run]) -> tuple[_Run, float, Clock] | None:
+def _leader(runs: Sequence[_Run], told: Tell) -> tuple[_Run, float, Clock] | None:
     """Return the observed run with the largest sudden gain, that gain, and its window."""
     found = None
     for run in runs:
+        told(f"  windows of {run.name}")
         sudden = np.flatnonzero(run.sudden)
         if run.observed and len(sudden):
             window = int(sudden[np.argmax(run.gain[sudden])])

@@ -17,6 +17,7 @@ from irtwin.effects.local import LocalEffect
 from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.thresholds import Local
+from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Joint, Robot
 
 _CELLS = 160  # of angle over a joint's way, in either direction: four for the width of the narrowest bump
@@ -27,9 +28,17 @@ _SLOW = (0.03, 0.15)  # of the joint's largest speed: over so much, friction tha
 
 
 def local_effects(
-    robot: Robot, effects: Sequence[LocalEffect], left: Sequence[Remainder], limits: Local, seed: int
+    robot: Robot,
+    effects: Sequence[LocalEffect],
+    left: Sequence[Remainder],
+    limits: Local,
+    seed: int,
+    tell: Tell | None = None,
 ) -> list[LocalEffect]:
-    """Return each effect at the joints, and in the place, where what is left in observed runs stands out."""
+    """Return each effect at the joints, and in the place, where what is left in observed runs stands out.
+
+    `tell` is told how far that has come, where it takes long.
+    """
     observed = [one for one in left if one.observed]
     if not observed:
         return []
@@ -38,15 +47,16 @@ def local_effects(
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, count))
     every = [(joint, _Passed.of(observed, stretches, k, count)) for k, joint in enumerate(robot.joints)]
     joints = [(joint, passed) for joint, passed in every if passed]
-    return [place for effect in effects for place in _places(effect, joints, signs, limits)]
+    return [place for effect in effects for place in _places(effect, joints, signs, limits, paced(tell))]
 
 
 def _places(
-    effect: LocalEffect, joints: Sequence[tuple[Joint, _Passed]], signs: np.ndarray, limits: Local
+    effect: LocalEffect, joints: Sequence[tuple[Joint, _Passed]], signs: np.ndarray, limits: Local, told: Tell
 ) -> Iterator[LocalEffect]:
     """Yield the shape that explains most, if enough, of each group at each joint of which one is beyond chance."""
     tried = []
     for joint, passed in joints:
+        told(f"  {effect.id.replace('_', ' ')} of {joint.name}")
         lowest = effect.joint_terms(joint)[0].lowest
         tried += [(joint.name, group, passed.judged(group, signs, lowest)) for group in effect.over(*passed.way)]
     reached = np.max([judged.reached for _, _, judged in tried], axis=0, initial=0.0)

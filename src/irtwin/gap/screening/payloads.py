@@ -15,6 +15,7 @@ from irtwin.effects.rigid_body import flange_frame, to_body
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import SomePayload
+from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Robot
 
 _FLIPS = 999
@@ -37,19 +38,20 @@ class UntoldPayload:
 
 
 def untold_payload(
-    robot: Robot, system: System, noise: np.ndarray, limits: SomePayload, seed: int
+    robot: Robot, system: System, noise: np.ndarray, limits: SomePayload, seed: int, tell: Tell | None = None
 ) -> UntoldPayload | None:
     """Return the payload that some observed runs carry and others do not; None where none shows.
 
-    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m.
+    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m. `tell`
+    is told how far that has come, where it takes long.
     """
-    parts = _Parts.of(robot, system, noise, limits.fewest_runs)
+    parts = _Parts.of(robot, system, noise, limits.fewest_runs, tell)
     if parts is None:
         return None
     with_load = parts.carrying(np.arange(len(parts.runs)))
     if not with_load.any() or with_load[parts.observed].all():
         return None
-    of_joints = parts.judged()
+    of_joints = parts.judged(tell)
     gain = of_joints.sum(axis=1)
     mean, t = float(gain.mean()), float(gain.mean() / max(gain.std(ddof=1) / np.sqrt(len(gain)), 1e-12))
     told = gain if 2.0 ** -len(gain) <= limits.alpha else of_joints.ravel()
@@ -92,7 +94,9 @@ class _Parts:
     prior: np.ndarray
 
     @classmethod
-    def of(cls, robot: Robot, system: System, noise: np.ndarray, fewest: int) -> _Parts | None:
+    def of(
+        cls, robot: Robot, system: System, noise: np.ndarray, fewest: int, tell: Tell | None = None
+    ) -> _Parts | None:
         """Take the runs apart; None where too few are observed, or groups are stretches of runs."""
         runs = tuple(dict.fromkeys(block.run for block in system.blocks))
         groups = [{int(g) for g, b in zip(system.group, system.blocks, strict=True) if b.run == run} for run in runs]
@@ -106,8 +110,9 @@ class _Parts:
         full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
         acting = [_acting(full, row[:base]) for row in system.pattern]
         of_joints = [[np.zeros((len(own), len(own))) for own in acting] for _ in runs]
-        rows = np.zeros(len(runs))
+        rows, told = np.zeros(len(runs)), paced(tell)
         for number, block in enumerate(system.blocks):
+            told(f"  payloads in {block.run}")
             run = runs.index(block.run)
             rows[run] += block.rows.max()
             for joint, level in enumerate(noise):
@@ -153,10 +158,11 @@ class _Parts:
             return np.asarray(np.isin(every, tried) & ~found)
         return found
 
-    def judged(self) -> np.ndarray:
+    def judged(self, tell: Tell | None) -> np.ndarray:
         """Return (G, n) the mean square gained in each observed group and joint, which had no say in it."""
-        found = []
+        found, told = [], paced(tell)
         for group in dict.fromkeys(self.group[self.observed].tolist()):
+            told(f"  payloads without group {group + 1}")
             rest = np.flatnonzero(self.group != group)
             own = np.flatnonzero(self.group == group)
             with_load = self.carrying(rest)

@@ -22,6 +22,7 @@ from irtwin.gap.screening.payloads import untold_payload
 from irtwin.gap.screening.remainder import remainders
 from irtwin.gap.screening.ripples import fast_ripples, known_ripples
 from irtwin.gap.screening.together import Both, each_beside_the_other
+from irtwin.identification.progress import Tell, paced
 from irtwin.identification.two_processes import begun
 
 
@@ -53,20 +54,25 @@ class Screened:
         return [*found, *(one.effect for one in self.both if one), *self.ripples, *self.local]
 
 
-def screen(case: Case, stack: Stack, system: System, seed: int) -> Screened:
-    """Search the runs' torque; system: its equations, with the terms of the twin at least."""
+def screen(case: Case, stack: Stack, system: System, seed: int, tell: Tell | None = None) -> Screened:
+    """Search the runs' torque; system: its equations, with the terms of the twin at least.
+
+    `tell` is told how far that has come, where it takes long.
+    """
     noise, limits = noise_before(system), case.thresholds
     values = twin_values(system, system.solution((), summed(system.moments(noise))))
-    left = remainders(case, stack, values)
-    in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact), worth=case.long)
+    left = remainders(case, stack, values, tell=tell)
+    in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact, tell), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
-    payload = untold_payload(case.robot, system, noise, limits.some_payload, seed)
+    payload = untold_payload(case.robot, system, noise, limits.some_payload, seed, tell)
     known_orders = known_ripples(case.robot, left, limits.ripples.least_periods)
-    ripples = (*known_orders, *fast_ripples(case.robot, left, limits.ripples.least_share))
-    local = tuple(local_effects(case.robot, known, left, limits.local, seed))
+    ripples = (*known_orders, *fast_ripples(case.robot, left, limits.ripples.least_share, tell))
+    local = tuple(local_effects(case.robot, known, left, limits.local, seed, tell))
 
     def both() -> Both:
-        return each_beside_the_other(case, stack, system, noise, (in_contact(), payload), seed)
+        told = paced(tell)
+        touch = in_contact(lambda: told("  waiting for what shows contacts"))
+        return each_beside_the_other(case, stack, system, noise, (touch, payload), seed, tell)
 
     return Screened(both, ripples, local)
 

@@ -18,26 +18,30 @@ from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.payloads import UntoldPayload, beside, untold_payload
 from irtwin.gap.screening.remainder import Remainder, remainders
+from irtwin.identification.progress import Tell
 
 _TURNS = 4  # the second mostly says what the first one did
 
 Both = tuple[Transient | None, UntoldPayload | None]
 
 
-def each_beside_the_other(case: Case, stack: Stack, system: System, noise: np.ndarray, found: Both, seed: int) -> Both:
+def each_beside_the_other(
+    case: Case, stack: Stack, system: System, noise: np.ndarray, found: Both, seed: int, tell: Tell | None = None
+) -> Both:
     """Return contact and payload, each told beside the other; `found`: each by itself.
 
-    system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m.
+    system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m. `tell` is
+    told how far that has come, where it takes long.
     """
     touch, payload = found
     for _ in range(_TURNS):
         apart = _apart_from(system, touch)
         if touch is not None:
-            payload = untold_payload(case.robot, apart, noise, case.thresholds.some_payload, seed)
-        left = None if payload is None else _beside(case, stack, apart, noise, payload)
+            payload = untold_payload(case.robot, apart, noise, case.thresholds.some_payload, seed, tell)
+        left = None if payload is None else _beside(case, stack, apart, noise, payload, tell)
         if left is None:
             break
-        before, touch = touch, contact(case.robot, left, _rms(left, noise), case.thresholds.contact)
+        before, touch = touch, contact(case.robot, left, _rms(left, noise), case.thresholds.contact, tell)
         if (before and before.effect) == (touch and touch.effect):
             break
     return touch, payload
@@ -58,14 +62,14 @@ def _apart_from(system: System, touch: Transient | None) -> System:
 
 
 def _beside(
-    case: Case, stack: Stack, system: System, noise: np.ndarray, payload: UntoldPayload
+    case: Case, stack: Stack, system: System, noise: np.ndarray, payload: UntoldPayload, tell: Tell | None
 ) -> list[Remainder] | None:
     """Return what the twin and the payload leave of the runs."""
     both = beside(case.robot, system, noise, payload.effect)
     if both is None:
         return None
     values, load = both
-    return remainders(case, stack, twin_values(system, values), (payload.effect, load))
+    return remainders(case, stack, twin_values(system, values), (payload.effect, load), tell)
 
 
 def _rms(left: list[Remainder], noise: np.ndarray) -> np.ndarray:

@@ -14,17 +14,29 @@ Tell = Callable[[str], None]
 _EVERY = 5.0  # s between two lines: short work says none
 
 
+class Told:
+    """What tells lines, and knows when it told the last: one clock for all that is done in turn."""
+
+    def __init__(self, tell: Tell):
+        self._tell, self._last = tell, time.monotonic()
+
+    def __call__(self, line: str) -> None:
+        """Tell a line."""
+        self._last = time.monotonic()
+        self._tell(line)
+
+    def step(self, line: str) -> None:
+        """Tell a line where the last was some seconds ago."""
+        if time.monotonic() - self._last >= _EVERY and not in_copy():
+            self(line)
+
+
 def paced(tell: Tell | None) -> Tell:
     """Return what tells a line only where the last was some seconds ago: it may be given one at each step."""
-    said = time.monotonic()
-
-    def told(line: str) -> None:
-        nonlocal said
-        if tell is not None and time.monotonic() - said >= _EVERY and not in_copy():
-            said = time.monotonic()
-            tell(line)
-
-    return told
+    if tell is None:
+        return lambda line: None
+    told = getattr(tell, "__self__", tell)  # what is paced already keeps its clock
+    return (told if isinstance(told, Told) else Told(tell)).step
 
 
 def with_progress(equations: Equations, motions: Sequence[Motion], tell: Tell | None) -> Equations:

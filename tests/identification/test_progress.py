@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 from tests.synthetic import arm, swing
 
-from irtwin.gap.regression import progress
-from irtwin.gap.regression.progress import paced, with_progress
+from irtwin.identification import progress
 from irtwin.identification.accumulate import Rows
+from irtwin.identification.progress import Told, paced, with_progress
 
 ROBOT = arm(2)
 MOTIONS = [swing(ROBOT, seed, seconds=4.0) for seed in (1, 2)]
@@ -44,3 +44,18 @@ def test_steps_are_told_where_they_take_long(monkeypatch):
     paced(lines.append)("a step")
     paced(None)("nobody listens")
     assert lines == ["a step"]
+
+
+def test_all_that_is_paced_by_one_keeps_its_clock(monkeypatch):
+    now, lines = [0.0], []
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    told = Told(lines.append)
+    first, second = paced(told), paced(paced(told))
+    for seconds, tell, line in ((3, first, "too soon"), (5, second, "a"), (9, first, "too soon"), (10, first, "b")):
+        now[0] = float(seconds)
+        tell(line)
+    now[0] = 11.0
+    told("at once")
+    now[0] = 15.0
+    second("too soon")
+    assert lines == ["a", "b", "at once"]

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.synthetic import swing
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.gap.data.baseline import baseline
+from irtwin.gap.forecast import Forecast, forecast
+from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.channels import Signals
+from irtwin.signals.log import DataSet, Run
+
+RUNS = 12
+MEASURED = {  # s of processor and bytes of `bench/diagnosis_speed.py` 12x1000xJOINTS, with power
+    6: (13.8, 467e6),
+    12: (57.5, 710e6),
+    20: (112.9, 1388e6),
+    30: (157.6, 1960e6),
+    40: (431.5, 3265e6),
+}
+
+
+def chain(joints: int):
+    links, last = ['<link name="base"/>'], "base"
+    for k in range(joints):
+        links.append(
+            f'<link name="link_{k}"><inertial><origin xyz="0.02 0.01 0.05"/><mass value="{20 / (k + 2)}"/><inertia '
+            'ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="joint_{k}" type="revolute"><parent link="{last}"/><child link="link_{k}"/>'
+            f'<origin xyz="0.02 0.01 0.12"/><axis xyz="{"0 0 1" if k % 2 else "0 1 0"}"/>'
+            '<limit lower="-2.5" upper="2.5" velocity="3" effort="500"/></joint>'
+        )
+        last = f"link_{k}"
+    return parse_urdf(f'<robot name="chain">{"".join(links)}</robot>')
+
+
+def data_set(joints: int, seconds: float = 10.0, *, power: bool = True) -> DataSet:
+    robot = chain(joints)
+    runs = []
+    for k in range(RUNS):
+        motion = swing(robot, k, seconds)
+        warm = np.full_like(motion.q, 30.0)
+        signals = Signals(motion.time, motion.q, torque=np.zeros_like(motion.q), temperature=warm)
+        if power:
+            signals = replace(signals, power=np.zeros(len(motion.time)))
+        role, repeat = "reference" if k < RUNS // 3 else "observed", {1: "0", RUNS // 3 + 1: str(RUNS // 3)}.get(k)
+        runs.append(Run(str(k), Path("run"), "", role, 0.0, (0.0, 0.0, 0.0), repeat, None, {}, signals))
+    return DataSet(Path(), robot, tuple(runs), (*BASELINE, "copper_loss"), None, None, False, {})
+
+
+def expected(joints: int, seconds: float = 10.0, *, power: bool = True) -> Forecast:
+    one = data_set(joints, seconds, power=power)
+    return forecast(one, baseline(one, ()))
+
+
+@pytest.mark.parametrize("joints", MEASURED)
+def test_the_forecast_is_within_a_factor_of_two_of_what_was_measured(joints):
+    seconds, memory = MEASURED[joints]
+    found = expected(joints)
+    assert seconds / 2 <= found.seconds <= 2 * seconds
+    assert memory / 2 <= found.memory <= 2 * memory
+
+
+def test_more_joints_take_more():
+    found = [expected(joints) for joints in (3, 6, 9, 20, 40)]
+    assert np.all(np.diff([one.seconds for one in found]) > 0)
+    assert np.all(np.diff([one.memory for one in found]) > 0)
+
+
+def test_longer_runs_and_power_take_more():
+    assert expected(6, 20.0).seconds > expected(6).seconds > expected(6, power=False).seconds
+    assert expected(6, 20.0).memory > expected(6).memory > expected(6, power=False).memory
+
+
+@pytest.mark.parametrize(
+    ("seconds", "line"),
+    [
+        (44.0, "30 joints, 12 runs: about 40 s of processor and 1.7 GB"),
+        (170.0, "30 joints, 12 runs: about 3 minutes of processor and 1.7 GB"),
+    ],
+)
+def test_it_is_said_in_words_where_it_is_long(seconds, line):
+    found = Forecast(30, 12, seconds, 1.7e9)
+    assert found.line == line
+    assert found.long
+    assert not Forecast(6, 12, 12.0, 0.4e9).long

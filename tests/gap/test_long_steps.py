@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import pytest
+from tests.gap.test_diagnosis import WITH_LOSS, data_set, runs
+
+from irtwin.gap.diagnosis import diagnose
+from irtwin.identification import progress
+
+STEPS = {
+    "case": "friction near zero speed, joint",
+    "twin": "the twin without",
+    "remainders": "what is left of",
+    "contacts": "contacts in",
+    "windows": "windows of",
+    "ripples": "ripples of",
+    "places of effects": "local wear of",
+    "trials": "hypotheses, group",
+    "judged": "how far the gap closes, group",
+    "shares": "causes leave",
+    "estimate": "coefficients, weighed",
+    "residual": "torque that is left of",
+    "followed": "what torque follows at",
+    "closeable": "how much of torque could be closed",
+    "excitation": "exciting motion, step",
+    "programmes": "weighing",
+}
+
+
+@pytest.fixture(scope="module")
+def lines():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(progress, "_EVERY", 0.0)
+        said: list[str] = []
+        diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["coulomb_friction"], progress=said.append)
+    return said
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_each_long_step_says_how_far_it_has_come(lines, step):
+    assert any(STEPS[step] in line for line in lines)
