@@ -14,7 +14,7 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.estimates import estimate_of
-from irtwin.gap.isolation.finding import find, keeping
+from irtwin.gap.isolation.finding import find
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.thresholds import DEFAULT
@@ -78,15 +78,13 @@ def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     assert offset == pytest.approx(truth(ROBOT)["c"][1], abs=0.3)  # of the sensor alone
 
 
-def test_what_is_kept_is_fitted_with_power_again():
+def test_the_estimate_stands_on_power_too():
     finding = found(case(real=3.0, cable=6.0))
     assert sorted(names(finding)) == ["asymmetric_friction missing joint_2", "cable_drag missing joint_1"]
-    kept = keeping(finding, [cause for cause in finding.causes if cause.effect == "asymmetric_friction"], 0)
-    terms = [(effect.id, term.joint) for effect, term in kept.system.terms]
+    terms = [(effect.id, term.joint) for effect, term in finding.system.terms]
     place, true = terms.index(("torque_offset", "joint_2")), truth(ROBOT)["c"][1]
-    alone = estimate_of(kept.system, kept.chosen).values[place]  # by torque alone
-    assert abs(kept.estimate.values[place] - true) < abs(alone - true) / 2
-    assert kept.attribution.noise[0] > 2 * finding.attribution.noise[0]  # of the cable
+    alone = estimate_of(finding.system, finding.chosen).values[place]  # by torque alone
+    assert abs(finding.estimate.values[place] - true) < abs(alone - true) / 2
 
 
 def test_an_offset_of_a_sensor_costs_none():
@@ -100,7 +98,7 @@ def test_power_tells_what_torque_alone_cannot(made, effect):
     changed = case(**made, changed=True)
     beside = found(changed)
     assert names(beside) == [f"{effect} changed joint_2"]
-    assert not beside.causes[0].rivals
+    assert not beside.causes[0].not_told_from(0.1)
     alone = found(changed, power=False)
     assert {"asymmetric_friction", "torque_offset"} <= {alone.causes[0].effect, *alone.causes[0].rivals}
 

@@ -205,7 +205,7 @@ def test_power_follows_the_torque_squared():
 def test_a_coupling_acts_on_both_joints_of_its_pair():
     effect = JointCoupling()
     variant = Variant(effect, (0,), effect.terms(ROBOT)[:1])
-    found = Cause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, t=9.0, p=0.0)
+    found = Cause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, log_odds=9.0, probability=1.0)
     assert found.touched(ROBOT) == JOINTS[1:]
     empty = dict.fromkeys(("after", "seen", "explained", "acts", "reference", "level"))
     finding = SimpleNamespace(places=JOINTS)

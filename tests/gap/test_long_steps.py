@@ -14,7 +14,7 @@ STEPS = {
     "windows": "windows of",
     "ripples": "ripples of",
     "places of effects": "local wear of",
-    "trials": "hypotheses, group",
+    "trials": "hypotheses, beside",
     "judged": "how far the gap closes, group",
     "shares": "causes leave",
     "estimate": "coefficients, weighed",

@@ -11,8 +11,7 @@ from tests.synthetic import arm, as_run, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.power_consistency import PowerBalance, filtered
+from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
@@ -64,20 +63,3 @@ def test_power_decides_where_its_change_is_large_and_sure():
     limits = DEFAULT.power_consistency
     said = [PowerBalance(*one, limits).kind for one in ((0.5, 8.0), (-0.5, -8.0), (0.5, 1.0), (0.01, 9.0))]
     assert said == ["mechanical", "sensor", None, None]
-
-
-def test_power_drops_rivals_of_the_other_kind():
-    limits = DEFAULT.power_consistency
-    mechanical, sensor, undecided = (PowerBalance(*one, limits) for one in ((0.5, 8.0), (-0.5, -8.0), (0.5, 1.0)))
-    friction = Cause(
-        "load_dependent_friction",
-        "missing",
-        ("joint_1",),
-        (),
-        1.0,
-        5.0,
-        0.001,
-        ("torque_constant_error", "stribeck_friction"),
-    )
-    assert filtered(friction, mechanical, KNOWN).rivals == ("stribeck_friction",)
-    assert filtered(friction, sensor, KNOWN) == filtered(friction, undecided, KNOWN) == friction

@@ -21,6 +21,8 @@ from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.repeats.removal import Removed
 from irtwin.gap.thresholds import Matters
 
+_LEAST_P = 1e-6  # of what a p tells
+
 
 def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
     """Return a finding whose residual before anything is added holds what was taken out, on groups left out."""
@@ -228,7 +230,8 @@ class NotRepeating:
 
 def _log_odds(p: float) -> float:
     """Return the least log odds against chance that a p leaves, at even odds (Sellke, Bayarri and Berger 2001)."""
-    return -math.log(-math.e * p * math.log(p)) if 0 < p < 1 / math.e else 0.0
+    p = max(p, _LEAST_P)
+    return -math.log(-math.e * p * math.log(p)) if p < 1 / math.e else 0.0
 
 
 def _numbers(values: np.ndarray) -> tuple[float, ...]:

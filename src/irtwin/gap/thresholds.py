@@ -188,7 +188,7 @@ class Criterion:
     """How likely a structure of effects is: see `docs/how-it-decides.md`."""
 
     misfit: float = _threshold(
-        0.063, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
+        0.08, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
     )
     misfit_unexplained: float = _threshold(
         0.2, "the same of what is left above the floor", "share of its RMS", "decisions/gap-criterion.md"
@@ -200,7 +200,7 @@ class Criterion:
         "decisions/gap-unexplained-verdict.md",
     )
     certainty: float = _threshold(
-        8.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
+        12.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
     )
     least_rival: float = _threshold(0.1, "an effect is named as a rival of a cause from it", _P, _JUDGEMENT)
 

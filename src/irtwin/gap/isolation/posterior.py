@@ -25,7 +25,7 @@ from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
 
-_HOPELESS = -6.0  # log odds, by noise that holds the effect: less noise may raise them so much
+_HIDDEN = 6.0  # of log odds, by noise that holds the effect
 _SIZES = (1.0, 0.3, 0.1, 0.03)  # of an effect, in units of what is expected
 
 
@@ -114,20 +114,19 @@ class Posterior:
                 )
             ]
         )
-        return np.array([own[np.argmax(said[own])] for own in self._shapes])
+        return np.array([own[np.argmax(said[own])] for own in self._shapes], dtype=int)
 
     def variant(self, place: int) -> Variant:
         """Return the shape of a hypothesis that explains most."""
         return self.evidence.variants[int(self.shape[place])]
 
-    def first_at_each_joint(self) -> list[int]:
-        """Return the place of the hypothesis that explains most at each joint, and of the whole robot, in that order.
+    def first(self, least: float) -> int | None:
+        """Return the place of the hypothesis that explains most; None where none explains anything.
 
-        What is hopeless is left out.
+        What has less than the `least` log odds, and less still by noise that holds its own effect, is left out.
         """
-        explained = self.evidence.explained[self.shape]
-        order = [int(k) for k in np.argsort(-explained) if explained[k] > 0 and self.log_odds[k] > _HOPELESS]
-        return list({self.hypotheses[k].joint: k for k in reversed(order)}.values())[::-1]
+        explained = np.where(self.log_odds > least - _HIDDEN, self.evidence.explained[self.shape], 0.0)
+        return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
 
     def likeliest_at(self, one: Hypothesis) -> int:
         """Return the place of the likeliest hypothesis of those that could be where one is."""

@@ -16,6 +16,7 @@ from irtwin.gap.thresholds import Criterion
 from irtwin.identification.progress import Tell, paced
 
 _MOST = 16  # hypotheses of a structure
+_HOPELESS = -4.0  # log odds: what has less is not tried further
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
 
 Found = tuple[Hypothesis, Variant]
@@ -44,9 +45,9 @@ def attribute(
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
-    Hypotheses are added one by one while one is likelier than not, everything refitted; then each in turn is taken out
-    and looked for anew. floor: (g,) RMS, 0 or None where unknown; `tell` is told how far it has come, where it takes
-    long.
+    Hypotheses are added one by one, everything refitted; what is less likely than nothing is dropped; then each in turn
+    is taken out and looked for anew. floor: (g,) RMS, 0 or None where unknown; `tell` is told how
+    far it has come, where it takes long.
     """
     candidates = in_scope(candidates, both=system.both)
     search = _Search(system, candidates, Prior.of(candidates), limits, floor, paced(tell))
@@ -54,7 +55,7 @@ def attribute(
     before = search.beside((), noise)
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = visibility(system, system.moments(noise), shapes)
-    found, noise = search.settled(*search.forward(before, noise))
+    found, noise = search.settled(*search.pruned(*search.forward(before, noise)))
     known = {(one.effect, one.scope, one.joint): variant for one, variant in found}
     after = search.beside(found, noise)
     known |= {(one.effect, one.scope, one.joint): after.variant(k) for k, one in enumerate(after.hypotheses)}
@@ -92,26 +93,47 @@ class _Search:
         return np.asarray(1 - np.minimum((1 + self.limits.excess) * (floor / noise) ** 2, 1.0))
 
     def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
-        """Add what explains most while it is likelier than nothing; return it and what it leaves, (g,)."""
+        """Add what explains most while that is not hopeless; return it and what it leaves, (g,).
+
+        Two effects of one joint hide each other: neither is likely until both are there.
+        """
         found: list[Found] = []
-        while len(found) < _MOST and (new := self.likely(posterior, found, noise)) is not None:
+        while len(found) < _MOST and (new := self.likely(posterior, found, noise, _HOPELESS)) is not None:
             found.append(new)
             noise = self.left(found, noise)
             posterior = self.beside(found, noise)
         return found, noise
 
-    def likely(self, posterior: Posterior, found: Sequence[Found], noise: np.ndarray) -> Found | None:
-        """Return what explains most beside a structure, or is likelier in its place; None where nothing is likely.
+    def likely(
+        self, posterior: Posterior, found: Sequence[Found], noise: np.ndarray, least: float = 0.0
+    ) -> Found | None:
+        """Return what explains most beside a structure, or is likelier in its place; None below the `least` log odds.
 
-        At each joint in turn. All are judged by what the first there leaves: noise that holds its own effect hides it.
+        All are judged by what the first leaves: noise that holds its own effect would hide it.
         """
-        for first in posterior.first_at_each_joint():
-            new = posterior.hypotheses[first], posterior.variant(first)
-            judged = self.beside(found, self.left([*found, new], noise))
-            place = judged.likeliest_at(new[0])
-            if judged.log_odds[place] > 0:
-                return judged.hypotheses[place], judged.variant(place)
-        return None
+        first = posterior.first(least)
+        if first is None:
+            return None
+        new = posterior.hypotheses[first], posterior.variant(first)
+        judged = self.beside(found, self.left([*found, new], noise))
+        place = judged.likeliest_at(new[0])
+        return (judged.hypotheses[place], judged.variant(place)) if judged.log_odds[place] > least else None
+
+    def pruned(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+        """Drop what is less likely than nothing beside the others, the least likely first."""
+        while found:
+            odds = [self.odds(one, found, noise) for one in found]
+            worst = int(np.argmin(odds))
+            if odds[worst] > 0:
+                break
+            found = [*found[:worst], *found[worst + 1 :]]
+            noise = self.left(found, noise)
+        return found, noise
+
+    def odds(self, one: Found, found: Sequence[Found], noise: np.ndarray) -> float:
+        """Return the log odds of one hypothesis of a structure beside the others."""
+        posterior = self.beside([each for each in found if each is not one], noise)
+        return float(posterior.log_odds[_index(posterior, one[0])])
 
     def settled(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
@@ -142,7 +164,7 @@ class _Search:
 def _cause(found: Found, posterior: Posterior) -> Cause:
     """Return one hypothesis of a structure as a cause, with what could stand in its place."""
     hypothesis, variant = found
-    own = next(k for k, one in enumerate(posterior.hypotheses) if _place(one) == _place(hypothesis))
+    own = _index(posterior, hypothesis)
     near = [k for k, one in enumerate(posterior.hypotheses) if overlap(one, hypothesis)]
     weights, none = posterior.weights(near)
     whole = np.logaddexp.reduce([*weights, none])
@@ -180,6 +202,10 @@ def _joined(parts: Sequence[Cause]) -> Cause:
         probability=first.probability,
         rivals=first.rivals,
     )
+
+
+def _index(posterior: Posterior, hypothesis: Hypothesis) -> int:
+    return next(k for k, one in enumerate(posterior.hypotheses) if _place(one) == _place(hypothesis))
 
 
 def _place(one: Hypothesis) -> tuple[str, str, str | None]:
