@@ -27,7 +27,6 @@ def _given(value: Mapping[str, float], meaning: str, unit: str, source: str) -> 
 _RESIDUAL = "share of the mean square of one equation's residual"
 _FLOOR = "floor squared"
 _ERRORS = "standard errors between groups"
-_OF_GAIN = "share of the cause's gain"
 _P = "probability"
 
 
@@ -201,6 +200,9 @@ class Criterion:
     )
     certainty: float = _threshold(
         12.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
+    )
+    unknown: float = _threshold(
+        0.05, "an effect that the catalogue lacks looks like the cause", _P, "decisions/gap-criterion.md"
     )
     least_rival: float = _threshold(0.1, "an effect is named as a rival of a cause from it", _P, _JUDGEMENT)
 

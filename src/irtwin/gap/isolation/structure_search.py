@@ -162,12 +162,15 @@ class _Search:
 
 
 def _cause(found: Found, posterior: Posterior) -> Cause:
-    """Return one hypothesis of a structure as a cause, with what could stand in its place."""
+    """Return one hypothesis of a structure as a cause, with what could stand in its place.
+
+    What the catalogue lacks could, too: its part is no effect's.
+    """
     hypothesis, variant = found
     own = _index(posterior, hypothesis)
     near = [k for k, one in enumerate(posterior.hypotheses) if overlap(one, hypothesis)]
     weights, none = posterior.weights(near)
-    whole = np.logaddexp.reduce([*weights, none])
+    whole = np.logaddexp.reduce([*weights, none]) - np.log1p(-posterior.limits.unknown)
     sure: dict[tuple[str, str], float] = {}
     for k, weight in zip(near, weights, strict=True):
         key = posterior.hypotheses[k].effect, posterior.hypotheses[k].scope

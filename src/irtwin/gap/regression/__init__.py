@@ -1,1 +1,1 @@
-"""The equations of one channel: candidate columns, normal equations, residuals, cross-validation, significance."""
+"""The equations of one channel: candidate columns, normal equations, evidence of hypotheses, residuals."""
