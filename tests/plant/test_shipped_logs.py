@@ -98,9 +98,8 @@ def test_the_plant_makes_the_first_log_again(drawings: Drawings) -> None:
     motion = motion_of(campaign.motions[run.motion], drawings)
     recording = simulate(machine, motion, run.payload, Thermal(drawings.thermal), seed=10)
     shipped = pq.read_table(SHIPPED / "runs" / f"{run.name}.parquet")
-    # other processors round differently, which may tip a reading to the next step of its sensor, a few torques further
+    # other processors round differently, which may tip a reading to the next step of its sensor, and move torques by some steps
     for index, joint in enumerate(drawings.joints):
         np.testing.assert_allclose(shipped[f"q_{joint}"], recording.q[:, index], atol=1e-5)
-        apart = np.abs(shipped[f"tau_{joint}"].to_numpy() - recording.torque[:, index])
-        assert apart.max() < 0.5 and np.mean(apart > 0.1) < 0.005
+        np.testing.assert_allclose(shipped[f"tau_{joint}"], recording.torque[:, index], atol=0.3)
     np.testing.assert_allclose(shipped["power"], recording.power, atol=1.0)
