@@ -94,27 +94,24 @@ class Posterior:
     @cached_property
     def log_odds(self) -> np.ndarray:
         """(H,) log odds that a hypothesis is true beside the structure, against that nothing more is."""
-        by_shape = np.array(
-            [
-                self._explaining(self.evidence.gain[k], self.variance[k], len(information)) - self._size(k, variance)
-                for k, (information, variance) in enumerate(zip(self.evidence.information, self.variance, strict=True))
-            ]
-        )
+        by_shape = self._by_shape
         return np.asarray(self.prior + np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes]))
 
     @cached_property
     def shape(self) -> np.ndarray:
         """(H,) the index of each hypothesis' variant that explains most, its freedom counted."""
-        size = np.array([self._size(k, variance) for k, variance in enumerate(self.variance)])
-        said = np.array(
+        return np.array([own[np.argmax(self._by_shape[own])] for own in self._shapes], dtype=int)
+
+    @cached_property
+    def _by_shape(self) -> np.ndarray:
+        """(V,) log evidence of each variant against nothing, without the prior."""
+        gains = zip(self.evidence.gain, self.variance, self.evidence.information, strict=True)
+        return np.array(
             [
-                self._explaining(gain, variance, len(own)) - less
-                for gain, variance, own, less in zip(
-                    self.evidence.gain, self.variance, self.evidence.information, size, strict=True
-                )
+                self._explaining(gain, variance, len(information)) - self._size(k, variance)
+                for k, (gain, variance, information) in enumerate(gains)
             ]
         )
-        return np.array([own[np.argmax(said[own])] for own in self._shapes], dtype=int)
 
     def variant(self, place: int) -> Variant:
         """Return the shape of a hypothesis that explains most."""
