@@ -98,7 +98,7 @@ def test_the_plant_makes_the_first_log_again(drawings: Drawings) -> None:
     motion = motion_of(campaign.motions[run.motion], drawings)
     recording = simulate(machine, motion, run.payload, Thermal(drawings.thermal), seed=10)
     shipped = pq.read_table(SHIPPED / "runs" / f"{run.name}.parquet")
-    # other processors round differently, which may tip a reading to the next step of its sensor, and move torques by some steps
+    # other processors round differently: a reading may tip to its sensor's next step, and torques move by some steps
     for index, joint in enumerate(drawings.joints):
         np.testing.assert_allclose(shipped[f"q_{joint}"], recording.q[:, index], atol=1e-5)
         np.testing.assert_allclose(shipped[f"tau_{joint}"], recording.torque[:, index], atol=0.3)
