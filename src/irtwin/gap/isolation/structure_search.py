@@ -46,8 +46,8 @@ def attribute(
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
     Hypotheses are added one by one, everything refitted; what is less likely than nothing is dropped; then each in turn
-    is taken out and looked for anew. floor: (g,) RMS, 0 or None where unknown; `tell` is told how
-    far it has come, where it takes long.
+    is taken out and looked for anew. floor: (g,) RMS, 0 or None where unknown; `tell` is told how far it has come,
+    where it takes long.
     """
     candidates = in_scope(candidates, both=system.both)
     search = _Search(system, candidates, Prior.of(candidates), limits, floor, paced(tell))
