@@ -31,6 +31,10 @@ WRITTEN = (
 )
 
 
+class Unmade(Exception):
+    """The harness cannot make what a case has: a fault of its own."""
+
+
 def try_case_apart(case: Case, sound: Path) -> Fault | None:
     """Try a case from a process that has opened no store: a fork lacks RocksDB's threads, and waits for them."""
     context = multiprocessing.get_context("forkserver")
@@ -40,7 +44,7 @@ def try_case_apart(case: Case, sound: Path) -> Fault | None:
 
 
 def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Fault | None:
-    """Try the commands of a case, one after the other; return the first fault.
+    """Try the commands of a case, one after the other; return the first fault. Raises Unmade.
 
     `sound`: the folder of what is sound. `tried` counts how each ended.
     """
@@ -52,7 +56,7 @@ def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Faul
             Sound(sound).copy(part, folder)
         made = in_child(lambda: _make(case, folder), folder)
         if made.status:
-            raise AssertionError(f"the harness cannot make what this case has:\n{made.err}\n{case.to_json()}")
+            raise Unmade(f"status {made.status}: {made.err[-3000:]}\n{case.to_json()}")
         outside.seal()
         with peer(*case.peer) if case.peer else nullcontext() as port:
             if port is not None:
