@@ -17,7 +17,7 @@ from tests.fuzz.fault import SET_ASIDE, Fault, fault_of
 from tests.fuzz.outside import SECRET, Outside
 from tests.fuzz.peers import peer
 from tests.fuzz.run_irtwin import run_irtwin
-from tests.fuzz.sound import JOINTS, ROBOT, Sound
+from tests.fuzz.sound import ROBOT, Sound
 from tests.fuzz.ways import spoil_case
 
 _CHECKING = ("check", "status")
@@ -53,7 +53,7 @@ def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Faul
         outside = Outside(Path(name))
         folder = outside.case
         for part in case.sound:
-            Sound(sound).copy(part, folder)
+            Sound(sound, _moving(case)).copy(part, folder)
         made = in_child(lambda: _make(case, folder), folder)
         if made.status:
             raise Unmade(f"status {made.status}: {made.err[-3000:]}\n{case.to_json()}")
@@ -223,7 +223,10 @@ def _ends(case: Case) -> list[str]:
 
 
 def _moving(case: Case) -> int:
-    return JOINTS if case.sound else sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
+    """Return how many joints move: of what is sound as many as the controllers have that are followed, else two."""
+    if case.sound:
+        return 6 if case.peer and "live controller" in case.commands else 2
+    return sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
 
 
 def _stream(case: Case, folder: Path) -> bytes:
