@@ -136,12 +136,11 @@ def soak_on(folder: Path, seconds: float, robots: int, rate: float, graph_url: s
 def fill(folder: Path, robots: int, graph_url: str | None) -> None:
     """Make a workspace of robots with twins, and its graph."""
     known = kr6()
-    with Workspace(folder) as place:
+    with Workspace(folder) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
+        graph.load_ontology()
         for number in range(robots):
             add_robot(place, f"R{number:03d}", known)
-        with KnowledgeGraph.of_workspace(place, graph_url) as graph:
-            graph.load_ontology()
-            refresh(graph, place.engine, place.resources.paths("mappings"), place.mapped_rows)
+        refresh(graph, place.engine, place.resources.paths("mappings"), place.mapped_rows)
 
 
 @contextmanager

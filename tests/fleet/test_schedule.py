@@ -8,7 +8,7 @@ import pytest
 
 from irtwin.errors import InputError
 from irtwin.fleet import schedule
-from irtwin.fleet.batch import Batch
+from irtwin.fleet.batch import Batch, key
 
 pytestmark = pytest.mark.slow
 DIES = (sys.executable, "-m", "tests.fleet.worker_that_dies")
@@ -42,6 +42,19 @@ def test_a_process_that_never_begins_is_not_tried_for_ever(tmp_path: Path) -> No
         schedule.work_here(
             _batches(tmp_path, ("a",)), 1, lambda batch: None, (sys.executable, "-c", "raise SystemExit(7)")
         )
+
+
+@pytest.mark.parametrize("name", ["records", "lock", "records/a"])
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(name: str, tmp_path: Path, capfd) -> None:
+    (batch,) = _batches(tmp_path, ("a",))
+    place = batch.folder / name.replace("/a", f"/{key(batch.places[0])}.json/x")
+    if name == "records":
+        place.write_text("a file in its place")
+    else:
+        place.mkdir(parents=True)
+    with pytest.raises(InputError, match="cannot be written"):
+        schedule.work_here([batch], 1, lambda batch: None)
+    assert capfd.readouterr().err == ""
 
 
 def test_a_cluster_goes_on_where_a_worker_is_killed(tmp_path: Path) -> None:

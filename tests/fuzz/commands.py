@@ -17,7 +17,7 @@ from tests.fuzz.fault import SET_ASIDE, Fault, fault_of
 from tests.fuzz.outside import SECRET, Outside
 from tests.fuzz.peers import peer
 from tests.fuzz.run_irtwin import run_irtwin
-from tests.fuzz.sound import JOINTS, ROBOT, Sound
+from tests.fuzz.sound import ROBOT, Sound
 from tests.fuzz.ways import spoil_case
 
 _CHECKING = ("check", "status")
@@ -31,6 +31,10 @@ WRITTEN = (
 )
 
 
+class Unmade(Exception):
+    """The harness cannot make what a case has: a fault of its own."""
+
+
 def try_case_apart(case: Case, sound: Path) -> Fault | None:
     """Try a case from a process that has opened no store: a fork lacks RocksDB's threads, and waits for them."""
     context = multiprocessing.get_context("forkserver")
@@ -40,7 +44,7 @@ def try_case_apart(case: Case, sound: Path) -> Fault | None:
 
 
 def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Fault | None:
-    """Try the commands of a case, one after the other; return the first fault.
+    """Try the commands of a case, one after the other; return the first fault. Raises Unmade.
 
     `sound`: the folder of what is sound. `tried` counts how each ended.
     """
@@ -49,10 +53,10 @@ def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Faul
         outside = Outside(Path(name))
         folder = outside.case
         for part in case.sound:
-            Sound(sound).copy(part, folder)
+            Sound(sound, _moving(case)).copy(part, folder)
         made = in_child(lambda: _make(case, folder), folder)
         if made.status:
-            raise AssertionError(f"the harness cannot make what this case has:\n{made.err}\n{case.to_json()}")
+            raise Unmade(f"status {made.status}: {made.err[-3000:]}\n{case.to_json()}")
         outside.seal()
         with peer(*case.peer) if case.peer else nullcontext() as port:
             if port is not None:
@@ -219,7 +223,10 @@ def _ends(case: Case) -> list[str]:
 
 
 def _moving(case: Case) -> int:
-    return JOINTS if case.sound else sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
+    """Return how many joints move: of what is sound as many as the controllers have that are followed, else two."""
+    if case.sound:
+        return 6 if case.peer and "live controller" in case.commands else 2
+    return sum(axis.kind not in ("fixed", "mimic") for axis in case.data.robot.axes)
 
 
 def _stream(case: Case, folder: Path) -> bytes:

@@ -1,6 +1,6 @@
 """Draws cases for FUZZ_SECONDS (600 by default), and keeps the smallest case of each fault in `kept/`, as a test.
 
-`make fuzz`; FUZZ_SEED repeats a session. Exit status 1 where a fault was found.
+`make fuzz`; FUZZ_SEED repeats a session. Exit status 1 where a fault was found, or a case could not be made.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from tests.fuzz.case import Case, cases
-from tests.fuzz.commands import try_case
+from tests.fuzz.commands import Unmade, try_case
 from tests.fuzz.fault import Fault
 
 KEPT = Path(__file__).parent / "kept"
@@ -24,12 +24,13 @@ _ROUND = 20  # draws by one seed, before it is looked which commands came seldom
 
 
 class Session:
-    """Draws until the time is over; `faults` counts each kind, `tried` each command."""
+    """Draws until the time is over; `faults` counts each kind, `tried` each command, `unmade` what could not be."""
 
     def __init__(self, seconds: float, sound: Path) -> None:
         self.faults: dict[str, int] = {}
         self.tried: Counter[str] = Counter()
         self.draws = 0
+        self.unmade = 0
         self._sound = sound
         self._seen: set[Case] = set()  # a drawing repeats itself
         self._end = time.monotonic() + seconds
@@ -52,8 +53,13 @@ class Session:
         if self.over or case in self._seen:
             return
         self._seen.add(case)
+        try:
+            fault = try_case(case, self._sound, self.tried)
+        except Unmade as error:
+            self.unmade += 1
+            print(f"not made, {error}", flush=True)
+            return
         self.draws += 1
-        fault = try_case(case, self._sound, self.tried)
         if fault is None:
             return
         self.faults[fault.kind] = self.faults.get(fault.kind, 0) + 1
@@ -91,7 +97,8 @@ def main() -> None:
         print(f"{count:6d}  {how}")
     for kind, count in sorted(session.faults.items(), key=lambda entry: -entry[1]):
         print(f"{count:6d}  {kind}")
-    sys.exit(bool(session.faults))
+    print(f"{session.unmade:6d}  cases that could not be made")
+    sys.exit(bool(session.faults or session.unmade))
 
 
 def _draw(session: Session, number: int) -> None:

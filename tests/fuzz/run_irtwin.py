@@ -1,18 +1,45 @@
-"""The command line in this process, with everything imported."""
+"""The command line in this process, with everything imported and what ships read."""
 
 from __future__ import annotations
 
+import gc
 import importlib
 import pkgutil
 import sys
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
 import irtwin
 import irtwin.cli
+from irtwin.knowledge.parts import Ontology
+from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.shacl.validation import validate
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.storage.database import Workspace
 
-for _module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):  # here, once, not in each child
-    if not _module.name.endswith("__main__"):
-        importlib.import_module(_module.name)
+
+def _read_what_ships() -> None:
+    """Do here, once, what each child would do anew: ontology, rules and shapes are worked out for some seconds.
+
+    No store is opened on disk: a fork would lack its threads. What was read moves out of the collector's sight, else
+    each child's first collection copies all of it.
+    """
+    for module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    _ = Ontology.of(graph).borders
+    reason(graph)
+    validate(graph)
+    with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)):
+        pass
+    gc.collect()
+    gc.freeze()
+
+
+_read_what_ships()
 
 
 def run_irtwin(arguments: Sequence[str]) -> None:

@@ -13,15 +13,15 @@ from tests.fuzz.run_irtwin import run_irtwin
 from tests.fuzz.streams import NOON
 from tests.small_robots import data_set
 
-ROBOT, JOINTS = "arm", 6  # as many as the controllers that are followed have
+ROBOT = "arm"
 PARTS = ("workspace", "given.zip", "fleet")
 
 
 class Sound:
-    """What is sound, in a folder that is filled when it is first needed."""
+    """What is sound, of an arm of some joints, in a folder that is filled when it is first needed."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, joints: int) -> None:
+        self._folder, self._joints = folder / f"of_{joints}_joints", joints
 
     def copy(self, part: str, folder: Path) -> None:
         """Put one of `PARTS` into the folder of a case."""
@@ -32,11 +32,12 @@ class Sound:
 
     def _make(self) -> None:
         """Take a robot in, find its gap, watch it until it has an alarm; back all that up."""
-        folder = self._folder
+        folder, joints = self._folder, self._joints
+        folder.mkdir()
         data, workspace, archive, fleet, stream = (folder / name for name in ("data", *PARTS, "stream"))
-        made = in_child(lambda: data_set(data, ROBOT, joints=JOINTS) and None, folder)
+        made = in_child(lambda: data_set(data, ROBOT, joints=joints) and None, folder)
         assert made.status == 0, made.err
-        stream.write_text("".join(map(_line, range(500))))
+        stream.write_text("".join(_line(number, joints) for number in range(500)))
         into = ["--workspace", str(workspace)]
         for words in (
             ["run", str(data), *into],
@@ -49,7 +50,7 @@ class Sound:
             assert done.status == 0, done.err
 
 
-def _line(number: int) -> str:
+def _line(number: int, joints: int) -> str:
     time = NOON + number / 20
-    said = {"robot": ROBOT, "time": time, "position": [0.3 * math.sin(time + joint) for joint in range(JOINTS)]}
-    return json.dumps(said | {"effort": [90.0] * JOINTS, "power": 5000.0}) + "\n"
+    said = {"robot": ROBOT, "time": time, "position": [0.3 * math.sin(time + joint) for joint in range(joints)]}
+    return json.dumps(said | {"effort": [90.0] * joints, "power": 5000.0}) + "\n"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
+import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +15,10 @@ from hypothesis import strategies as st
 from tests.fuzz import archives, extensions, recordings, spoil, workspaces
 
 _Ways = Mapping[str, Callable[[Path, np.random.Generator], None]]
+_BEYOND_READING = (
+    *(pa.ArrowException, OverflowError, OSError, LookupError, RecursionError, ValueError),
+    *(zipfile.BadZipFile, zlib.error, sqlite3.Error),
+)
 _WHERE: dict[str, tuple[str, _Ways]] = {  # what is spoilt -> where it is in a case's folder, and how
     "data": ("data", spoil.WAYS),
     "archive": ("given.zip", archives.WAYS),
@@ -26,7 +33,7 @@ def spoil_case(folder: Path, way: str, seed: int) -> None:
     """Spoil what is in the folder of a case in one way; what is spoilt beyond reading stays as it is."""
     what, _, name = way.rpartition(": ")
     where, ways = _WHERE[what or "data"]
-    with suppress(pa.ArrowException, OverflowError, OSError, LookupError, RecursionError, ValueError):
+    with suppress(*_BEYOND_READING):
         ways[name](folder / where, np.random.default_rng(seed))
 
 

@@ -58,11 +58,11 @@ def expected(joints: int, seconds: float = 10.0, *, power: bool = True) -> Forec
 
 
 @pytest.mark.parametrize("joints", MEASURED)
-def test_the_forecast_is_within_a_factor_of_two_of_what_was_measured(joints):
+def test_the_forecast_is_within_three_tenths_of_what_was_measured(joints):
     seconds, memory = MEASURED[joints]
     found = expected(joints)
-    assert seconds / 2 <= found.seconds <= 2 * seconds
-    assert memory / 2 <= found.memory <= 2 * memory
+    assert seconds / 1.3 <= found.seconds <= 1.3 * seconds
+    assert memory / 1.3 <= found.memory <= 1.3 * memory
 
 
 def test_more_joints_take_more():

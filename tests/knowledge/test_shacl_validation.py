@@ -94,6 +94,16 @@ def test_broken_constraint_is_said_in_words(
     assert {row["node"] for row in kept} == {subject}
 
 
+def test_two_values_where_one_may_be_are_not_called_absent(two_robots: list[Quad]) -> None:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    one = changed(two_robots, RUN, "Payload", Literal(1.0))
+    other = Quad(NamedNode(RUN), NamedNode(term("Payload")), Literal(2.0), NamedNode(GRAPH_SOURCE + "x"))
+    graph.replace([*one, other], GRAPH_SOURCE, GRAPH_ACTIVITY)
+    (violation,) = validate(graph)
+    assert str(violation).endswith("a run's payload is one number, 0 kg or more (irt:Payload has several values)")
+
+
 def typed(subject: str, kind: str) -> Quad:
     return Quad(NamedNode(subject), NamedNode(RDF + "type"), NamedNode(term(kind)), NamedNode(GRAPH_SOURCE + "x"))
 

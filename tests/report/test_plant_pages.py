@@ -98,6 +98,13 @@ def test_a_plant_without_robots() -> None:
     assert not overview.sheet(overview.overview(answers, TARIFF), TARIFF).rows
 
 
+def test_alarms_are_not_counted_as_none_beside_a_contradiction(answers: Answers) -> None:
+    rows = ({"contradiction": "two payloads of one run"},)
+    said = text(drawn(answers | {"contradictions": replace(answers["contradictions"], rows=rows)}, TARIFF))
+    assert "of what is not contradicted, see above" in said
+    assert "of what is not contradicted" not in text(drawn(answers, TARIFF))
+
+
 def test_a_piece_and_a_cycle(answers: Answers) -> None:
     said = text(drawn(answers, TARIFF))
     assert "bracket Arm_A electrical, measured 40 75.0 J 15 133 J" in said.replace("\N{NO-BREAK SPACE}", " ")

@@ -83,6 +83,11 @@ def test_tables_in_tables_without_end(folder, line):
     assert "nested too deeply" in refused(folder)
 
 
+def test_an_array_that_takes_the_parser_seconds_is_not_read(folder):
+    rewrite(folder, "^payload_mass.*$", "payload_mass = [" + "1," * 1_500_000 + "]")
+    assert "is larger than the 2 MB limit" in refused(folder)
+
+
 def test_text_with_many_dots_is_no_table(folder):
     rewrite(folder, "^role.*$", 'role = "observed"\nnote = "' + ".".join("a" * 1000) + '"')
     read_data_set(folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -129,3 +130,14 @@ def test_what_those_who_run_the_server_can_mend_is_one_line(
             other.execute(end_all)
         with pytest.raises(InputError, match="connection to the database was lost; do it again"):
             session.execute(robots)
+
+
+def test_a_pipe_in_place_of_the_turn_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / ".graph.turn")
+    assert not turns.is_rewritten(tmp_path)
+    with (
+        Workspace(tmp_path) as place,
+        pytest.raises(InputError, match="cannot be written"),
+        turns.rewriting_alone(place.engine, tmp_path),
+    ):
+        pass

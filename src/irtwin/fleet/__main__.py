@@ -3,6 +3,11 @@
 import sys
 from pathlib import Path
 
-from irtwin.fleet.batch import Batch
+from irtwin.errors import InputError
+from irtwin.fleet.batch import STOPPED, Batch
 
-Batch(Path(sys.argv[1])).work()
+try:
+    Batch(Path(sys.argv[1])).work()
+except InputError as error:
+    print(error, file=sys.stderr)
+    sys.exit(STOPPED)

@@ -22,6 +22,7 @@ from irtwin.storage.files import write
 
 RUN, DIAGNOSE = "run", "diagnose"
 BEGUN, DONE, REFUSED, FAILED = "begun", "done", "refused", "failed"
+STOPPED = 2  # exit status of a process whose batch's folder cannot be written
 _ATTEMPTS = 2  # of a data set whose process ended: memory may have been short for another's sake
 _SETS = "sets.json"
 _MOST_BYTES = 100_000_000
@@ -134,7 +135,11 @@ class Batch:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        with (self.folder / "lock").open("w") as lock:
+        try:
+            lock = (self.folder / "lock").open("w")
+        except OSError as error:
+            raise InputError(f"{self.folder / 'lock'}: cannot be written ({error.strerror}); remove it") from error
+        with lock:
             fcntl.flock(lock, fcntl.LOCK_EX)  # a scheduler may take a worker for lost that is still at work
             yield
 

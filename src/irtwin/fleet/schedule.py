@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.fleet.batch import Batch
+from irtwin.fleet.batch import STOPPED, Batch
 
 Tell = Callable[[Batch], None]
 WORKER = (sys.executable, "-m", "irtwin.fleet")
@@ -50,12 +50,19 @@ def work_on_cluster(batches: Sequence[Batch], scheduler: str, tell: Tell, comman
 def in_process(folder: str, command: Sequence[str] = WORKER) -> None:
     """Work through a batch in a process of its own, begun again where it dies; a store is bound to one thread.
 
-    Each death counts against the data set that it died of. Raises InputError where a process dies without a record.
+    Each death counts against the data set that it died of. Raises InputError where a process dies without a record,
+    or stops as the batch's folder cannot be written.
     """
     batch = Batch(Path(folder))
     before = list(batch.records())
-    while (status := subprocess.run([*command, folder], check=False).returncode) != 0:
+    while (done := subprocess.run([*command, folder], stderr=subprocess.PIPE, text=True, check=False)).returncode != 0:
+        if done.returncode == STOPPED:
+            raise InputError(done.stderr.strip())
+        sys.stderr.write(done.stderr)
         after = list(batch.records())
         if after == before:
-            raise InputError(f"{folder}: its process ended with status {status} and left no record; see what it wrote")
+            raise InputError(
+                f"{folder}: its process ended with status {done.returncode} and left no record; see what it wrote"
+            )
         before = after
+    sys.stderr.write(done.stderr)

@@ -22,14 +22,13 @@ LONG = 30.0  # s: of less nothing is said
 _GROUPS = 8  # at least: few runs are cut in time
 _BLOCKS = 40  # at least
 
-# Set by hand to what `bench/diagnosis_speed.py` took, with power: 12x1000 and 12x5000 of 6 joints, 12x1000 of 12 and of
-# 30; 20 and 40 were measured after (docs/findings/gap-diagnosis.md, "Many joints"). How often is searched depends on
-# what is found.
-_PER_SAMPLE = 4e-5  # s, of each sample and joint
-_PER_PRODUCT = 4.5e-6  # s, of each product of a term of the twin with a column, in each group
-_PER_FIT = 4e-9  # s, of each of these and each term of the twin: fits carried over to all columns
+# Set by hand to what `bench/diagnosis_speed.py` took, with power: 12x1000 of 6, 12, 20, 30 and 40 joints, and 12x5000
+# of 6 (docs/findings/gap-diagnosis.md, "Many joints"). How often is searched depends on what is found.
+_PER_SAMPLE = 2.6e-5  # s, of each sample and joint
+_PER_COLUMN = 5e-3  # s, of each column of the equations
+_PER_PRODUCT = 4.2e-6  # s, of each product of a term of the twin with a column, in each group
 _BEFORE = 0.2e9  # bytes that the program has without data
-_HELD = 2.3  # times what the equations' products take: those of torque alone, and the next experiment's, stand beside
+_HELD = 2.0  # times what the equations' products take: those of torque alone, and the next experiment's, stand beside
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ def forecast(data_set: DataSet, begun: Baseline) -> Forecast:
 def forecast_of(sizes: Sizes, joints: int, runs: int, samples: int) -> Forecast:
     """Return what a diagnosis takes whose equations have such sizes, of so many samples in all runs."""
     products = (int(sizes.group.max()) + 1) * sizes.base * sizes.size
-    seconds = _PER_SAMPLE * samples * joints + (_PER_PRODUCT + _PER_FIT * sizes.base) * products
+    seconds = _PER_SAMPLE * samples * joints + _PER_COLUMN * sizes.size + _PER_PRODUCT * products
     return Forecast(joints, runs, seconds, _BEFORE + _HELD * sizes.bytes)
 
 

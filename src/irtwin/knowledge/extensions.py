@@ -25,6 +25,7 @@ from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.rule import SHACL, Rule
 from irtwin.knowledge.store.keywords import refuse_service
 from irtwin.knowledge.store.rdf_input import read_turtle
+from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL, PREFIXES, shorten
 from irtwin.knowledge.vocabulary import SH as SHACL_TERMS
@@ -61,6 +62,8 @@ def check_mappings(resources: Resources, engine: Engine) -> None:
 
 def sparql_fault(text: str) -> tuple[int, str] | None:
     """Return line and words of what is wrong with a query, which may read this graph alone; None where nothing is."""
+    if not is_readable(text, ID):
+        return 1, f"column 1: the query {NOT_READABLE}"
     try:
         Store().query(text, base_iri=ID, prefixes=PREFIXES)
     except SyntaxError as error:

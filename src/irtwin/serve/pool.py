@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from irtwin.knowledge.store.linked import remove_left_behind
+from irtwin.knowledge.store.readable import NOT_READABLE
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.shares import Displaced
 from irtwin.serve.source import Source
@@ -130,7 +131,7 @@ class Worker:
         if status == -signal.SIGABRT:
             return Refusal(503, f"the query needs more than {self._limits.memory >> 20} MB of memory: ask for less")
         if status == -signal.SIGSEGV:
-            return Refusal(400, "the query is nested too deeply, or too long, to be read")
+            return Refusal(400, f"the query {NOT_READABLE}")
         return Refusal(500, f"the query was lost: its worker ended with status {status}; ask again")
 
 

@@ -15,7 +15,7 @@ from irtwin.errors import InputError
 from irtwin.input_file import read_input
 
 BAG_FOLDER = "metadata.yaml"  # what a folder that is a ROS 2 bag holds
-_LARGEST = 20_000_000  # bytes
+_LARGEST = 2_000_000  # bytes, of thousands of runs; a million takes the parser up to 2 s
 _GREATEST = 1e300  # of a number
 _DEEPEST = 32  # tables in tables
 _MOST_KEYS = 1000  # of a table: each that nobody knows is held against those that are known

@@ -7,6 +7,7 @@ is killed holds nothing any more: PostgreSQL lets go with its connection, the sy
 from __future__ import annotations
 
 import fcntl
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -46,7 +47,7 @@ def rewriting_alone(engine: Engine, folder: Path) -> Iterator[None]:
 def is_rewritten(folder: Path) -> bool:
     """Whether some process rewrites the graph of the workspace in `folder` just now."""
     try:
-        file = inside(folder, _FILE).open("rb")
+        file = open(inside(folder, _FILE), "rb", opener=_at_once)  # noqa: SIM115
     except FileNotFoundError:
         return False
     with file:
@@ -63,9 +64,14 @@ def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:
     return lambda: bool(connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": _KEY}))
 
 
+def _at_once(path: str, flags: int) -> int:
+    """Open a file; a pipe in its place, which would be waited for without end, is an error."""
+    return os.open(path, flags | os.O_NONBLOCK, 0o666)
+
+
 def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
     try:
-        file = held.enter_context(inside(folder, _FILE).open("ab"))
+        file = held.enter_context(open(inside(folder, _FILE), "ab", opener=_at_once))  # noqa: SIM115
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); {engines.TO_WRITE}") from None
 

@@ -17,6 +17,7 @@ from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import Table
 from irtwin.resources import Files, Resources, shipped
 
@@ -127,6 +128,8 @@ def _text(question: str, resources: Resources) -> str:
     known = named_questions(resources)
     if question in known:
         return known[question].text
+    if not is_readable(question, None):
+        raise InputError(f"the query {NOT_READABLE}; make it simpler")
     if _QUERY_FORM.search(question):
         return question
     near = get_close_matches(question, known, n=1)

@@ -47,7 +47,8 @@ _TYPE = NamedNode(RDF + "type")
 class Violation:
     """A node that breaks a constraint, said in words; `property` and `value` where the constraint has them.
 
-    `robot` is the one that the node belongs to, None where it belongs to none, or to several.
+    `several`: the property has more values than it may. `robot` is the one that the node belongs to, None where it
+    belongs to none, or to several.
     """
 
     node: str
@@ -55,10 +56,12 @@ class Violation:
     property: str | None
     value: str | None
     robot: str | None = None
+    several: bool = False
 
     def __str__(self) -> str:
         """Return one line: what is wrong, with which node, of which robot."""
-        found = "" if self.property is None else f" ({shorten(self.property)} is {self.value or 'absent'})"
+        said = "has several values" if self.several else f"is {self.value or 'absent'}"
+        found = "" if self.property is None else f" ({shorten(self.property)} {said})"
         of = "" if self.robot is None else f"{shorten(self.robot)}: "
         return f"{of}{shorten(self.node)}: {self.message}{found}"
 
@@ -244,4 +247,5 @@ def _violation(report: rdflib.Graph, result: rdflib.term.Node, robots: _Robots) 
         property=str(path) if isinstance(path, rdflib.URIRef) else None,
         value=None if value is None else str(value),
         robot=robots.of(str(focus)) if isinstance(focus, rdflib.URIRef) else None,
+        several=report.value(result, SH.sourceConstraintComponent) == SH.MaxCountConstraintComponent,
     )
