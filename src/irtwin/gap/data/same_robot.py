@@ -85,7 +85,7 @@ def _allowed(robot: Robot, system: System, heaviest: float) -> np.ndarray:
     weight = max(heaviest, sum(inertia.mass for inertia in robot.model.inertias) / 2)
     allowed = np.where(bodies, 0.0, np.inf)
     last = np.flatnonzero(bodies)[-len(_REACH) :]
-    allowed[last] = (weight * np.array(_REACH) / system.scale[last])[: len(last)]
+    allowed[last] = weight * np.array(_REACH)[: len(last)] / system.scale[last]
     return allowed
 
 
