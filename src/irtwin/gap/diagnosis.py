@@ -352,7 +352,7 @@ def _torque(
             )
 
         return find_possible(case, beside_power, unknown)
-    system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell)
+    system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell, case.shaken)
     system = replace(system, transient=found.contact)
 
     def alone(without: Set[Without]) -> tuple[Finding, Floor]:

@@ -14,6 +14,7 @@ from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.admission import admit
 from irtwin.gap.data.baseline import baseline
+from irtwin.gap.data.shaken import shaken
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
@@ -22,7 +23,7 @@ from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.progress import Tell
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import condition
+from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
@@ -110,6 +111,11 @@ class Case:
         """The motions whose torque is known or whose power was measured."""
         return [one for one in self.motions.values() if one.torque is not None or one.power is not None]
 
+    @cached_property
+    def shaken(self) -> tuple[tuple[Motion, Motion], ...]:
+        """Some observed motions, each with the same once more to which its noise of positions was added again."""
+        return shaken(self.runs, self.motions, self.robot, self.thresholds.repeats)
+
     @property
     def long(self) -> bool:
         """Whether there are so many samples that work on all of them is worth a copy of the process."""
@@ -147,7 +153,7 @@ def case_of(
     """
     begun = baseline(data_set, withhold, twin, thresholds.given_twin)
     cutoff = cutoff_for(begun.robot, data_set.runs, tell)
-    given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
+    given = {run.name: condition_for_fit(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
     case = Case(
