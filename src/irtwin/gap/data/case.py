@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
+from irtwin.effects.friction import FrictionTurn
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
@@ -130,10 +131,22 @@ class Case:
         runs = [motion.run for motion in self.with_torque]
         return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
 
+    @property
+    def friction_turns(self) -> list[Effect]:
+        """What the turn of dry friction is off by, where it is not at once: of all runs, and of observed ones alone."""
+        changed = [FrictionTurn(runs=tuple(sorted(self.observed)))] if self.others else []
+        return [FrictionTurn(), *changed]
+
     def with_friction_near_zero(self, tell: Tell | None = None) -> Case:
-        """Return the case with the turn of each joint's dry friction as its motions show it."""
-        motions = list(self.motions.values())
-        return replace(self, robot=with_friction_near_zero(self.robot, motions, self.effects, tell))
+        """Return the case with the turn of each joint's dry friction.
+
+        It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
+        """
+        sides = [motions for motions in (self.seen, self.others) if motions]
+        robot = self.robot
+        found = [with_friction_near_zero(robot, motions, self.effects, tell).joints for motions in sides]
+        joints = [next((one for one in reversed(each) if one.friction_width is not None), each[0]) for each in zip(*found, strict=True)]
+        return replace(self, robot=replace(robot, joints=tuple(joints)))
 
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""
