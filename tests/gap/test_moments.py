@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.gap.regression import moments as module
-from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, numbers, summed
+from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, numbers, summed
 
 COLUMNS = 9  # and the measurement
 WEIGHTS = np.array([2.0, 0.5, 3.0])
@@ -42,7 +42,16 @@ def group(rng: np.random.Generator, count: int, used: list[list[int]]) -> tuple[
 def test_they_are_the_products_of_all_columns(count, used, seed):
     rng = np.random.default_rng(seed)
     (one, first), (other, second) = group(rng, count, used), group(rng, 2 * count, used)
-    for found, expected in ((one, first), (summed([one, other]), first + second), (summed([one, other]) - one, second)):
+    less = rng.standard_normal(COLUMNS + 1)
+    shifted = first.copy()
+    shifted[:-1, -1] -= less[:-1]
+    shifted[-1, :-1] -= less[:-1]
+    for found, expected in (
+        (one, first),
+        (summed([one, other]), first + second),
+        (summed([one, other]) - one, second),
+        (Shifted(one, less), shifted),
+    ):
         np.testing.assert_allclose(found.whole, expected, atol=1e-9)
         rows, columns = rng.integers(0, COLUMNS + 1, 4), rng.permutation(COLUMNS + 1)[:6]
         np.testing.assert_allclose(found.among(rows, columns), expected[np.ix_(rows, columns)], atol=1e-9)

@@ -25,6 +25,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
 
+_SHARP = 3e-3  # rad/s: of what turns sooner little shows
 _MOST_LOST = 0.6  # of a load, in gears: those that lose half when driven back hold by themselves
 
 
@@ -74,6 +75,33 @@ class CoulombFriction(JointEffect):
         """Return where a joint stands still, as filtered or as logged: it may stick for a moment as it turns back."""
         slow = np.abs(motion.dq) < STANDSTILL
         return np.asarray(slow if motion.standing is None else slow | motion.standing)
+
+
+@dataclass(frozen=True)
+class FrictionTurn(JointEffect):
+    """sum a_k (s_k - s): dry friction that turns over other speeds than `direction` says, half to four times them.
+
+    It is of no catalogue: nobody asks for it, and no twin keeps it.
+    """
+
+    id: ClassVar[str] = "friction_turn"
+    family: ClassVar[str] = "friction"
+    channel: ClassVar[str] = "torque"
+    wider: ClassVar[tuple[float, ...]] = (0.5, 2.0, 4.0)
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return a_k."""
+        return tuple(Term(f"{factor:g} w", force_unit(joint), joint.name, spread=15.0) for factor in self.wider)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return what each turn has beyond the joint's."""
+        plain = direction(robot, motion.dq)
+        own = [(j.friction_width or _SHARP, j.friction_exponent or 2.0) for j in robot.joints]
+        return tuple(
+            np.column_stack([turn(dq, k * width, power) for dq, (width, power) in zip(motion.dq.T, own, strict=True)])
+            - plain
+            for k in self.wider
+        )
 
 
 @dataclass(frozen=True)

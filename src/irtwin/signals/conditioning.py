@@ -22,17 +22,27 @@ _BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the
 _ABOVE_NOISE = 3.0  # times the mean noise: what stands out is motion
 _FEWEST_PERIODS = 10  # of the cutoff in a run
 _NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is chosen
+_STATES = ("q", "dq", "ddq")
+_STATES_WIDER = 3.0  # what is below the cutoff then passes unchanged
 _AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this from those of the positions
 STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
-def condition(run: Run, robot: Robot, cutoff: float | None = None, time: np.ndarray | None = None) -> Motion:
+def condition(
+    run: Run,
+    robot: Robot,
+    cutoff: float | None = None,
+    time: np.ndarray | None = None,
+    *,
+    states_cutoff: float | None = None,
+) -> Motion:
     """Return the run's signals at an even rate (the sampling's), low-pass filtered without phase shift.
 
     Speeds and accelerations are derivatives of the filtered positions; speeds that were logged are taken instead
-    where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`. `time`: even times, (N,) s within
-    the run, to be returned instead of all of it. Raises InputError on a cutoff that is no positive number, or on a run
-    of fewer than 20 samples or, unless `time` is given, with a hole in time.
+    where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`; `states_cutoff` is another one for
+    positions, speeds and accelerations. `time`: even times, (N,) s within the run, to be returned instead of all of it.
+    Raises InputError on a cutoff that is no positive number, or on a run of fewer than 20 samples or, unless `time` is
+    given, with a hole in time.
     """
     signals = run.signals
     if len(signals.time) < FEWEST:
@@ -44,11 +54,13 @@ def condition(run: Run, robot: Robot, cutoff: float | None = None, time: np.ndar
     time = _even_time(run) if time is None else time
     rate = 1 / (time[1] - time[0])
 
-    def clean(values: np.ndarray, order: int = 1) -> np.ndarray:
+    def clean(values: np.ndarray, cutoff: float, order: int = 1) -> np.ndarray:
         return low_pass(make_interp_spline(signals.time, values, k=order)(time), rate, cutoff)
 
-    measured: dict[str, Any] = {name: clean(it) for name, it in signals.logged().items() if name not in REQUIRED}
-    q = clean(signals.q, order=3)
+    cutoffs = dict.fromkeys(_STATES, states_cutoff or cutoff)
+    logged = {name: it for name, it in signals.logged().items() if name not in REQUIRED}
+    measured: dict[str, Any] = {name: clean(it, cutoffs.get(name, cutoff)) for name, it in logged.items()}
+    q = clean(signals.q, cutoffs["q"], order=3)
     dq = _agreeing(measured.pop("dq", None), differentiate(q, rate))
     ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate))
     return Motion(
@@ -63,6 +75,15 @@ def condition(run: Run, robot: Robot, cutoff: float | None = None, time: np.ndar
         cutoff=cutoff,
         **measured,
     )
+
+
+def condition_for_fit(run: Run, robot: Robot, cutoff: float) -> Motion:
+    """Return the run's signals as `condition` does, its states filtered more widely.
+
+    What a fit computes of states passes the filter of the measurement, as the measurement does; states that had passed
+    it before would pass it twice, and what they lose there looks like an elastic joint.
+    """
+    return condition(run, robot, cutoff, states_cutoff=_STATES_WIDER * cutoff)
 
 
 def choose_cutoff(runs: Iterable[Run]) -> float:

@@ -9,11 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
+from irtwin.effects.friction import FrictionTurn
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.admission import admit
 from irtwin.gap.data.baseline import baseline
+from irtwin.gap.data.shaken import shaken
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
@@ -22,7 +24,7 @@ from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.progress import Tell
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import condition
+from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
@@ -110,6 +112,11 @@ class Case:
         """The motions whose torque is known or whose power was measured."""
         return [one for one in self.motions.values() if one.torque is not None or one.power is not None]
 
+    @cached_property
+    def shaken(self) -> tuple[tuple[Motion, Motion], ...]:
+        """Some observed motions, each with the same once more to which its noise of positions was added again."""
+        return shaken(self.runs, self.motions, self.robot, self.thresholds.repeats)
+
     @property
     def long(self) -> bool:
         """Whether there are so many samples that work on all of them is worth a copy of the process."""
@@ -124,10 +131,22 @@ class Case:
         runs = [motion.run for motion in self.with_torque]
         return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
 
+    @property
+    def friction_turns(self) -> list[Effect]:
+        """What the turn of dry friction is off by, where it is not at once: of all runs, and of observed ones alone."""
+        changed = [FrictionTurn(runs=tuple(sorted(self.observed)))] if self.others else []
+        return [FrictionTurn(), *changed]
+
     def with_friction_near_zero(self, tell: Tell | None = None) -> Case:
-        """Return the case with the turn of each joint's dry friction as its motions show it."""
-        motions = list(self.motions.values())
-        return replace(self, robot=with_friction_near_zero(self.robot, motions, self.effects, tell))
+        """Return the case with the turn of each joint's dry friction.
+
+        It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
+        """
+        sides = [motions for motions in (self.seen, self.others) if motions]
+        robot = self.robot
+        found = [with_friction_near_zero(robot, motions, self.effects, tell).joints for motions in sides]
+        joints = [next((one for one in reversed(each) if one.friction_width is not None), each[0]) for each in zip(*found, strict=True)]
+        return replace(self, robot=replace(robot, joints=tuple(joints)))
 
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""
@@ -147,7 +166,7 @@ def case_of(
     """
     begun = baseline(data_set, withhold, twin, thresholds.given_twin)
     cutoff = cutoff_for(begun.robot, data_set.runs, tell)
-    given = {run.name: condition(run, begun.robot, cutoff) for run in data_set.runs}
+    given = {run.name: condition_for_fit(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
     case = Case(

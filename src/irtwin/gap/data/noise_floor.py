@@ -17,6 +17,7 @@ from irtwin.signals.motion import Motion
 
 REPEATS, OUT_OF_BAND = "repeats", "out_of_band"
 _LEAST = 1e-9  # N m or W: of a channel that repeats itself to the last bit
+_MOST_BAND = 0.9  # of all frequencies in the band: with more of them nothing is left to tell noise from
 _WELCH = 512  # samples of a stretch whose spectrum is averaged
 
 
@@ -99,15 +100,19 @@ def _without_jumps(squares: np.ndarray) -> np.ndarray:
 
 
 def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Repeats) -> np.ndarray | None:
-    """Return the variance in the band of white noise that has, above it, what the filter takes away; NaN if smoothed.
+    """Return the variance in the band of white noise that has what the filter takes away above it; NaN if smoothed."""
+    variance = white_noise(time, signal, motion, limits)
+    return None if variance is None else variance * _share(motion, limits)
+
+
+def white_noise(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Repeats) -> np.ndarray | None:
+    """Return the variance of white noise that has above the band what the filter takes away; NaN if smoothed.
 
     The lesser of two medians: that over time, which no jump of friction moves, and that over frequency, which no line
-    of the spectrum does.
+    of the spectrum does. None where nothing is known of it.
     """
-    if signal is None or motion.cutoff is None or len(kernel(motion.rate, motion.cutoff)) == 1:
-        return None
-    share = min(1.0, limits.stop_band * motion.cutoff / (motion.rate / 2))
-    if share > 0.9:
+    share = _share(motion, limits)
+    if signal is None or motion.cutoff is None or share > _MOST_BAND:
         return None
     even = np.asarray(make_interp_spline(time, signal, k=1)(motion.time))
     above = even - low_pass(even, motion.rate, motion.cutoff)
@@ -115,8 +120,15 @@ def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: 
     window = np.hanning(len(even)).reshape(-1, *(1,) * (even.ndim - 1))
     power = np.abs(np.fft.rfft(window * (even - even.mean(axis=0)), axis=0)) ** 2 / (window**2).sum()
     over_frequency = np.median(power[np.linspace(0.0, 1.0, len(power)) > share], axis=0) / np.log(2)
-    variance = np.minimum(over_time, over_frequency) * share
+    variance = np.minimum(over_time, over_frequency)
     return np.atleast_1d(np.where(_smoothed(even, motion.rate, share * motion.rate / 2, limits), np.nan, variance))
+
+
+def _share(motion: Motion, limits: Repeats) -> float:
+    """Return the part of all frequencies that is in the filter's band."""
+    if motion.cutoff is None or len(kernel(motion.rate, motion.cutoff)) == 1:
+        return 1.0
+    return min(1.0, limits.stop_band * motion.cutoff / (motion.rate / 2))
 
 
 def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Repeats) -> np.ndarray:

@@ -54,7 +54,7 @@ def find_beside_power(
 
     def about(torque: Torque, power: TwinPower, of_torque: Sequence[Effect]) -> JointEquations:
         tried = (of_torque, effects[1])
-        found = joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell)
+        found = joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell, case.shaken)
         return replace(found, whole=replace(found.whole, transient=transient))
 
     equations = about(predicted, before, effects[0])

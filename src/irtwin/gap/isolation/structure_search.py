@@ -84,7 +84,8 @@ class _Search:
             and not any(_same_place(one, each) for each, _ in found)
         ]
         self.tell(f"  {len(left)} hypotheses, beside {len(found)} that are found")
-        moments = self.system.moments(noise)
+        chosen = [k for _, variant in found for k in variant.columns]
+        moments = self.system.without_noise(self.system.moments(noise), noise, chosen)
         return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.unexplained(noise))
 
     def unexplained(self, noise: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.gap.regression.shaken_equations import Pairs, shaken_products
+from irtwin.identification.accumulate import Equations, Rows, accumulate
 from irtwin.identification.progress import Tell, with_progress
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -30,27 +31,34 @@ def torque_system(
     effects: Sequence[Effect],
     below: Below | None,
     tell: Tell | None = None,
+    shaken: Pairs = (),
 ) -> System:
     """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
 
-    `tell` is told how far that has come, where it takes long. Raises InputError where too few samples are left.
+    `shaken` says what noise of positions does to them. `tell` is told how far that has come, where it takes long.
+    Raises InputError where too few samples are left.
     """
     robot = stack.robot
     columns = candidate_columns(robot, effects)
     tried = candidate_pattern(robot, effects, columns)
     pattern = np.concatenate([stack.pattern, tried], axis=1)
 
-    candidates = Candidates(robot, effects, tried, below or _nothing)
+    def equations() -> Equations:
+        candidates = Candidates(robot, effects, tried, below or _nothing)
 
-    def equations(motion: Motion) -> Rows:
-        assert motion.torque is not None
-        own = stack.columns_by_joint(motion)
-        columns = list(zip(own, candidates.part(motion), strict=True))
-        return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion))
+        def of_part(motion: Motion) -> Rows:
+            assert motion.torque is not None
+            own = stack.columns_by_joint(motion)
+            columns = list(zip(own, candidates.part(motion), strict=True))
+            return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion))
 
-    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern, by_products=bool(effects))
+        return of_part
+
+    blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=bool(effects))
+    noise = shaken_products([pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern)
     known = stack.prior_rows(stack.torque_terms)
-    return enough(System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
+    found = System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known)
+    return enough(replace(found, shaken=noise))
 
 
 def power_system(

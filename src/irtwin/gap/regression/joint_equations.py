@@ -15,7 +15,8 @@ from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Variant, candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.accumulate import Given, Rows, accumulate
+from irtwin.gap.regression.shaken_equations import Pairs, shaken_products
+from irtwin.identification.accumulate import Equations, Given, Rows, accumulate
 from irtwin.identification.power_line import carried, power_line, rows_of_both
 from irtwin.identification.progress import Tell, with_progress
 from irtwin.signals.motion import Motion
@@ -53,12 +54,14 @@ def joint_equations(
     predicted: Torque,
     power: TwinPower,
     tell: Tell | None = None,
+    shaken: Pairs = (),
 ) -> JointEquations:
     """Reduce both.
 
     effects: candidates of torque, then of power; `below` is what those of torque are built on. Power is linear in the
     torque about what the twin predicts: the joint torque `predicted`, and the `power` that it takes; a real torque
     carries its column times the slope of power, which is the joint's speed and twice the losses of its current.
+    `shaken` says what noise of positions does to them.
     Raises InputError where too few samples are left.
     """
     robot, (of_torque, of_power) = stack.robot, effects
@@ -71,22 +74,26 @@ def joint_equations(
         torque = predicted(whole)
         return Predicted(torque, *power(whole, torque))
 
-    shown = Candidates(robot, of_torque, tried, below)
-    added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
+    def equations() -> Equations:
+        shown = Candidates(robot, of_torque, tried, below)
+        added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
 
-    def equations(motion: Motion) -> Rows:
-        own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
-        line = power_line(stack, motion, own, torque, stack.power_columns(motion, torque), power.values)
-        electrical = added.part(motion)
+        def of_part(motion: Motion) -> Rows:
+            own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
+            line = power_line(stack, motion, own, torque, stack.power_columns(motion, torque), power.values)
+            electrical = added.part(motion)
 
-        def of_power() -> list[np.ndarray]:
-            return [line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
+            def of_power() -> list[np.ndarray]:
+                return [line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
 
-        rows: list[Given] = [*zip(own, parts, strict=True), of_power]
-        return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
+            rows: list[Given] = [*zip(own, parts, strict=True), of_power]
+            return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
+
+        return of_part
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
-    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern, by_products=True)
+    blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=True)
+    noise = shaken_products(shaken, equations(), equations(), pattern)
     alone = [replace(one, rows=one.rows[:-1], factors=one.factors[:-1]) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(
@@ -97,6 +104,7 @@ def joint_equations(
         *grouping.of(blocks),
         beside_power=True,
         prior_rows=stack.prior_rows(terms),
+        shaken=noise,
     )
     of_joints = np.concatenate([stack.pattern, tried], axis=1)
     known = stack.prior_rows(stack.torque_terms)

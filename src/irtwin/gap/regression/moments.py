@@ -216,6 +216,28 @@ class _Less(Moments):
         return np.asarray(self._whole.blocks(columns) - self._part.blocks(columns))
 
 
+class Shifted(Moments):
+    """Those of a group, less (D + 1,) products with the measurement; its own square stays."""
+
+    def __init__(self, whole: Moments, products: np.ndarray):
+        """Take both."""
+        self.size = whole.size
+        self._whole, self._less = whole, np.append(products[:-1], 0.0)
+
+    def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Take off what is with the measurement, which is the last."""
+        found = self._whole.among(rows, columns).copy()  # what is kept elsewhere stays
+        found[:, columns == self.size - 1] -= self._less[rows, None]
+        found[rows == self.size - 1] -= self._less[columns]
+        return found
+
+    def blocks(self, columns: np.ndarray) -> np.ndarray:
+        """Take off what is with the measurement, which is the last."""
+        last, less = columns == self.size - 1, self._less[columns]
+        both = less[:, :, None] * last[:, None, :] + last[:, :, None] * less[:, None, :]
+        return np.asarray(self._whole.blocks(columns) - both)
+
+
 def summed(moments: Sequence[Moments]) -> Moments:
     """Return the moments of several groups together."""
     return _Sum(moments)

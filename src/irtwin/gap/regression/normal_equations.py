@@ -16,7 +16,7 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Column
-from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, numbers
+from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, numbers, summed
 from irtwin.gap.regression.transient import Transient
 from irtwin.identification.accumulate import Block
 
@@ -57,7 +57,8 @@ class System:
     whether the block belongs to an observed run. `prior_rows` (K, K): what is known of the twin's terms, as
     `effects.prior` gives it; None: each by itself, as its spread says. With any that does not, each candidate column
     stands there twice: as it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of
-    a brief candidate. `beside_power`: the last equation is power's, beside those of torque.
+    a brief candidate. `beside_power`: the last equation is power's, beside those of torque. `shaken`: the products a
+    row, (k + 1, k + 1) of each equation's columns and measurement, that noise of positions makes; None: of none.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -69,6 +70,7 @@ class System:
     transient: Transient | None = None
     beside_power: bool = False
     prior_rows: np.ndarray | None = None
+    shaken: tuple[np.ndarray, ...] | None = None
 
     @property
     def base(self) -> int:
@@ -175,22 +177,32 @@ class System:
 
         These are `factor @ weights` and `factor.T` of that, without the factor's copies of columns.
         """
-        used, twice = np.flatnonzero(self.pattern[equation]), self.both and bool(self.observed[block])
-        factor, own, later = self.blocks[block].factors[equation], used[used < self.base], used[used >= self.base]
-        changed = later + len(self.columns)
+        factor, observed = self.blocks[block].factors[equation], bool(self.observed[block])
+        left = factor @ self._held(equation, observed, weights)
+        return left, self._among_all(equation, observed, factor.T @ left)
+
+    def _held(self, equation: int, observed: bool, weights: np.ndarray) -> np.ndarray:
+        """Return what (D + 1,) weights of all columns are of those that an equation holds, (k + 1,), unscaled."""
+        used = np.flatnonzero(self.pattern[equation])
+        own, later = used[used < self.base], used[used >= self.base]
         scaled = weights[:-1] * self.scale
         each = np.append(scaled[used], weights[-1])
         each[: len(own)] -= weights[-1] * self.expected[own]
-        if twice:
-            each[len(own) : -1] += scaled[changed]
-        left = factor @ each
-        products = factor.T @ left
+        if self.both and observed:
+            each[len(own) : -1] += scaled[later + len(self.columns)]
+        return each
+
+    def _among_all(self, equation: int, observed: bool, products: np.ndarray) -> np.ndarray:
+        """Return products with what an equation holds, (k + 1,), as those with all columns, (D + 1,)."""
+        used = np.flatnonzero(self.pattern[equation])
+        own, later = used[used < self.base], used[used >= self.base]
         found = np.zeros(self._size + 1)
         found[used] = products[:-1] * self.scale[used]
         found[-1] = products[-1] - products[: len(own)] @ self.expected[own]
-        if twice:
+        if self.both and observed:
+            changed = later + len(self.columns)
             found[changed] = products[len(own) : -1] * self.scale[changed]
-        return left, found
+        return found
 
     @cached_property
     def _products(self) -> list[list[Products]]:
@@ -239,6 +251,28 @@ class System:
         """
         weights = np.maximum(noise, self.quietest) ** -2.0
         return [GroupMoments(products, weights) for products in self._products]
+
+    def without_noise(self, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]) -> list[Moments]:
+        """Return each group's `moments`, weighted by `noise` (g,), less what noise of positions seems to explain.
+
+        A fit of the twin's terms and the chosen columns leaves the noise of these, times their coefficients; the
+        products of all columns with that are taken off those with the measurement.
+        """
+        if self.shaken is None:
+            return list(moments)
+        left = np.append(-self.solution(chosen, summed(moments)), 1.0)
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        a_row = {
+            observed: [
+                weight * self._among_all(k, observed, products @ self._held(k, observed, left))
+                for k, (weight, products) in enumerate(zip(weights, self.shaken, strict=True))
+            ]
+            for observed in (False, True)
+        }
+        return [
+            Shifted(own, rows @ np.array(a_row[bool(observed)]))
+            for own, rows, observed in zip(moments, self.rows, self.group_observed, strict=True)
+        ]
 
     def _weighted_among(
         self, inside: np.ndarray, groups: Sequence[int] | np.ndarray, noise: np.ndarray
