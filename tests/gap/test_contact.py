@@ -13,7 +13,6 @@ from irtwin.effects.friction import ChangedFrictionWithTemperature, TemperatureD
 from irtwin.effects.load import ExternalContact, Payload
 from irtwin.gap.regression.candidate_columns import Candidates
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, in_scope
-from irtwin.gap.regression.transient import is_transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.thresholds import DEFAULT
@@ -45,12 +44,9 @@ def runs(touched, added=push, count=8):
 @pytest.mark.parametrize("touched", [(2,), (1, 4, 6)])
 def test_a_contact_is_found_in_its_runs_and_its_time(touched):
     found = contact(ROBOT, runs(touched), NOISE, DEFAULT.contact)
-    assert found.effect.runs == tuple(f"run_{seed}" for seed in touched)
-    assert found.effect.start == pytest.approx(3.0, abs=0.2)
-    assert found.effect.stop == pytest.approx(4.5, abs=0.2)
-    assert found.t > 2.5
-    assert found.p < 0.01
-    assert found.gain.shape == (len(touched), 6)
+    assert found.runs == tuple(f"run_{seed}" for seed in touched)
+    assert found.start == pytest.approx(3.0, abs=0.2)
+    assert found.stop == pytest.approx(4.5, abs=0.2)
 
 
 def test_noise_is_no_contact():
@@ -95,7 +91,7 @@ def test_undecided_samples_are_left_out():
     for one in left:
         one.residual[100:120, 2] = np.nan
         one.residual[:5] = np.nan
-    assert contact(ROBOT, left, NOISE, DEFAULT.contact).effect.runs == ("run_1", "run_4", "run_6")
+    assert contact(ROBOT, left, NOISE, DEFAULT.contact).runs == ("run_1", "run_4", "run_6")
 
 
 def test_candidates_are_zero_in_runs_in_which_they_do_not_act():
@@ -104,12 +100,6 @@ def test_candidates_are_zero_in_runs_in_which_they_do_not_act():
     for seed, acts in ((1, False), (2, True)):
         motion = replace(swing(ROBOT, seed, seconds=8.0, rate=50.0), run=f"run_{seed}")
         assert np.any(np.concatenate(candidates.part(motion), axis=1)) == acts
-
-
-def test_only_what_has_a_start_or_a_stop_is_brief():
-    assert is_transient(ExternalContact(3.0, 4.5))
-    assert not is_transient(ExternalContact())
-    assert not is_transient(Payload(runs=("run_1",)))
 
 
 def test_beside_reference_runs_what_acts_in_some_runs_is_a_change():

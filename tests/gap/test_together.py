@@ -47,7 +47,7 @@ def screened(loaded, touched, still=()):
     left = remainders(case, stack, twin_values(system, system.solution((), summed(system.moments(noise)))))
     alone = contact(ROBOT, left, noise, DEFAULT.contact), untold_payload(ROBOT, system, noise, DEFAULT.some_payload, 0)
     both = each_beside_the_other(case, stack, system, noise, alone, 0)
-    return [[one and one.effect.runs for one in pair] for pair in (alone, both)]
+    return [[one and one.runs for one in pair] for pair in (alone, both)]
 
 
 def test_a_contact_is_found_beside_a_payload_that_hides_it():

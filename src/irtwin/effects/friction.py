@@ -25,7 +25,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
 
-_SHARP = 3e-3  # rad/s: of what turns sooner little shows
+_SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
 _MOST_LOST = 0.6  # of a load, in gears: those that lose half when driven back hold by themselves
 
 
@@ -79,9 +79,9 @@ class CoulombFriction(JointEffect):
 
 @dataclass(frozen=True)
 class FrictionTurn(JointEffect):
-    """sum a_k (s_k - s): dry friction that turns over other speeds than `direction` says, half to four times them.
+    """sum over k of a_k (s_k - s): dry friction that turns over k times the speed that `direction` says.
 
-    It is of no catalogue: nobody asks for it, and no twin keeps it.
+    A nuisance of a diagnosis: it is of no catalogue, and no twin keeps it.
     """
 
     id: ClassVar[str] = "friction_turn"
@@ -91,15 +91,15 @@ class FrictionTurn(JointEffect):
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return a_k."""
-        return tuple(Term(f"{factor:g} w", force_unit(joint), joint.name, spread=15.0) for factor in self.wider)
+        return tuple(Term(f"a_{k:g}", force_unit(joint), joint.name, spread=15.0) for k in self.wider)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return what each turn has beyond the joint's."""
+        """Return s_k - s."""
         plain = direction(robot, motion.dq)
-        own = [(j.friction_width or _SHARP, j.friction_exponent or 2.0) for j in robot.joints]
+        turns = [(joint.friction_width or _SHARP, joint.friction_exponent or 2.0) for joint in robot.joints]
+        by_joint = list(zip(motion.dq.T, turns, strict=True))
         return tuple(
-            np.column_stack([turn(dq, k * width, power) for dq, (width, power) in zip(motion.dq.T, own, strict=True)])
-            - plain
+            np.column_stack([turn(dq, k * width, exponent) for dq, (width, exponent) in by_joint]) - plain
             for k in self.wider
         )
 

@@ -346,14 +346,12 @@ def _torque(
                 before(),
                 floor,
                 seed,
-                transient=found.contact,
                 without=without,
                 tell=tell,
             )
 
         return find_possible(case, beside_power, unknown)
     system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell, case.shaken)
-    system = replace(system, transient=found.contact)
 
     def alone(without: Set[Without]) -> tuple[Finding, Floor]:
         first = find("torque", case, system, floor.torque, seed, without, tell=tell)

@@ -124,13 +124,14 @@ class Contact:
 
     fewest_joints: int = _threshold(3, "of fewer joints, hardly any agree on a force", "joints", _JUDGEMENT)
     longest: float = _threshold(0.7, "a longer force is no episode", "share of the run", _JUDGEMENT)
-    alpha: float = _threshold(0.01, "largest p of the whole search", _P, _CASES)
+    alpha: float = _threshold(
+        0.05, "largest p of the whole search, to be tried, and of the same window in one more run", _P, _CASES
+    )
     decay: float = _threshold(1.1, "decay of chance's gains beyond their median", "upper quartiles, in logs", _CASES)
     least_decay: float = _threshold(0.25, "that decay at least", "logs", _CASES)
     steady: float = _threshold(
         0.5, "a force over the whole run explains no more of the window's gain", "share of the gain", _CASES
     )
-    joining_alpha: float = _threshold(0.05, "largest p of the same window in one more run", _P, _CASES)
     agreeing: float = _threshold(
         0.5, "the first run's force explains so much of what a run's own does", "share of the gain", _CASES
     )

@@ -133,7 +133,10 @@ class Case:
 
     @property
     def friction_turns(self) -> list[Effect]:
-        """What the turn of dry friction is off by, where it is not at once: of all runs, and of observed ones alone."""
+        """How else dry friction may turn at zero speed: in all runs, and in observed ones otherwise than in the others.
+
+        A joint's turn is no number that stays: it differs with pose, load and what friction there is.
+        """
         changed = [FrictionTurn(runs=tuple(sorted(self.observed)))] if self.others else []
         return [FrictionTurn(), *changed]
 
@@ -142,11 +145,14 @@ class Case:
 
         It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
         """
-        sides = [motions for motions in (self.seen, self.others) if motions]
-        robot = self.robot
-        found = [with_friction_near_zero(robot, motions, self.effects, tell).joints for motions in sides]
-        joints = [next((one for one in reversed(each) if one.friction_width is not None), each[0]) for each in zip(*found, strict=True)]
-        return replace(self, robot=replace(robot, joints=tuple(joints)))
+        found = self.robot
+        for motions in (self.seen, self.others):
+            if motions:
+                turned = with_friction_near_zero(self.robot, motions, self.effects, tell)
+                both = zip(found.joints, turned.joints, strict=True)
+                joints = (own if one.friction_width is None else one for own, one in both)
+                found = replace(found, joints=tuple(joints))
+        return replace(self, robot=found)
 
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""

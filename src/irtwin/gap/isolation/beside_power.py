@@ -22,7 +22,6 @@ from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.gap.regression.normal_equations import noise_before
-from irtwin.gap.regression.transient import Transient
 from irtwin.identification.power_line import power_slope
 from irtwin.identification.progress import Tell
 
@@ -39,7 +38,6 @@ def find_beside_power(
     floor: Floor,
     seed: int,
     *,
-    transient: Transient | None = None,
     without: Set[Without] = frozenset(),
     tell: Tell | None = None,
 ) -> tuple[Finding, Floor]:
@@ -54,8 +52,7 @@ def find_beside_power(
 
     def about(torque: Torque, power: TwinPower, of_torque: Sequence[Effect]) -> JointEquations:
         tried = (of_torque, effects[1])
-        found = joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell, case.shaken)
-        return replace(found, whole=replace(found.whole, transient=transient))
+        return joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell, case.shaken)
 
     equations = about(predicted, before, effects[0])
     first, both = _find(case, equations, floor, seed, without, tell)

@@ -17,7 +17,6 @@ from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, numbers, summed
-from irtwin.gap.regression.transient import Transient
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
@@ -56,9 +55,9 @@ class System:
     `pattern` (g, K + M): which columns each equation has; `group` (B,): blocks left out together; `observed` (B,):
     whether the block belongs to an observed run. `prior_rows` (K, K): what is known of the twin's terms, as
     `effects.prior` gives it; None: each by itself, as its spread says. With any that does not, each candidate column
-    stands there twice: as it is, and (from index K + M) zero in all but observed runs. `transient`: what joints say of
-    a brief candidate. `beside_power`: the last equation is power's, beside those of torque. `shaken`: the products a
-    row, (k + 1, k + 1) of each equation's columns and measurement, that noise of positions makes; None: of none.
+    stands there twice: as it is, and (from index K + M) zero in all but observed runs. `beside_power`: the last
+    equation is power's, beside those of torque. `shaken`: the products a row, (k + 1, k + 1) of each equation's columns
+    and measurement, that noise of positions makes; None: of none.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -67,7 +66,6 @@ class System:
     blocks: tuple[Block, ...]
     group: np.ndarray
     observed: np.ndarray
-    transient: Transient | None = None
     beside_power: bool = False
     prior_rows: np.ndarray | None = None
     shaken: tuple[np.ndarray, ...] | None = None

@@ -15,7 +15,6 @@ import numpy as np
 
 from irtwin.effects.load import ExternalContact
 from irtwin.gap.regression.correlation import correlation_samples
-from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.remainder import Remainder
 from irtwin.gap.thresholds import Contact
 from irtwin.identification.progress import Tell, paced
@@ -35,11 +34,11 @@ Clock = tuple[float, float]
 
 def contact(
     robot: Robot, left: Sequence[Remainder], noise: np.ndarray, limits: Contact, tell: Tell | None = None
-) -> Transient | None:
-    """Return the clearest contact, in all observed runs that show its force at its clock; None where none stands out.
+) -> ExternalContact | None:
+    """Return the clearest contact, in all observed runs that show its force at its clock, to be tried as a cause.
 
-    noise: (n,) RMS of each joint's residual, N m. Of an arm of one or two joints nothing is said: hardly any agree.
-    `tell` is told how far that has come, where it takes long.
+    None where chance makes as much, and of an arm of one or two joints, of which hardly any agree. noise: (n,) RMS of
+    each joint's residual, N m. `tell` is told how far that has come, where it takes long.
     """
     if len(robot.joints) < limits.fewest_joints:
         return None
@@ -50,16 +49,20 @@ def contact(
     return _contact(runs, limits, told)
 
 
-def _contact(runs: Sequence[_Run], limits: Contact, told: Tell) -> Transient | None:
+def _contact(runs: Sequence[_Run], limits: Contact, told: Tell) -> ExternalContact | None:
     found = _leader(runs, told)
     if found is None:
         return None
-    run, gain, clock = found
+    first, gain, clock = found
     quiet = [one for one in runs if one.judged(*one.samples(clock))[0].sum() < limits.quiet * gain]
     chance = _Chance.of(quiet or runs, clock, limits)
-    transient = _episode(runs, run, clock, chance, chance.p(gain, chance.count), limits)
-    worse, better = -transient.gain.clip(max=0.0).sum(), transient.gain.clip(min=0.0).sum()
-    return transient if transient.p <= limits.alpha and worse <= limits.harm * better else None
+    members, p = _members(runs, first, clock, chance, limits)
+    clock = _placed(members, clock)
+    gains = np.concatenate([run.judged(*run.samples(clock))[0] for run in members])
+    worse, better = -gains.clip(max=0.0).sum(), gains.clip(min=0.0).sum()
+    if p * chance.p(gain, chance.count) > limits.alpha or worse > limits.harm * better:
+        return None
+    return ExternalContact(*clock, runs=tuple(sorted(run.name for run in members)))
 
 
 def _leader(runs: Sequence[_Run], told: Tell) -> tuple[_Run, float, Clock] | None:
@@ -75,29 +78,25 @@ def _leader(runs: Sequence[_Run], told: Tell) -> tuple[_Run, float, Clock] | Non
     return found
 
 
-def _episode(runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, p: float, limits: Contact) -> Transient:
-    """Join the runs that show the first one's force at its clock, and place start and stop by all of them.
+def _members(
+    runs: Sequence[_Run], first: _Run, clock: Clock, chance: _Chance, limits: Contact
+) -> tuple[list[_Run], float]:
+    """Return the runs that show the first one's force at its clock, and how likely chance makes the others of them.
 
-    p: of the first; each further motion makes chance as much less likely, of however many runs it was one.
+    Each further motion makes chance as much less likely, of however many runs it was one.
     """
     _, force = first.judged(*first.samples(clock))
     members, others = [first], [run for run in runs if run.observed and run is not first and clock[1] <= run.time[-1]]
+    p = 1.0
     for run in others:
         window = run.samples(clock)
         gains, own = run.judged(*window)
         alone = chance.p(float(gains.sum()), 1)
-        if alone <= limits.joining_alpha and run.explained(*window, force) >= limits.agreeing * run.explained(
-            *window, own
-        ):
+        if alone <= limits.alpha and run.explained(*window, force) >= limits.agreeing * run.explained(*window, own):
             if run.label not in [member.label for member in members]:
                 p *= min(1.0, alone * len(others))
             members.append(run)
-    clock = _placed(members, clock)
-    gain = np.concatenate([run.judged(*run.samples(clock))[0] for run in members])
-    share = gain / np.concatenate([run.squares(*run.samples(clock)) for run in members])
-    felt = np.any(gain != 0, axis=0)
-    t = max(_t(gain[:, felt]), _t(share[:, felt]))
-    return Transient(ExternalContact(*clock, runs=tuple(sorted(run.name for run in members))), gain, t, p)
+    return members, p
 
 
 def _placed(members: Sequence[_Run], clock: Clock) -> Clock:
@@ -169,7 +168,6 @@ class _Run:
         self._inverse = np.linalg.inv(np.einsum("tjk,tjl->jkl", friction, friction) + 1e-6 * np.eye(3))
         taken = np.einsum("jkl,tj,tjl->jk", self._inverse, residual, friction)
         residual = residual - np.einsum("tjk,jk->tj", friction, taken)
-        self._energy = _summed(residual**2)
         self._squares = _summed(np.einsum("tja,tjb->tjab", jacobian, jacobian))
         self._right = _summed(jacobian * residual[:, :, None])
         self._cross = _summed(np.einsum("tjk,tja->tjka", friction, jacobian))
@@ -228,19 +226,11 @@ class _Run:
         squares, right = (part.sum(axis=1)[0] for part in self._window(start, stop))
         return float(2 * force[0] @ right - force[0] @ squares @ force[0])
 
-    def squares(self, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
-        """Return each joint's squares in windows, (W, n), at least one."""
-        return np.asarray(np.maximum(self._energy[stop] - self._energy[start], 1.0))
-
     def _window(self, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return each joint's products in windows, (W, n, 3, 3), and with the residual, (W, n, 3)."""
         cross = self._cross[stop] - self._cross[start]
         imitated = np.einsum("wjka,jkl,wjlb->wjab", cross, self._inverse, cross)
         return self._squares[stop] - self._squares[start] - imitated, self._right[stop] - self._right[start]
-
-
-def _t(values: np.ndarray) -> float:
-    return float(values.mean() / max(values.std(ddof=1) / np.sqrt(values.size), 1e-12)) if values.size > 1 else 0.0
 
 
 def _summed(products: np.ndarray) -> np.ndarray:

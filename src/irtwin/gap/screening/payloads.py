@@ -22,28 +22,15 @@ _FLIPS = 999
 _SWEEPS = 10
 
 
-@dataclass(frozen=True)
-class UntoldPayload:
-    """A payload in some runs: `effect` has the `runs`.
-
-    gain: mean square that it explains, of joints by which it was not told which runs carry it, without the runs' group;
-    t: of that between groups; p: under random signs of the groups, or of each joint in each where groups are so few
-    that all of one sign would still be chance.
-    """
-
-    effect: Payload
-    gain: float
-    t: float
-    p: float
-
-
 def untold_payload(
     robot: Robot, system: System, noise: np.ndarray, limits: SomePayload, seed: int, tell: Tell | None = None
-) -> UntoldPayload | None:
+) -> Payload | None:
     """Return the payload that some observed runs carry and others do not; None where none shows.
 
-    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m. `tell`
-    is told how far that has come, where it takes long.
+    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m. It explains enough
+    of joints by which it was not told which runs carry it, without the runs' group: more than under random signs of the
+    groups, or of each joint in each where groups are so few that all of one sign would still be chance. `tell` is told
+    how far that has come, where it takes long.
     """
     parts = _Parts.of(robot, system, noise, limits.fewest_runs, tell)
     if parts is None:
@@ -53,14 +40,12 @@ def untold_payload(
         return None
     of_joints = parts.judged(tell)
     gain = of_joints.sum(axis=1)
-    mean, t = float(gain.mean()), float(gain.mean() / max(gain.std(ddof=1) / np.sqrt(len(gain)), 1e-12))
     told = gain if 2.0 ** -len(gain) <= limits.alpha else of_joints.ravel()
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, len(told)))
     p = float((1 + np.sum(signs @ told >= told.sum())) / (1 + _FLIPS))
-    if mean < limits.least_gain or p > limits.alpha:
+    if gain.mean() < limits.least_gain or p > limits.alpha:
         return None
-    runs = tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries)
-    return UntoldPayload(Payload(runs=runs), mean, t, p)
+    return Payload(runs=tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries))
 
 
 def beside(robot: Robot, system: System, noise: np.ndarray, payload: Payload) -> tuple[np.ndarray, np.ndarray] | None:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
+from irtwin.effects.load import ExternalContact
 from irtwin.effects.local import LocalEffect
 from irtwin.effects.stack import Stack
 from irtwin.effects.transmission import TorqueRipple
@@ -15,7 +16,6 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
-from irtwin.gap.regression.transient import Transient, is_transient
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
 from irtwin.gap.screening.payloads import untold_payload
@@ -42,16 +42,12 @@ class Screened:
         """Contact and payload."""
         return self.waited()
 
-    @property
-    def contact(self) -> Transient | None:
-        """The contact."""
-        return self.both[0]
-
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects to try with those found: screened ones in their place only, payloads in some runs too."""
-        placed = {self.contact.effect.id} if self.contact else set()
-        found = [one for one in effects if not isinstance(one, LocalEffect | TorqueRipple) and one.id not in placed]
-        return [*found, *(one.effect for one in self.both if one), *self.ripples, *self.local]
+        contact, payload = self.both
+        placed = (LocalEffect, TorqueRipple, *([ExternalContact] if contact else []))
+        found = [one for one in effects if not isinstance(one, placed)]
+        return [*found, *(one for one in (contact, payload) if one), *self.ripples, *self.local]
 
 
 def screen(case: Case, stack: Stack, system: System, seed: int, tell: Tell | None = None) -> Screened:
@@ -83,5 +79,5 @@ def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, f
     if not effects:
         return None
     runs = sorted({run for effect in effects for run in effect.runs or ()})
-    window = next(((e.shape["start"], e.shape["stop"]) for e in effects if is_transient(e)), None)
+    window = next(((e.shape["start"], e.shape["stop"]) for e in effects if isinstance(e, ExternalContact)), None)
     return tuple(runs), window

@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from irtwin.effects.load import ExternalContact, Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.normal_equations import System, twin_values
-from irtwin.gap.regression.transient import Transient
 from irtwin.gap.screening.contact import contact
-from irtwin.gap.screening.payloads import UntoldPayload, beside, untold_payload
+from irtwin.gap.screening.payloads import beside, untold_payload
 from irtwin.gap.screening.remainder import Remainder, remainders
 from irtwin.identification.progress import Tell
 
 _TURNS = 4  # the second mostly says what the first one did
 
-Both = tuple[Transient | None, UntoldPayload | None]
+Both = tuple[ExternalContact | None, Payload | None]
 
 
 def each_beside_the_other(
@@ -42,34 +42,33 @@ def each_beside_the_other(
         if left is None:
             break
         before, touch = touch, contact(case.robot, left, _rms(left, noise), case.thresholds.contact, tell)
-        if (before and before.effect) == (touch and touch.effect):
+        if before == touch:
             break
     return touch, payload
 
 
-def _apart_from(system: System, touch: Transient | None) -> System:
+def _apart_from(system: System, touch: ExternalContact | None) -> System:
     """Return the equations without the blocks of time in which a contact acts."""
     if touch is None:
         return system
-    effect = touch.effect
     kept = [
         k
         for k, block in enumerate(system.blocks)
-        if not (effect.runs and block.run in effect.runs and block.start <= effect.stop and block.stop >= effect.start)
+        if not (touch.runs and block.run in touch.runs and block.start <= touch.stop and block.stop >= touch.start)
     ]
     blocks = tuple(system.blocks[k] for k in kept)
     return replace(system, blocks=blocks, group=system.group[kept], observed=system.observed[kept])
 
 
 def _beside(
-    case: Case, stack: Stack, system: System, noise: np.ndarray, payload: UntoldPayload, tell: Tell | None
+    case: Case, stack: Stack, system: System, noise: np.ndarray, payload: Payload, tell: Tell | None
 ) -> list[Remainder] | None:
     """Return what the twin and the payload leave of the runs."""
-    both = beside(case.robot, system, noise, payload.effect)
+    both = beside(case.robot, system, noise, payload)
     if both is None:
         return None
     values, load = both
-    return remainders(case, stack, twin_values(system, values), (payload.effect, load), tell)
+    return remainders(case, stack, twin_values(system, values), (payload, load), tell)
 
 
 def _rms(left: list[Remainder], noise: np.ndarray) -> np.ndarray:
