@@ -11,7 +11,7 @@ from irtwin.signals.motion import Motion
 
 Tell = Callable[[str], None]
 
-_EVERY = 5.0  # s between two lines: short work says none
+_EVERY = 2.5  # s between two lines at least: with a step that long there is one each 5 s, and short work says none
 
 
 class Told:
