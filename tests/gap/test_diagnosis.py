@@ -132,7 +132,7 @@ def test_what_has_no_cause_is_told_beyond_what_reference_runs_leave_over_one_ano
     diagnosis = diagnose(data_set(without_power, effects=WITH_LOSS))
     assert diagnosis.causes == ()
     (torque,) = diagnosis.channels
-    assert max((torque.fitted[1] / torque.floor) ** 2 - 1) < DEFAULT.verdict.excess
+    assert max((torque.fitted[1] / torque.floor) ** 2 - 1) < DEFAULT.criterion.excess
     assert diagnosis.verdict == ("unexplained" if size else "no_gap")
     assert {place.joint for place in diagnosis.document.locations} == ({"joint_2"} if size else set())
 

@@ -195,7 +195,7 @@ class Criterion:
     )
     excess: float = _threshold(
         3.5,
-        "what is left beyond is no noise, whatever the floor missed",
+        "what is left beyond is no noise, whatever the floor missed, and a gap without a cause",
         _FLOOR,
         "decisions/gap-unexplained-verdict.md",
     )
@@ -242,9 +242,6 @@ class Detectability:
 class Verdict:
     """When the diagnosis abstains."""
 
-    excess: float = _threshold(
-        3.5, "what is left beyond is a gap without a cause", _FLOOR, "decisions/gap-unexplained-verdict.md"
-    )
     closed: float = _threshold(
         0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-unexplained-verdict.md"
     )

@@ -63,7 +63,7 @@ def find_possible(
     else:
         finding, floor = search(without | {effect for effect, _ in refused})
     more = (finding.attribution.noise / np.maximum(least, finding.system.quietest)) ** 2 - 1
-    return finding, floor, Refusals(tuple(refused.values()), bool(more.max() > case.thresholds.verdict.excess))
+    return finding, floor, Refusals(tuple(refused.values()), bool(more.max() > case.thresholds.criterion.excess))
 
 
 def _of(robot: Robot, finding: Finding, cause: Cause, stated: Stated) -> list[Refused]:
