@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.synthetic import arm, swing
 
-from irtwin.effects.friction import ChangedFrictionWithTemperature, TemperatureDependentFriction
+from irtwin.effects.friction import ChangedFrictionWithTemperature, StribeckFriction, TemperatureDependentFriction
 
 ROBOT = arm(2)
 MOTION = swing(ROBOT, 1, seconds=5.0)
@@ -38,3 +38,13 @@ def test_in_a_twin_viscous_friction_holds_at_t0() -> None:
     (change,) = TemperatureDependentFriction(joints=("joint_2",)).changes()
     assert change == CHANGE
     assert change.standing() == TemperatureDependentFriction(joints=("joint_2",))
+
+
+def test_no_stribeck_friction_is_tried_at_speeds_over_which_a_joints_dry_friction_turns() -> None:
+    sharp, soft = ROBOT.joints
+    robot = replace(ROBOT, joints=(sharp, replace(soft, friction_width=0.015, friction_exponent=2.0)))
+    tried = {
+        (form.vs, form.joints) for form in StribeckFriction().candidates(robot) if isinstance(form, StribeckFriction)
+    }
+    slow, fast = ("joint_1",), ("joint_1", "joint_2")
+    assert tried == {(0.01, slow), (0.025, slow), (0.05, fast), (0.1, fast), (0.2, fast)}

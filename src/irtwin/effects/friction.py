@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -26,6 +26,8 @@ from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
 
 _SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
+_TURNED = 2.0  # widths, where most of a turn is over
+_OVER = 3.0  # widths, where a turn is over
 _MOST_LOST = 0.6  # of a load, in gears: those that lose half when driven back hold by themselves
 
 
@@ -52,6 +54,16 @@ def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:
     return found
 
 
+def _width(joint: Joint) -> float:
+    return joint.friction_width or 0.0
+
+
+def turning(robot: Robot, dq: np.ndarray) -> np.ndarray:
+    """Return (N, n), by speeds, where a joint is so slow that its dry friction turns: its law there is its own."""
+    widths = np.array([joint.friction_width or _SHARP for joint in robot.joints])
+    return np.asarray(np.abs(dq) < _TURNED * widths)
+
+
 @dataclass(frozen=True)
 class CoulombFriction(JointEffect):
     """Fc s, s the sign of dq by `direction`.
@@ -75,33 +87,6 @@ class CoulombFriction(JointEffect):
         """Return where a joint stands still, as filtered or as logged: it may stick for a moment as it turns back."""
         slow = np.abs(motion.dq) < STANDSTILL
         return np.asarray(slow if motion.standing is None else slow | motion.standing)
-
-
-@dataclass(frozen=True)
-class FrictionTurn(JointEffect):
-    """sum over k of a_k (s_k - s): dry friction that turns over k times the speed that `direction` says.
-
-    A nuisance of a diagnosis: it is of no catalogue, and no twin keeps it.
-    """
-
-    id: ClassVar[str] = "friction_turn"
-    family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
-    wider: ClassVar[tuple[float, ...]] = (0.5, 2.0, 4.0)
-
-    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return a_k."""
-        return tuple(Term(f"a_{k:g}", force_unit(joint), joint.name, spread=15.0) for k in self.wider)
-
-    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return s_k - s."""
-        plain = direction(robot, motion.dq)
-        turns = [(joint.friction_width or _SHARP, joint.friction_exponent or 2.0) for joint in robot.joints]
-        by_joint = list(zip(motion.dq.T, turns, strict=True))
-        return tuple(
-            np.column_stack([turn(dq, k * width, exponent) for dq, (width, exponent) in by_joint]) - plain
-            for k in self.wider
-        )
 
 
 @dataclass(frozen=True)
@@ -135,10 +120,14 @@ class StribeckFriction(JointEffect):
     d: float = 1.0
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return a grid of speeds and two forms."""
-        return tuple(
-            form for flat in self.variants(d=(1.0, 2.0)) for form in flat.variants(vs=(0.01, 0.025, 0.05, 0.1, 0.2))
-        )
+        """Return a grid of speeds and two forms, where dry friction has turned by then: what is slower is that turn."""
+        found: list[Effect] = []
+        for vs in (0.01, 0.025, 0.05, 0.1, 0.2):
+            joints = None if robot is None else [j.name for j in self.acting(robot) if vs >= _OVER * _width(j)]
+            forms = [replace(self, vs=vs, d=d) for d in (1.0, 2.0)]
+            if joints != []:
+                found.extend(forms if joints is None else [form.on(*joints) for form in forms])
+        return tuple(found)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fs."""

@@ -176,14 +176,14 @@ def diagnose(
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
     excitation = begun(lambda: excitation_of(case.robot, tell), worth=case.long)  # the next experiment's
-    stack = case.stack.with_effects([*case.effects, *case.run_offsets, *case.friction_turns])
+    stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = _plain(case, stack, tell)
     differ = disturbances(case)
     case, taken = removed(case, stack, plain, differ)
     if taken:
         case = case.with_friction_near_zero(tell)
-        stack = case.stack.with_effects([*case.effects, *case.run_offsets, *case.friction_turns])
+        stack = case.stack.with_effects(stack.effects)
         plain = _plain(case, stack, tell)
     tell.step("  the noise floor")
     floor = noise_floor(case.runs, case.motions, thresholds.repeats)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import lapack
@@ -27,13 +27,15 @@ class Rows:
 
     `columns` may also be, for each equation, the arrays (N, some) that side by side are the columns which it has by the
     `pattern`: they are joined when few samples are left. A function that returns them is called beside the work on the
-    next part. Where `undecided` (N, g) the equation does not hold, and is left out.
+    next part. Where `undecided` (N, g) the equation does not hold, and is left out. Rows where it is `slow` (N, g) stay
+    apart from the others.
     """
 
     columns: np.ndarray | Sequence[Given]
     known: np.ndarray
     measured: np.ndarray
     undecided: np.ndarray | None = None
+    slow: np.ndarray | None = None
 
     def own(self, equation: int, used: np.ndarray) -> Sequence[np.ndarray]:
         """Return the columns of an equation, `used` (K,) by the pattern, as arrays (N, some) to stand side by side."""
@@ -52,7 +54,16 @@ _ROUNDING = 1e-15  # of a column's square: less of what others leave of it is ro
 _SHARED = 5e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
 _BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
+_SLOW = 0.02  # of the kernel: a row with more of it is slow, as one reversal outweighs many quiet rows
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
+
+
+@dataclass(frozen=True)
+class Slow:
+    """Slow rows of a block's equations: how many there were, (g,), and from which row of the factor on, (g,)."""
+
+    begin: np.ndarray
+    rows: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -60,7 +71,8 @@ class Block:
     """A stretch of a run, reduced.
 
     `factors[e]` is a factor, (r, k_e + 1) with r <= k_e + 1, of equation e's rows of [columns | measurement]: with the
-    same products of columns; `rows` (g,) is how many each equation had.
+    same products of columns, or two on top of each other; `rows` (g,) is how many each equation had. `slow`: which of
+    both are of slow rows; None where none were told apart.
     """
 
     run: str
@@ -68,6 +80,22 @@ class Block:
     stop: float  # s
     rows: np.ndarray
     factors: tuple[np.ndarray, ...]
+    slow: Slow | None = None
+
+    def of(self, equations: slice) -> Block:
+        """Return some equations of the block."""
+        slow = None if self.slow is None else Slow(self.slow.begin[equations], self.slow.rows[equations])
+        return replace(self, rows=self.rows[equations], factors=self.factors[equations], slow=slow)
+
+    @property
+    def apart(self) -> Block:
+        """The block with 2 g equations: those of fast rows, then those of slow ones."""
+        assert self.slow is not None
+        cut = [np.split(factor, [begin]) for factor, begin in zip(self.factors, self.slow.begin, strict=True)]
+        factors = (*(fast for fast, _ in cut), *(slow for _, slow in cut))
+        return replace(
+            self, rows=np.concatenate([self.rows - self.slow.rows, self.slow.rows]), factors=factors, slow=None
+        )
 
 
 def accumulate(
@@ -200,7 +228,9 @@ class _Growing:
         self._taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
         self._step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
         self._reduced = [kind(int(row.sum()) + 1) for row in pattern]
+        self._slow = [kind(int(row.sum()) + 1) for row in pattern]
         self.rows = np.zeros(len(pattern), dtype=int)
+        self._slow_rows = np.zeros(len(pattern), dtype=int)
 
     def samples(self, equations: Equations) -> Iterator[Rows]:
         """Yield the equations part by part, each with half a kernel more at either end."""
@@ -213,27 +243,35 @@ class _Growing:
 
     def add(self, sample: Rows) -> None:
         """Take in a part, filtered and decimated."""
-        parts = self._thinned(sample)
+        parts, slow = self._thinned(sample)
         self.rows += [len(part) for part in parts]
-        for reduced, part in zip(self._reduced, parts, strict=True):
-            reduced.add(part)
+        self._slow_rows += [int(inside.sum()) for inside in slow]
+        for reduced, apart, part, inside in zip(self._reduced, self._slow, parts, slow, strict=True):
+            reduced.add(part[~inside])
+            if inside.any():
+                apart.add(part[inside])
 
-    def _thinned(self, sample: Rows) -> list[np.ndarray]:
-        """Return each equation's rows of [columns | measurement], filtered and decimated."""
+    def _thinned(self, sample: Rows) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return each equation's rows of [columns | measurement], filtered and decimated, and which are slow."""
         taps, step = self._taps, self._step
         half = len(taps) // 2
         measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
-        keep = np.ones(measured.shape, dtype=bool)
+        keep, slow = np.ones(measured.shape, dtype=bool), np.zeros(measured.shape, dtype=bool)
         if sample.undecided is not None:
             keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
+        if sample.slow is not None:
+            slow = decimate(sample.slow.astype(float), np.abs(taps), step) >= _SLOW
         rows = []
         for equation, used in enumerate(self._pattern):
             columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
             rows.append(np.column_stack([*columns, measured[:, equation]])[keep[:, equation]])
-        return rows
+        return rows, [slow[kept, k] for k, kept in enumerate(keep.T)]
 
     def block(self) -> Block:
         """Return what the block has become."""
         time = self._motion.time
         ends = float(time[self._start]), float(time[self._stop - 1])
-        return Block(self._motion.run, *ends, self.rows, tuple(reduced.factor() for reduced in self._reduced))
+        both = [(fast.factor(), slow.factor()) for fast, slow in zip(self._reduced, self._slow, strict=True)]
+        factors = tuple(np.concatenate(parts) if len(parts[1]) else parts[0] for parts in both)
+        slow = Slow(np.array([len(fast) for fast, _ in both]), self._slow_rows)
+        return Block(self._motion.run, *ends, self.rows, factors, slow)

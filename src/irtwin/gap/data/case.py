@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
-from irtwin.effects.friction import FrictionTurn
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
@@ -130,15 +129,6 @@ class Case:
         """
         runs = [motion.run for motion in self.with_torque]
         return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
-
-    @property
-    def friction_turns(self) -> list[Effect]:
-        """How else dry friction may turn at zero speed: in all runs, and in observed ones otherwise than in the others.
-
-        A joint's turn is no number that stays: it differs with pose, load and what friction there is.
-        """
-        changed = [FrictionTurn(runs=tuple(sorted(self.observed)))] if self.others else []
-        return [FrictionTurn(), *changed]
 
     def with_friction_near_zero(self, tell: Tell | None = None) -> Case:
         """Return the case with the turn of each joint's dry friction.

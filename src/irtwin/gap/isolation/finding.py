@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -180,7 +180,14 @@ def attributed(
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
     candidates = _hypotheses(system, _inside(case, system), without)
-    return attribute(system, candidates, case.thresholds.criterion, floor, tell)
+    apart = system.by_speed
+    level = floor if floor is None or apart is system else np.tile(floor, 2)
+    found = attribute(apart, candidates, case.thresholds.criterion, level, tell)
+    if apart is system:
+        return found
+    chosen = [k for cause in found.causes for k in cause.columns]
+    noise = system.residual_rms(chosen, noise_before(system))
+    return replace(found, noise=system.residual_rms(chosen, noise))
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:

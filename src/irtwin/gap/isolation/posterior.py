@@ -69,9 +69,9 @@ class Posterior:
         candidates: Sequence[Hypothesis],
         prior: Prior,
         limits: Criterion,
-        unexplained: np.ndarray,
+        misfit: np.ndarray,
     ) -> Posterior:
-        """Try candidates beside what was found, everything refitted; `unexplained` (g,) is as of `_Search`."""
+        """Try candidates beside what was found, everything refitted; `misfit` (g,) is as of `_Search`."""
         variants = [variant for one in candidates for variant in one.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(one.variants) for one in candidates])
         chosen = [k for _, variant in found for k in variant.columns]
@@ -81,9 +81,8 @@ class Posterior:
             for one in candidates
         ]
         seen = evidence(system, moments, chosen, variants)
-        left = [float(np.mean(unexplained[system.equations(variant.columns)])) for variant in variants]
-        misfit = np.hypot(limits.misfit, limits.misfit_unexplained * np.sqrt(left))
-        return cls(tuple(candidates), owner, np.array(log_prior), seen, misfit, limits)
+        own = np.sqrt(_where_it_explains(system, misfit, seen))
+        return cls(tuple(candidates), owner, np.array(log_prior), seen, own, limits)
 
     @cached_property
     def variance(self) -> np.ndarray:
@@ -164,6 +163,23 @@ class Posterior:
     @cached_property
     def _shapes(self) -> list[np.ndarray]:
         return [np.flatnonzero(self.owner == place) for place in range(len(self.hypotheses))]
+
+
+def _where_it_explains(system: System, misfit: np.ndarray, seen: Evidence) -> np.ndarray:
+    """Return (V,) the misfit, squared, of the rows in which a variant explains something; `misfit` (g,) of equations.
+
+    What it explains in one half of the equations counts by the misfit there.
+    """
+    explained, own = np.zeros((2, len(seen.variants), len(system.halves)))
+    acts = np.zeros((len(seen.variants), len(misfit)), dtype=bool)
+    for place, variant in enumerate(seen.variants):
+        acts[place] = system.equations(variant.columns)
+    for k, half in enumerate(system.halves):
+        inside = [each == half for each, _ in system.parts]
+        explained[:, k] = (seen.said + 2 * seen.missed)[:, inside].sum(axis=1).clip(min=0.0)
+        own[:, k] = (acts[:, half] * misfit[half]).sum(axis=1) / np.maximum(acts[:, half].sum(axis=1), 1)
+    explained[explained.sum(axis=1) <= 0] = 1.0
+    return np.asarray(explained.sum(axis=1) / (explained / own).sum(axis=1))
 
 
 def overlap(one: Hypothesis, other: Hypothesis) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -73,10 +73,18 @@ class _Search:
     limits: Criterion
     floor: np.ndarray | None
     tell: Tell
+    tried: dict[tuple[bytes, bytes], Posterior] = field(default_factory=dict)
 
     def beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
-        """Try what may stand beside a structure; equations are weighed by `noise` (g,)."""
-        taken = {k for _, variant in found for k in variant.columns}
+        """Try what may stand beside a structure, once; equations are weighed by `noise` (g,)."""
+        asked = np.sort(_columns(found)).tobytes(), noise.tobytes()
+        if asked not in self.tried:
+            self.tried[asked] = self._beside(found, noise)
+        return self.tried[asked]
+
+    def _beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
+        chosen = _columns(found)
+        taken = set(chosen)
         left = [
             one
             for one in self.candidates
@@ -84,14 +92,21 @@ class _Search:
             and not any(_same_place(one, each) for each, _ in found)
         ]
         self.tell(f"  {len(left)} hypotheses, beside {len(found)} that are found")
-        chosen = [k for _, variant in found for k in variant.columns]
         moments = self.system.without_noise(self.system.moments(noise), noise, chosen)
-        return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.unexplained(noise))
+        return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.misfit(noise))
 
-    def unexplained(self, noise: np.ndarray) -> np.ndarray:
-        """Return (g,) which part of the mean square that is left, `noise`, no floor explains; all where unknown."""
-        floor = np.zeros_like(noise) if self.floor is None else self.floor
-        return np.asarray(1 - np.minimum((1 + self.limits.excess) * (floor / noise) ** 2, 1.0))
+    def misfit(self, noise: np.ndarray) -> np.ndarray:
+        """Return (g,) the misfit along any effect, squared, as a part of the mean square that is left, `noise`.
+
+        It is larger by what no floor explains, and where dry friction turns by all that is left beyond other rows.
+        """
+        limits, floor = self.limits, np.zeros_like(noise) if self.floor is None else self.floor
+        unexplained = 1 - np.minimum((1 + limits.excess) * (floor / noise) ** 2, 1.0)
+        found = limits.misfit**2 + limits.misfit_unexplained**2 * unexplained
+        fast = noise[self.system.halves[0]]
+        for half in self.system.halves[1:]:
+            found[half] += 1 - np.minimum(fast / noise[half], 1.0) ** 2
+        return np.asarray(found)
 
     def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Add what explains most while that is not hopeless; return it and what it leaves, (g,).
@@ -144,6 +159,8 @@ class _Search:
                 rest = [each for each in found if each is not one]
                 new = self.likely(self.beside(rest, noise), rest, noise)
                 found = rest if new is None else [*rest, new]
+            if sorted(_columns(found)) == sorted(_columns(before)):
+                break
             noise = self.left(found, noise)
             if {_place(one) for one, _ in found} == {_place(one) for one, _ in before}:
                 break
@@ -151,7 +168,7 @@ class _Search:
 
     def left(self, found: Sequence[Found], noise: np.ndarray) -> np.ndarray:
         """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations."""
-        return self.system.residual_rms([k for _, variant in found for k in variant.columns], noise)
+        return self.system.residual_rms(_columns(found), noise)
 
     def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[Cause, ...]:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""
@@ -210,6 +227,10 @@ def _joined(parts: Sequence[Cause]) -> Cause:
 
 def _index(posterior: Posterior, hypothesis: Hypothesis) -> int:
     return next(k for k, one in enumerate(posterior.hypotheses) if _place(one) == _place(hypothesis))
+
+
+def _columns(found: Sequence[Found]) -> list[int]:
+    return [k for _, variant in found for k in variant.columns]
 
 
 def _place(one: Hypothesis) -> tuple[str, str, str | None]:

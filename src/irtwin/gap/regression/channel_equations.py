@@ -9,6 +9,7 @@ import numpy as np
 
 from irtwin.effects.compliance import load_inertia, load_torque
 from irtwin.effects.effect import Effect, Predicted
+from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate_pattern
@@ -50,7 +51,8 @@ def torque_system(
             assert motion.torque is not None
             own = stack.columns_by_joint(motion)
             columns = list(zip(own, candidates.part(motion), strict=True))
-            return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion))
+            slow = turning(robot, motion.dq) if effects else None
+            return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion), slow)
 
         return of_part
 

@@ -20,14 +20,15 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projected, asked_columns, fitted_columns, projected, projected_in
 
 _SPEAKS = 1e-3  # of what a variant says in its strongest group: a group with less says nothing of it
+_NOTHING = 1e-12  # squares, in units of the noise: what adds less acts nowhere
 _FEW = 4.0  # groups' worth of weight that the spread of the other variants has beside a variant's own
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """V variants beside a fit, G groups; squares in units of the noise.
+    """V variants beside a fit, G parts of the equations (`System.parts`); squares in units of the noise.
 
-    explained (V,); said, missed (V, G): what each adds to a group, and the score that this leaves there; values (V, k
+    explained (V,); said, missed (V, G): what each adds to a part, and the score that this leaves there; values (V, k
     each), in units of the prior; information (V, k, k each); rows (G,).
     """
 
@@ -44,7 +45,8 @@ class Evidence:
         """(V,) how many rows a variant acts in, effectively: an effect of one run has that run's."""
         total = self.said.sum(axis=1)
         squares = (self.said**2 / self.rows).sum(axis=1)
-        return np.asarray(np.where(total > 0, total**2 / np.maximum(squares, 1e-300), self.rows.sum()))
+        shown = total > _NOTHING
+        return np.asarray(np.where(shown, total**2 / np.where(shown, squares, 1.0), self.rows.sum()))
 
     @cached_property
     def gain(self) -> np.ndarray:
@@ -92,7 +94,7 @@ def evidence(
             solved = np.array([values[place] for place in batch.place])
             said[batch.place, group] = _squares(products, solved)
             missed[batch.place, group] = (solved * right).sum(axis=1) - said[batch.place, group]
-    rows = np.maximum(system.rows.max(axis=1), 1.0)
+    rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in system.parts])
     shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
     return Evidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from irtwin.effects.effect import Effect, Predicted
+from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate_pattern
 from irtwin.gap.regression.channel_equations import Torque, enough
@@ -87,14 +88,15 @@ def joint_equations(
                 return [line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
 
             rows: list[Given] = [*zip(own, parts, strict=True), of_power]
-            return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
+            found = rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
+            return replace(found, slow=np.pad(turning(robot, motion.dq), ((0, 0), (0, 1))))
 
         return of_part
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=True)
     noise = shaken_products(shaken, equations(), equations(), pattern)
-    alone = [replace(one, rows=one.rows[:-1], factors=one.factors[:-1]) for one in blocks if one.rows[:-1].any()]
+    alone = [one.of(slice(-1)) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(
         terms,

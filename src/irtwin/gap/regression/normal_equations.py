@@ -7,7 +7,7 @@ to triangular factors while the samples are read; whatever is asked later works 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -57,7 +57,8 @@ class System:
     `effects.prior` gives it; None: each by itself, as its spread says. With any that does not, each candidate column
     stands there twice: as it is, and (from index K + M) zero in all but observed runs. `beside_power`: the last
     equation is power's, beside those of torque. `shaken`: the products a row, (k + 1, k + 1) of each equation's columns
-    and measurement, that noise of positions makes; None: of none.
+    and measurement, that noise of positions makes; None: of none. `apart`: the second half of the equations are the
+    first half's rows in which dry friction turns.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -69,6 +70,29 @@ class System:
     beside_power: bool = False
     prior_rows: np.ndarray | None = None
     shaken: tuple[np.ndarray, ...] | None = None
+    apart: bool = False
+
+    @cached_property
+    def by_speed(self) -> System:
+        """The system with 2 g equations: rows in which a joint's dry friction turns stand apart, in the second half.
+
+        What nobody knows of that law is noise of theirs alone.
+        """
+        if any(block.slow is None for block in self.blocks):
+            return self
+        return replace(
+            self,
+            pattern=np.concatenate([self.pattern, self.pattern]),
+            blocks=tuple(block.apart for block in self.blocks),
+            shaken=None if self.shaken is None else self.shaken * 2,
+            apart=True,
+        )
+
+    @property
+    def halves(self) -> tuple[slice, ...]:
+        """The equations of rows alike: all, or those of fast rows and those of slow ones."""
+        count = len(self.pattern)
+        return (slice(count // 2), slice(count // 2, count)) if self.apart else (slice(count),)
 
     @property
     def base(self) -> int:
@@ -93,8 +117,8 @@ class System:
         """Return (g,) whether an equation of their own signal has any of some candidate columns of one effect."""
         own = [k - len(self.columns) if k >= self.changed else k for k in columns]
         found = np.asarray(self.pattern[:, own].any(axis=1))
-        if self.beside_power and found[:-1].any():
-            found[-1] = False
+        if self.beside_power and found[: self.halves[0].stop - 1].any():
+            found[[half.stop - 1 for half in self.halves]] = False
         return found
 
     @property
@@ -243,15 +267,20 @@ class System:
             )
 
     def moments(self, noise: np.ndarray) -> list[Moments]:
-        """Return each group's products of columns, (D + 1, D + 1), equations weighted by their `noise` (g,).
+        """Return each part's products of columns, (D + 1, D + 1), equations weighted by their `noise` (g,).
 
         Raises InputError where they would take too much memory.
         """
         weights = np.maximum(noise, self.quietest) ** -2.0
-        return [GroupMoments(products, weights) for products in self._products]
+        return [GroupMoments(self._products[group][half], weights[half]) for half, group in self.parts]
+
+    @property
+    def parts(self) -> list[tuple[slice, int]]:
+        """The halves of the groups, (P,): of which equations, and of which group."""
+        return [(half, group) for half in self.halves for group in range(self.groups)]
 
     def without_noise(self, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]) -> list[Moments]:
-        """Return each group's `moments`, weighted by `noise` (g,), less what noise of positions seems to explain.
+        """Return each part's `moments`, weighted by `noise` (g,), less what noise of positions seems to explain.
 
         A fit of the twin's terms and the chosen columns leaves the noise of these, times their coefficients; the
         products of all columns with that are taken off those with the measurement.
@@ -260,16 +289,18 @@ class System:
             return list(moments)
         left = np.append(-self.solution(chosen, summed(moments)), 1.0)
         weights = np.maximum(noise, self.quietest) ** -2.0
-        a_row = {
-            observed: [
-                weight * self._among_all(k, observed, products @ self._held(k, observed, left))
-                for k, (weight, products) in enumerate(zip(weights, self.shaken, strict=True))
-            ]
+        a_row = [
+            np.array(
+                [
+                    weight * self._among_all(k, observed, products @ self._held(k, observed, left))
+                    for k, (weight, products) in enumerate(zip(weights, self.shaken, strict=True))
+                ]
+            )
             for observed in (False, True)
-        }
+        ]
         return [
-            Shifted(own, rows @ np.array(a_row[bool(observed)]))
-            for own, rows, observed in zip(moments, self.rows, self.group_observed, strict=True)
+            Shifted(own, self.rows[group, half] @ a_row[int(self.group_observed[group])][half])
+            for own, (half, group) in zip(moments, self.parts, strict=True)
         ]
 
     def _weighted_among(
@@ -292,6 +323,9 @@ class System:
         """
         found = self.rms(chosen, noise, range(self.groups), range(self.groups))
         found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
+        if self.apart:  # few rows are fitted easily: no law is known better where friction turns
+            fast, slow = np.split(found, 2)
+            found = np.concatenate([fast, np.maximum(fast, slow)])
         return np.asarray(np.maximum(found, self.quietest))
 
     @cached_property

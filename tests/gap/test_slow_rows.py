@@ -1,0 +1,92 @@
+"""Rows in which dry friction turns: how it does so may differ from side to side, is no change, and hides none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.data_sets import write
+from tests.synthetic import arm, as_run, measure, swing, truth
+
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Predicted
+from irtwin.effects.friction import turning
+from irtwin.effects.stack import Stack
+from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.regression.channel_equations import torque_system
+from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.normal_equations import System
+from irtwin.signals.filter import low_pass
+from irtwin.signals.log import Run, read_data_set
+
+ROBOT = arm(2)
+WIDTH = 0.01  # rad/s
+
+
+def run(seed: int, role: str, width: float, stronger: float) -> Run:
+    """A run whose dry friction turns over some speed, `stronger` times the truth's at the first joint."""
+    motion = measure(ROBOT, swing(ROBOT, seed), noise=0.05, seed=seed)
+    assert motion.torque is not None
+    dry = truth(ROBOT)["Fc"]
+    now = dry * [stronger, 1.0]
+    torque = motion.torque + now * np.tanh(motion.dq / width) - dry * np.sign(motion.dq)
+    return replace(as_run(replace(motion, torque=torque, current=None, power=None)), name=f"{role}_{seed}", role=role)
+
+
+def causes(folder: Path, width: float, stronger: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """What is told of observed runs whose friction turns over another speed: effects of 0.5 and more, their joints."""
+    runs = [run(seed, "reference", WIDTH, 1.0) for seed in (1, 2, 3)]
+    runs += [run(seed, "observed", width, stronger) for seed in (4, 5, 6)]
+    found = diagnose(read_data_set(write(folder / "set", ROBOT, runs))).document
+    return {cause.effect: tuple(cause.joints) for cause in found.causes if cause.confidence >= 0.5}
+
+
+@pytest.mark.parametrize("width", [0.004, 0.025])
+def test_a_turn_over_another_speed_is_no_change_of_friction(tmp_path: Path, width: float) -> None:
+    assert causes(tmp_path, width) == {}
+
+
+def test_a_change_of_dry_friction_is_told_beside_a_turn_over_another_speed(tmp_path: Path) -> None:
+    assert causes(tmp_path, 0.025, stronger=1.3) == {"coulomb_friction": ("joint_1",)}
+
+
+def reduced(noise: float) -> System:
+    """The equations of torque with viscous friction as the candidate; `noise` N m more where dry friction turns."""
+    motions = []
+    for seed in range(1, 6):
+        motion = replace(measure(ROBOT, swing(ROBOT, seed), noise=0.05, seed=seed), cutoff=15.0)
+        more = noise * np.random.default_rng(seed).standard_normal(motion.dq.shape)
+        logged = low_pass(motion.torque + more * turning(ROBOT, motion.dq), motion.rate, 15.0)
+        motions.append(replace(motion, torque=logged))
+    grouping = Grouping({one.run: one.run for one in motions}, frozenset(one.run for one in motions), 4)
+    stack = Stack(ROBOT, ("rigid_body", "rotor_inertia", "coulomb_friction", "torque_offset"))
+    return torque_system(stack, motions, grouping, [catalogue()["viscous_friction"]], lambda whole: Predicted(whole.q))
+
+
+def test_what_friction_does_where_it_turns_is_noise_of_these_rows_alone() -> None:
+    system = reduced(noise=3.0)
+    viscous = [system.base, system.base + 1]
+    together = system.residual_rms(viscous, system.noise_before)
+    apart = system.by_speed.residual_rms(viscous, system.by_speed.residual_rms(viscous, system.by_speed.noise_before))
+    assert np.all(together > 1.5 * apart[:2])
+    assert np.all(apart[2:] > 5 * apart[:2])
+
+
+def test_rows_that_stand_apart_say_together_what_they_said() -> None:
+    system = reduced(noise=0.0)
+    apart = system.by_speed
+    noise = np.array([0.05, 0.08])
+    whole, parts = summed(system.moments(noise)).whole, summed(apart.moments(np.tile(noise, 2))).whole
+    np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+    np.testing.assert_array_equal(apart.rows[:, :2] + apart.rows[:, 2:], system.rows)
+    assert np.all(apart.rows > 0)
+    assert len(apart.moments(np.tile(noise, 2))) == 2 * system.groups
+
+
+def test_rows_are_never_less_noisy_where_friction_turns() -> None:
+    apart = reduced(noise=0.0).by_speed
+    fast, slow = np.split(apart.noise_before, 2)
+    assert np.all(slow >= fast)
