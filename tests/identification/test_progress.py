@@ -47,6 +47,7 @@ def test_steps_are_told_where_they_take_long(monkeypatch):
 
 
 def test_all_that_is_paced_by_one_keeps_its_clock(monkeypatch):
+    monkeypatch.setattr(progress, "_EVERY", 5.0)
     now, lines = [0.0], []
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     told = Told(lines.append)

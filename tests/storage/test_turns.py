@@ -114,9 +114,9 @@ def test_what_those_who_run_the_server_can_mend_is_one_line(
     url = new_postgresql_database()
     place = engine.open_engine(url)
     with engine.writing(place) as session:
-        session.execute(text("CREATE ROLE guest LOGIN PASSWORD 'do-not-tell'"))
-    guest = url.replace("postgres@", "guest:do-not-tell@")
-    with pytest.raises(InputError, match=r"guest:\*\*\*@.*this user may not do that") as caught:
+        session.execute(text("CREATE ROLE visitor LOGIN PASSWORD 'do-not-tell'"))
+    guest = url.replace("postgres@", "visitor:do-not-tell@")
+    with pytest.raises(InputError, match=r"visitor:\*\*\*@.*this user may not do that") as caught:
         Workspace(tmp_path / "guest", guest)
     assert "do-not-tell" not in str(caught.value)
     robots = Base.metadata.tables["robot"].select()
