@@ -54,10 +54,6 @@ def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:
     return found
 
 
-def _width(joint: Joint) -> float:
-    return joint.friction_width or 0.0
-
-
 def turning(robot: Robot, dq: np.ndarray) -> np.ndarray:
     """Return (N, n), by speeds, where a joint is so slow that its dry friction turns: its law there is its own."""
     widths = np.array([joint.friction_width or _SHARP for joint in robot.joints])
@@ -121,13 +117,12 @@ class StribeckFriction(JointEffect):
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return a grid of speeds and two forms, where dry friction has turned by then: what is slower is that turn."""
-        found: list[Effect] = []
-        for vs in (0.01, 0.025, 0.05, 0.1, 0.2):
-            joints = None if robot is None else [j.name for j in self.acting(robot) if vs >= _OVER * _width(j)]
-            forms = [replace(self, vs=vs, d=d) for d in (1.0, 2.0)]
-            if joints != []:
-                found.extend(forms if joints is None else [form.on(*joints) for form in forms])
-        return tuple(found)
+        grid = [replace(self, vs=vs, d=d) for vs in (0.01, 0.025, 0.05, 0.1, 0.2) for d in (1.0, 2.0)]
+        if robot is None:
+            return tuple(grid)
+        widths = {joint.name: joint.friction_width or 0.0 for joint in self.acting(robot)}
+        turned = [[name for name, width in widths.items() if form.vs >= _OVER * width] for form in grid]
+        return tuple(form.on(*joints) for form, joints in zip(grid, turned, strict=True) if joints)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fs."""

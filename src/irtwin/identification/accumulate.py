@@ -231,6 +231,7 @@ class _Growing:
         self._slow = [kind(int(row.sum()) + 1) for row in pattern]
         self.rows = np.zeros(len(pattern), dtype=int)
         self._slow_rows = np.zeros(len(pattern), dtype=int)
+        self._told_apart = False
 
     def samples(self, equations: Equations) -> Iterator[Rows]:
         """Yield the equations part by part, each with half a kernel more at either end."""
@@ -244,6 +245,7 @@ class _Growing:
     def add(self, sample: Rows) -> None:
         """Take in a part, filtered and decimated."""
         parts, slow = self._thinned(sample)
+        self._told_apart = sample.slow is not None
         self.rows += [len(part) for part in parts]
         self._slow_rows += [int(inside.sum()) for inside in slow]
         for reduced, apart, part, inside in zip(self._reduced, self._slow, parts, slow, strict=True):
@@ -271,7 +273,9 @@ class _Growing:
         """Return what the block has become."""
         time = self._motion.time
         ends = float(time[self._start]), float(time[self._stop - 1])
-        both = [(fast.factor(), slow.factor()) for fast, slow in zip(self._reduced, self._slow, strict=True)]
-        factors = tuple(np.concatenate(parts) if len(parts[1]) else parts[0] for parts in both)
-        slow = Slow(np.array([len(fast) for fast, _ in both]), self._slow_rows)
-        return Block(self._motion.run, *ends, self.rows, factors, slow)
+        fast = tuple(reduced.factor() for reduced in self._reduced)
+        if not self._told_apart:
+            return Block(self._motion.run, *ends, self.rows, fast)
+        both = tuple(np.concatenate([own, slow.factor()]) for own, slow in zip(fast, self._slow, strict=True))
+        begin = np.array([len(own) for own in fast])
+        return Block(self._motion.run, *ends, self.rows, both, Slow(begin, self._slow_rows))

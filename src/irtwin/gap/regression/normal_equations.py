@@ -78,7 +78,7 @@ class System:
 
         What nobody knows of that law is noise of theirs alone.
         """
-        if any(block.slow is None for block in self.blocks):
+        if any(block.slow is None for block in self.blocks):  # as of power alone: no row is slow
             return self
         return replace(
             self,
