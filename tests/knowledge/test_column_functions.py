@@ -60,7 +60,7 @@ def ask(graph: KnowledgeGraph, call: str) -> object:
 
 
 def by_group(graph: KnowledgeGraph, query: str) -> dict[tuple[tuple[type, object], ...], Any]:
-    """Each row's last value by the others; 1 and 1.0 are two groups, as in SPARQL."""
+    """Each row's last value by the others; 1 and 1.0 are two groups, as in SPARQL, and so are "a" and "a"@en."""
     rows = [list(row.values()) for row in graph.query(query)]
     return {tuple((type(value), value) for value in row[:-1]): row[-1] for row in rows}
 
@@ -83,6 +83,16 @@ def by_group(graph: KnowledgeGraph, query: str) -> dict[tuple[tuple[type, object
     by=["'<urn:run>/<urn:robot>'"],
     function="count",
 )
+@example(
+    triples=[
+        ("_:4", "<urn:energy>", "0"),
+        ("_:4", "<urn:effect>", '"a"@en'),
+        ("<urn:1>", "<urn:effect>", '"a"'),
+        ("<urn:2>", "<urn:effect>", '"a"'),
+    ],
+    by=["<urn:effect>"],
+    function="count",
+)
 def test_columns_answer_what_the_triples_do(triples: list[tuple[str, ...]], by: list[str], function: str) -> None:
     graph = graph_of(" .\n".join(map(" ".join, triples)) + " .")
     ends = [f"?end{number}" for number in range(len(by))]
@@ -90,9 +100,10 @@ def test_columns_answer_what_the_triples_do(triples: list[tuple[str, ...]], by: 
     arguments = ", ".join(f"{path}, {end}" for path, end in zip(by, ends, strict=True))
     group = " ".join(ends)
     numbers = "?one <urn:energy> ?number FILTER(isNumeric(?number))"
-    plain = f"SELECT {group} ({PLAIN[function]}(?number) AS ?value) {{ {numbers} {patterns} }} GROUP BY {group}"
+    keys = f"{group} " + " ".join(f"(LANG({end}) AS {end}_language)" for end in ends)
+    plain = f"SELECT {keys} ({PLAIN[function]}(?number) AS ?value) {{ {numbers} {patterns} }} GROUP BY {group}"
     call = f"column:{function}(<urn:energy>, {arguments})"
-    called = f"SELECT {group} ({call} AS ?value) {{ SELECT DISTINCT {group} {{ {patterns} }} }}"
+    called = f"SELECT {keys} ({call} AS ?value) {{ SELECT DISTINCT {group} {{ {patterns} }} }}"
     expected, found = by_group(graph, plain), by_group(graph, called)
     assert {key for key, value in found.items() if value} <= expected.keys() <= found.keys()
     for key, value in expected.items():
