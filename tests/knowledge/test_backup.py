@@ -327,7 +327,8 @@ def test_a_link_out_of_the_workspace_is_not_backed_up(tmp_path: Path) -> None:
 
 def test_what_is_no_backup(tmp_path: Path) -> None:
     foreign = tmp_path / "foreign.zip"
-    for manifest in (None, "{}", '"x"', '{"format": "irtwin backup", "version": 1}', "[" * 100_000):
+    endless = '{"format": "irtwin backup", "version": 1, "files": {"a.txt": {"sha256": "", "size": Infinity}}}'
+    for manifest in (None, "{}", '"x"', '{"format": "irtwin backup", "version": 1}', "[" * 100_000, endless):
         with zipfile.ZipFile(foreign, "w") as target:
             target.writestr("a.txt", "a")
             if manifest is not None:

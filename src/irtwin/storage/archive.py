@@ -96,13 +96,13 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
             f"{archive}: made by another irtwin version ({said.get('software')}); restore it with that one"
         )
     try:
-        listed = {str(name): (str(one["sha256"]), int(one["size"])) for name, one in said["files"].items()}
-    except (AttributeError, KeyError, TypeError, ValueError):
+        listed = {str(name): (str(one["sha256"]), one["size"]) for name, one in said["files"].items()}
+    except (AttributeError, KeyError, TypeError):
         raise foreign from None
     agree = len(source.infolist()) == len(listed) + 1 and set(entries) == set(listed)
     if not agree or any(entries[name].file_size != size for name, (_, size) in listed.items()):
         raise InputError(f"{archive}: damaged: its files do not match its list; use another backup")
-    return listed
+    return listed  # so its sizes are whole numbers, equal to those of the ZIP
 
 
 def _copy(source: IO[bytes], sink: IO[bytes]) -> tuple[str, int]:
