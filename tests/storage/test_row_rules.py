@@ -97,6 +97,17 @@ def test_a_workspace_whose_rows_another_program_changed_is_not_opened(tmp_path: 
         Workspace(tmp_path)
 
 
+def test_a_row_that_refers_to_none_is_told(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
+        session.execute(insert(of(Robot)), [row_of(Robot)])
+        session.execute(insert(of(Joint)), [row_of(Joint)])
+    with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
+        database.execute("DELETE FROM robot")
+        database.commit()
+    with pytest.raises(InputError, match=r"a row of table joint .*: it refers to no row of robot; restore a backup"):
+        Workspace(tmp_path)
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -53,9 +53,14 @@ def check_rows(connection: Connection, where: str) -> None:
             for row in connection.execute(select(table).execution_options(yield_per=1000)).mappings():
                 check_row(table, dict(row))
         except ValueError as error:
-            raise InputError(
-                f"{where}: a row of table {table.name} was changed by another program: {error}; restore a backup"
-            ) from None
+            raise _changed(where, table.name, str(error)) from None
+    if connection.dialect.name == "sqlite":  # which another program may open without asking for foreign keys
+        for name, _, parent, _ in connection.exec_driver_sql("PRAGMA foreign_key_check"):
+            raise _changed(where, name, f"it refers to no row of {parent}")
+
+
+def _changed(where: str, table: str, how: str) -> InputError:
+    return InputError(f"{where}: a row of table {table} was changed by another program: {how}; restore a backup")
 
 
 @cache
