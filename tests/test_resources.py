@@ -78,6 +78,10 @@ def test_a_file_elsewhere_or_too_large_is_refused(tmp_path: Path, monkeypatch: p
     with pytest.raises(InputError, match="leads outside"):
         resources_of(place)
     (place / "ontology" / "a.ttl").unlink()
+    (place / "ontology" / "a.ttl").symlink_to("a.ttl")
+    with pytest.raises(InputError, match="leads outside"):
+        resources_of(place)
+    (place / "ontology" / "a.ttl").unlink()
     (place / "ontology" / "a.ttl").write_text("# more than four")
     monkeypatch.setattr(resources, "MOST_BYTES", 4)
     with pytest.raises(InputError, match="is larger than"):

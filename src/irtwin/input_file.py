@@ -32,6 +32,16 @@ class Unpacking:
             )
 
 
+def real_path(path: Path) -> Path | None:
+    """Return where a path leads; None where its links go round in a circle, a name is too long or has a NUL."""
+    try:
+        real = path.resolve()
+        real.is_file()
+        return real
+    except (OSError, RuntimeError, ValueError):  # Python 3.13 has the former for a circle, those before the latter
+        return None
+
+
 def read_input(path: Path, most: int) -> bytes:
     """Return a file's content. Raises InputError where it cannot be read or has more than `most` bytes."""
     if check_file(path) > most:

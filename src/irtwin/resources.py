@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import read_input, real_path
 from irtwin.trust import trusted
 
 GROUP = "irtwin.extensions"
@@ -188,7 +188,8 @@ def _found(place: Path, origin: str) -> list[Resource]:
     files = []
     for kind in KINDS:
         for path, name in _files(place / kind, kind):
-            if not path.resolve().is_relative_to(place.resolve()):
+            real = real_path(path)
+            if real is None or not real.is_relative_to(place.resolve()):
                 raise InputError(f"{path}: leads outside {place}; put the file itself there")
             holds = KINDS[kind]
             if not (name.endswith(holds.endings) and all(map(_NAME.fullmatch, name.split("/")))):

@@ -14,7 +14,7 @@ from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import read_input, real_path
 
 FORMATS = (".stl", ".obj", ".dae")
 LARGEST = 20_000_000  # bytes of a file
@@ -47,13 +47,10 @@ def find_mesh(name: str, folder: Path, beside: Path) -> Path:
     paths = [path, PurePosixPath(*path.parts[1:])] if scheme == "package" else [path]
     inside, outside = folder.resolve(), False
     for found in (base / one for base in (beside, folder) for one in paths):
-        try:
-            real = found.resolve()
-            if real.is_relative_to(inside) and real.is_file():
-                return real
-            outside |= not real.is_relative_to(inside)
-        except (OSError, RuntimeError):  # a name too long, a ring of links
-            continue
+        real = real_path(found)
+        if real is not None and real.is_relative_to(inside) and real.is_file():
+            return real
+        outside |= real is not None and not real.is_relative_to(inside)
     if outside:
         raise InputError(f'mesh "{_shown(name)}" leads outside the data set; copy the file into it')
     raise InputError(f'mesh "{_shown(name)}" is not in the data set; copy the file into it')

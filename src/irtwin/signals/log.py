@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
-from irtwin.input_file import checksum
+from irtwin.input_file import checksum, real_path
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
@@ -18,7 +18,7 @@ from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled, holes
 from irtwin.signals.sources.bag_source import number_topics
-from irtwin.signals.toml_file import Table, read_toml, real_path, shown, take
+from irtwin.signals.toml_file import Table, read_toml, shown, take
 
 PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
 ROLES = ("observed", "reference", "simulated", PLANNED)
@@ -395,12 +395,12 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
         if run.name in names:
             raise InputError(f'{file}: two runs are named "{run.name}" ({names[run.name]}, {run.file}); rename one')
         names[run.name] = run.file
-    files = {run.file.resolve(): run.name for run in reversed(runs)}  # of a run in pieces, the first
+    files = {real_path(run.file): run.name for run in reversed(runs)}  # of a run in pieces, the first
     plans = {run.name for run in runs if run.role == PLANNED}
     resolved = []
     for run in runs:
         if run.repeat_of is not None:
-            target = files.get((file.parent / run.repeat_of).resolve())
+            target = files.get(real_path(file.parent / run.repeat_of))
             if target is None or target == run.name:
                 raise InputError(
                     f'{file}: run "{run.name}" repeat_of = "{run.repeat_of}" is not another run of this data set'

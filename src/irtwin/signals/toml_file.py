@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import read_input, real_path
 
 BAG_FOLDER = "metadata.yaml"  # what a folder that is a ROS 2 bag holds
 _LARGEST = 2_000_000  # bytes, of thousands of runs; a million takes the parser up to 2 s
@@ -87,16 +87,6 @@ class Table:
         if not (real.is_file() or (real / BAG_FOLDER).is_file()):
             raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
         return path
-
-
-def real_path(path: Path) -> Path | None:
-    """Return where a path leads; None where its links go round in a circle or a name is too long."""
-    try:
-        real = path.resolve()
-        real.is_file()
-        return real
-    except (OSError, RuntimeError):  # Python 3.13 has the former for a circle, those before the latter
-        return None
 
 
 def read_toml(file: Path) -> dict[str, Any]:

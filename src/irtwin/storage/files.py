@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NewType
 
 from irtwin.errors import InputError, WorkspaceFault
+from irtwin.input_file import real_path
 
 InsidePath = NewType("InsidePath", Path)  # of a file in a workspace: what `inside` returns, and nobody else makes one
 
@@ -122,11 +123,8 @@ def inside(workspace: Path, path: str) -> InsidePath:
 
     The one gate for what rows, archives and file names say: a database, or a whole folder, may come from elsewhere.
     """
-    try:
-        is_inside = (workspace / path).resolve().is_relative_to(workspace.resolve())
-    except (OSError, RuntimeError, ValueError):  # a ring of links, a name too long, a NUL
-        is_inside = False
-    if not is_inside:
+    real = real_path(workspace / path)
+    if real is None or not real.is_relative_to(workspace.resolve()):
         raise InputError(
             f"{workspace}: the path {path[:200]!r} leads outside the workspace; nothing was read or written"
         )
