@@ -17,6 +17,7 @@ from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap import predict as predicted
 from irtwin.gap.isolation.torque_scale import torque_scale_of
+from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.planning.admission import check_motion
 from irtwin.planning.plan import Plan, Task, nominal_twin
@@ -57,7 +58,7 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     cutoff = cutoff_for(given.robot, own)
     motions = [condition(run, given.robot, cutoff) for run in own]
     twin = fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
-    return replace(twin, torque_scale=torque_scale_of(twin, given, motions))
+    return replace(twin, torque_scale=torque_scale_of(twin, given, motions, ScaleOfTorque()))
 
 
 def predict(

@@ -10,6 +10,7 @@ from tests.synthetic import swing
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.data.baseline import baseline
 from irtwin.gap.forecast import Forecast, forecast
+from irtwin.gap.thresholds import GivenTwin
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, Run
@@ -54,7 +55,7 @@ def data_set(joints: int, seconds: float = 10.0, *, power: bool = True) -> DataS
 
 def expected(joints: int, seconds: float = 10.0, *, power: bool = True) -> Forecast:
     one = data_set(joints, seconds, power=power)
-    return forecast(one, baseline(one, ()))
+    return forecast(one, baseline(one, (), GivenTwin()))
 
 
 @pytest.mark.parametrize("joints", MEASURED)

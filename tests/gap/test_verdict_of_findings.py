@@ -85,7 +85,7 @@ def finding(*classes, matters=True, least=0.1, effect="stribeck_friction"):
     ],
 )
 def test_causes_that_are_likely_make_the_verdict(findings, verdict):
-    assert verdict_of(findings, DEFAULT.verdict) == verdict
+    assert verdict_of(findings) == verdict
 
 
 def test_a_gap_that_is_closed_is_not_left_open():

@@ -27,8 +27,6 @@ def test_a_cause_that_no_finding_that_matters_has_is_marked():
 
 def test_a_guess_beside_a_likely_cause_adds_no_joint_to_what_is_said_of_the_family():
     cause = document("ambiguous").causes[0]
-    of_both = [
-        replace(cause, joints=(joint,), confidence=sure) for joint, sure in (("joint_1", 0.04), ("joint_2", 0.7))
-    ]
-    assert _joints(arm(3), of_both, likely=0.5) == ("joint_2",)
-    assert _joints(arm(3), of_both, likely=0.9) == ("joint_1", "joint_2")
+    guess, other = (replace(cause, joints=(joint,), confidence=0.49) for joint in ("joint_1", "joint_2"))
+    assert _joints(arm(3), [guess, replace(other, confidence=0.5)]) == ("joint_2",)
+    assert _joints(arm(3), [guess, other]) == ("joint_1", "joint_2")

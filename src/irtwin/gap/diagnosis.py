@@ -114,10 +114,10 @@ class Diagnosis:
         written = tuple(writing.cause(robot, *one, self.scale, self.thresholds.criterion) for one in named)
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
         causes = apart.causes(written)
-        found = writing.findings(robot, self.channels, named, written, self.thresholds)
+        found = writing.findings(robot, self.channels, named, written, self.thresholds.matters)
         found = apart.findings(found, causes, self.thresholds.matters)
         causes = writing.folded(causes, found)
-        judged = verdict_of(found, self.thresholds.verdict)
+        judged = verdict_of(found)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
         shrink = writing.shrink(
             robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
@@ -168,7 +168,7 @@ def diagnose(
     diagnosed.
     """
     tell = Told(progress or (lambda line: None))
-    expected = forecast(data_set, baseline(data_set, withhold, twin, thresholds.given_twin))
+    expected = forecast(data_set, baseline(data_set, withhold, thresholds.given_twin, twin))
     if expected.long:
         tell(expected.line)
     tell(f"Filtering {len(data_set.runs)} runs")

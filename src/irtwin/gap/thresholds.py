@@ -248,9 +248,6 @@ class Verdict:
     rates: float = _threshold(
         0.1, "rates of logs that differ by more are not alike", "share", "decisions/gap-unexplained-verdict.md"
     )
-    likely: float = _threshold(
-        0.5, "a cause or a family speaks from it; below it is a guess", "confidence", "more likely than not"
-    )
 
 
 @dataclass(frozen=True)
@@ -269,8 +266,6 @@ class Matters:
 class Places:
     """Which joints and regimes are named."""
 
-    false_discoveries: float = _threshold(0.05, "expected share of false places", "share", "decisions/gap-locations.md")
-    least_share: float = _threshold(0.02, "least share of a place", "share of the channel's excess", _JUDGEMENT)
     most: int = _threshold(12, "places that are named", "places", "for a reader")
     run_stands_out: float = _threshold(1.5, "a run is named with a place beyond it", _FLOOR, _JUDGEMENT)
     unsuited: float = _threshold(

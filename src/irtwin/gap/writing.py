@@ -25,7 +25,7 @@ from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
-from irtwin.gap.thresholds import Criterion, Thresholds
+from irtwin.gap.thresholds import Criterion, Matters
 from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import TorqueScale
 
@@ -97,7 +97,7 @@ def findings(
     channels: Sequence[Finding],
     named: Sequence[tuple[Finding, Cause, str]],
     causes: Sequence[document.Cause],
-    limits: Thresholds,
+    limits: Matters,
 ) -> tuple[document.Finding, ...]:
     """Return the causes as a tree, the branch that closes most first; `named`: every cause with its id."""
     of_all = [(channel, branch) for channel in channels for branch in branches(channel)]
@@ -106,7 +106,7 @@ def findings(
     own_of_all = [
         [written[next(name for _, one, name in named if one is each)] for each in branch.causes] for _, branch in of_all
     ]
-    joints = [_joints(robot, own, limits.verdict.likely) for own in own_of_all]
+    joints = [_joints(robot, own) for own in own_of_all]
     ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
     found = []
     for (channel, branch), own, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
@@ -124,7 +124,7 @@ def findings(
                 share=branch.closing.share,
                 share_interval95=branch.closing.interval,
                 share_of=branch.closing.share_of,
-                matters=branch.closing.matters(limits.matters, likely=max(classes) >= limits.verdict.likely),
+                matters=branch.closing.matters(limits, likely=max(classes) >= document.LIKELY),
                 members=tuple(one for some in members for one in some),
             )
         )
@@ -137,9 +137,9 @@ def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding
     return tuple(one if one.id in told else replace(one, folded_away=True) for one in causes)
 
 
-def _joints(robot: Robot, causes: Sequence[document.Cause], likely: float) -> tuple[str, ...]:
+def _joints(robot: Robot, causes: Sequence[document.Cause]) -> tuple[str, ...]:
     """Return the joints of the causes that are likely; of all, where none is."""
-    told = [cause for cause in causes if cause.confidence >= likely] or causes
+    told = [cause for cause in causes if cause.likely] or causes
     touched = {joint for cause in told for joint in cause.joints}
     return tuple(joint for joint in robot.joint_names if joint in touched)
 

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.gap.isolation.torque_scale import torque_scale_of
+from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.motions import robot_motions
@@ -42,7 +43,7 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
 def twin_made(workspace: Workspace, robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> Made:
     """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id."""
     said = stored_data_set(workspace, robot_id, twin.robot)
-    twin = replace(twin, torque_scale=torque_scale_of(twin, said, parts.fit))
+    twin = replace(twin, torque_scale=torque_scale_of(twin, said, parts.fit, ScaleOfTorque()))
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"

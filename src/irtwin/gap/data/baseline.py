@@ -12,7 +12,7 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.gap.thresholds import DEFAULT, GivenTwin
+from irtwin.gap.thresholds import GivenTwin
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
@@ -27,9 +27,7 @@ class Baseline:
     prior: Prior | None = None
 
 
-def baseline(
-    data_set: DataSet, withhold: Sequence[str], twin: Twin | None = None, limits: GivenTwin = DEFAULT.given_twin
-) -> Baseline:
+def baseline(data_set: DataSet, withhold: Sequence[str], limits: GivenTwin, twin: Twin | None = None) -> Baseline:
     """Return what the data set's twin models, or a `twin` that is given, less the effects withheld.
 
     Of a twin: its effects in their shapes, and its numbers as the prior, as far as they can have moved since. Effects

@@ -160,7 +160,7 @@ def case_of(
 
     `tell` is told how far that has come, where it takes long. Raises InputError where `baseline` and `admit` do.
     """
-    begun = baseline(data_set, withhold, twin, thresholds.given_twin)
+    begun = baseline(data_set, withhold, thresholds.given_twin, twin)
     cutoff = cutoff_for(begun.robot, data_set.runs, tell)
     given = {run.name: condition_for_fit(run, begun.robot, cutoff) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)

@@ -23,6 +23,10 @@ Scope = Annotated[str, OneOf("missing", "changed")]
 ScaleSource = Annotated[str, OneOf("stated", "simulated", "sensor", "assumed")]
 FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
 
+LIKELY = 0.5  # confidence from which a cause or a finding is likely, more so than not; below it is a guess
+FALSE_PLACES = 0.05  # rate of false discoveries up to which a place is sure, as intervals are 95 % ones
+LEAST_SHARE = 0.02  # of its channel's excess that a place has, to be worth a line
+
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
@@ -120,6 +124,11 @@ class Cause:
     indistinguishable_from: tuple[str, ...]
     evidence: Evidence
     folded_away: bool | None = None
+
+    @property
+    def likely(self) -> bool:
+        """Whether it is more likely than not, and no guess."""
+        return self.confidence >= LIKELY
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ import numpy as np
 from irtwin.effects.effect import Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.channel_equations import Torque
-from irtwin.gap.thresholds import DEFAULT, ScaleOfTorque
+from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.accumulate import Rows, accumulate
 from irtwin.identification.estimators import estimate
 from irtwin.identification.uncertainty import half_widths
@@ -51,11 +51,13 @@ def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque, l
     return known if told is None else _narrowed(known, *told, limits)
 
 
-def torque_scale_of(twin: Twin, data_set: DataSet, motions: Sequence[Motion]) -> TorqueScale | None:
+def torque_scale_of(
+    twin: Twin, data_set: DataSet, motions: Sequence[Motion], limits: ScaleOfTorque
+) -> TorqueScale | None:
     """Return how sure the scale is by which a twin was fitted to motions; None where these have no torque."""
     if not any(motion.torque is not None for motion in motions):
         return None
-    return torque_scale(data_set, motions, twin.joint_torque, DEFAULT.scale_of_torque)
+    return torque_scale(data_set, motions, twin.joint_torque, limits)
 
 
 def _stated(data_set: DataSet, by_power: bool, limits: ScaleOfTorque) -> TorqueScale:

@@ -16,7 +16,7 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.spread import spread
 from irtwin.gap.regression.normal_equations import System, noise_before, reference_rms
 from irtwin.gap.repeats.disturbances import Disturbance
-from irtwin.gap.thresholds import Thresholds, Verdict
+from irtwin.gap.thresholds import Thresholds
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
 MUCH_IS_LEFT, IMPOSSIBLE_NUMBER, DOES_NOT_REPEAT, UNSURE = (
@@ -65,7 +65,7 @@ def most_left(findings: Sequence[Finding]) -> tuple[str, int]:
     return max(left, key=lambda place: left[place])
 
 
-def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
+def verdict_of(findings: Sequence[document.Finding]) -> str:
     """Return the verdict on a gap that is not left open.
 
     It is `unexplained` where no cause that matters is likely, or none that is likely closes more than nothing for sure.
@@ -75,7 +75,7 @@ def verdict_of(findings: Sequence[document.Finding], limits: Verdict) -> str:
     if not mattering:
         return NO_GAP
     classes = [sure for finding in mattering if _closes_for_sure(finding) for sure in _classes(finding)]
-    likely = [sure for sure in classes if sum(sure) >= limits.likely]
+    likely = [sure for sure in classes if sum(sure) >= document.LIKELY]
     if not likely:
         return UNEXPLAINED
     return AMBIGUOUS if any(len(sure) > 1 for sure in likely) else ATTRIBUTED

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import false_discovery_control, t
 
+from irtwin.gap.document.document import FALSE_PLACES, LEAST_SHARE
 from irtwin.gap.localisation.excess_map import Map
 from irtwin.gap.localisation.regimes import (
     ACCELERATING,
@@ -114,14 +115,14 @@ def locate(
         )
         for place in range(len(joints))
         for r, regime in enumerate(seen.regimes.names)
-        if share[0, place, r] >= limits.least_share and q[place, r] <= limits.false_discoveries
+        if share[0, place, r] >= LEAST_SHARE and q[place, r] <= FALSE_PLACES
     ]
     if acting is not None and acts is not None:
         sure = {one.joint for one in found}
         unsure = [place for place in range(len(joints)) if acting[place] and joints[place] not in sure]
         found += [location(place, r, rank) for place in unsure for r, rank in _where_added(acts, place)]
     if leaving is not None and joints[leaving] not in {one.joint for one in found}:
-        foremost = np.flatnonzero((concentration[leaving] > 1) & (share[0, leaving] >= limits.least_share))
+        foremost = np.flatnonzero((concentration[leaving] > 1) & (share[0, leaving] >= LEAST_SHARE))
         found += [location(leaving, int(r), float(share[0, leaving, r])) for r in foremost]
     found = [one for one in found if one.regime != LOADED or one.follows in _LOADS]
     last = np.zeros(len(joints), dtype=bool) if acting is None else ~acting

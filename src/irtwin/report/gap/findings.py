@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.thresholds import DEFAULT
+from irtwin.gap.document.document import LIKELY
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
-_LIKELY = DEFAULT.verdict.likely  # below it a finding is a guess
 
 Alternative = tuple[str, float]  # what an effect is called, and its confidence
 
@@ -48,12 +47,12 @@ class Finding:
     @property
     def likely(self) -> bool:
         """Whether it is more likely than not, and no guess."""
-        return self.confidence >= _LIKELY
+        return self.confidence >= LIKELY
 
     @property
     def effects(self) -> str:
         """The causes with their confidences, each with its alternatives; beside likely ones, guesses are counted."""
-        told = [some for some in self.members if _together(some) >= _LIKELY] or self.members
+        told = [some for some in self.members if _together(some) >= LIKELY] or self.members
         guesses = len(self.members) - len(told)
         beside = f", beside {guesses} {'guess' if guesses == 1 else 'guesses'}" if guesses else ""
         return wording.listed([" or ".join(_with(*one) for one in some) for some in told]) + beside
@@ -63,7 +62,7 @@ class Finding:
         """The whole finding; a guess without its effects, unless one of them is likely."""
         sure = f"({wording.share(self.confidence)} sure)"
         if not self.likely:
-            one_of = any(_together(some) >= _LIKELY for some in self.members)
+            one_of = any(_together(some) >= LIKELY for some in self.members)
             return f"{self.claim} {sure}" + (f": {self.effects}" if one_of else "")
         if [chance for some in self.members for _, chance in some] == [self.confidence]:
             return f"{self.claim}: {self.members[0][0][0]} {sure}"

@@ -10,8 +10,7 @@ from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document
-from irtwin.gap.thresholds import DEFAULT
+from irtwin.gap.document.document import FALSE_PLACES, LEAST_SHARE, LIKELY, Document
 from irtwin.json_text import parse_json
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.running import infer
@@ -105,9 +104,8 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
 
 def _places(rows: Sequence[Row]) -> list[Row]:
     """Return the places that have a part of the gap worth a line; all, where none has. `sure`: beyond chance."""
-    limits = DEFAULT.places
-    marked: list[Row] = [{**row, "sure": row["rate"] <= limits.false_discoveries} for row in rows]
-    return [row for row in marked if row["excess"] > 0 and row["share"] >= limits.least_share] or marked
+    marked: list[Row] = [{**row, "sure": row["rate"] <= FALSE_PLACES} for row in rows]
+    return [row for row in marked if row["excess"] > 0 and row["share"] >= LEAST_SHARE] or marked
 
 
 def _cause(row: Row, answers: Answers) -> dict[str, Any]:
@@ -116,7 +114,7 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
         **row,
         "name": effect_name(row),
         "told": gap_verdict.matters(cause, answers),
-        "likely": row["confidence"] >= DEFAULT.verdict.likely,
+        "likely": row["confidence"] >= LIKELY,
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
         "parameters": _of(cause, answers, "cause_parameters"),

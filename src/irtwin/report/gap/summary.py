@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from irtwin.gap.document.document import Document
-from irtwin.gap.thresholds import DEFAULT
 from irtwin.knowledge.store.table import Row, Table
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -44,7 +43,7 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
     for cause in (one for one in diagnosis.causes if one.id in told):
         name = cause.effect.replace("_", " ")
         first: Row = {
-            "cause": name if cause.confidence >= DEFAULT.verdict.likely else f"perhaps {name}",
+            "cause": name if cause.likely else f"perhaps {name}",
             "joints": ", ".join(cause.joints) or "whole robot",
             "sure, %": round(100 * cause.confidence),
         }
