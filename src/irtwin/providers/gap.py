@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -22,10 +22,12 @@ from irtwin.providers.gap_rows import Place
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made, software
-from irtwin.providers.records import identifier, inputs, robot_iri
+from irtwin.providers.records import identifier, inputs, robot_iri, rows_of
+from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.files import inside
+from irtwin.storage.schema import Base
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
 
@@ -45,16 +47,32 @@ def record(
     Raises InputError where the workspace lacks the robot, or a run or joint that the diagnosis names.
     """
     started = datetime.now(UTC)
-    runs = _run_ids(workspace, robot_id)
-    linear = _linear_joints(workspace, robot_id, diagnosis)
-    row, documents = _row(robot_id, diagnosis, curves, twin, motion)
-    at = Place(row.diagnosis_id, robot_id, partial(_run_id, runs), linear)
-    rows = [row, *gap_rows.rows(diagnosis, at), *gap_rows.rows_of_curves(curves, at)]
-    made = Made(robot_id, inputs(workspace, robot_id, runs.values()), rows, documents=documents)
+    with workspace.reading() as session:
+        if session.get(schema.Robot, robot_id) is None:
+            raise InputError(f"{workspace.folder}: no robot {robot_id} here; run `irtwin run` on its data set first")
+        runs = session.scalars(select(schema.Run).where(schema.Run.robot_id == robot_id)).all()
+        joints = session.scalars(select(schema.Joint).where(schema.Joint.robot_id == robot_id)).all()
+    row, parts, documents = _rows(robot_id, joints, runs, diagnosis, curves, twin, motion)
+    used = inputs(workspace, robot_id, [run.run_id for run in runs])
     diagnosis_id = row.diagnosis_id
-    _keep(workspace, "diagnosis", made, started)
+    _keep(workspace, "diagnosis", Made(robot_id, used, [row, *parts], documents=documents), started)
     with workspace.reading() as session:
         return session.get_one(gap_schema.GapDiagnosis, diagnosis_id)
+
+
+def unrecorded(data_set: DataSet, diagnosis: Document, curves: Curves) -> tuple[list[Base], dict[str, bytes]]:
+    """Return the rows of a data set and its diagnosis as a workspace would have them, and the documents by their path.
+
+    Of samples and meshes, which are files of the workspace, there is none.
+    """
+    started = datetime.now(UTC)
+    robot, parts, runs = rows_of(data_set, {})
+    joints = [part for part in parts if isinstance(part, schema.Joint)]
+    row, own, documents = _rows(robot.robot_id, joints, runs, diagnosis, curves)
+    activity = _activity(robot.robot_id, "diagnosis", started)
+    for one in (row, *own):
+        one.activity_id = activity.activity_id  # type: ignore[attr-defined]
+    return [robot, *parts, *runs, activity, row, *own], documents
 
 
 def adopt(workspace: Workspace, robot_id: str) -> str:
@@ -88,25 +106,36 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
 
 
 def _keep(workspace: Workspace, provider: str, made: Made, started: datetime, instead_of: str | None = None) -> None:
-    activity = schema.Activity(
-        activity_id=f"{provider}.{made.robot_id}.{started:%Y%m%dT%H%M%S%f}",
-        robot_id=made.robot_id,
+    activity = _activity(made.robot_id, provider, started)
+    workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of=instead_of)
+
+
+def _activity(robot_id: str, provider: str, started: datetime) -> schema.Activity:
+    return schema.Activity(
+        activity_id=f"{provider}.{robot_id}.{started:%Y%m%dT%H%M%S%f}",
+        robot_id=robot_id,
         provider=provider,
-        subject=robot_iri(made.robot_id),
+        subject=robot_iri(robot_id),
         started=started,
         ended=datetime.now(UTC),
         software=software(),
     )
-    workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of=instead_of)
 
 
-def _run_ids(workspace: Workspace, robot_id: str) -> dict[str, str]:
-    """Return the robot's runs, by the end of their run_id; InputError where the robot is unknown."""
-    with workspace.reading() as session:
-        if session.get(schema.Robot, robot_id) is None:
-            raise InputError(f"{workspace.folder}: no robot {robot_id} here; run `irtwin run` on its data set first")
-        found = session.scalars(select(schema.Run.run_id).where(schema.Run.robot_id == robot_id)).all()
-    return {run_id.removeprefix(f"{robot_id}."): run_id for run_id in sorted(found)}
+def _rows(
+    robot_id: str,
+    joints: Iterable[schema.Joint],
+    runs: Iterable[schema.Run],
+    diagnosis: Document,
+    curves: Curves,
+    twin: str | None = None,
+    motion: str | None = None,
+) -> tuple[gap_schema.GapDiagnosis, list[gap_schema.OfDiagnosis], dict[str, bytes]]:
+    """Return the row of a diagnosis, those of its parts, and the documents that it names, by their path."""
+    row, documents = _row(robot_id, diagnosis, curves, twin, motion)
+    ids = {run.run_id.removeprefix(f"{robot_id}."): run.run_id for run in runs}
+    at = Place(row.diagnosis_id, robot_id, partial(_run_id, ids), _linear_joints(robot_id, joints, diagnosis))
+    return row, [*gap_rows.rows(diagnosis, at), *gap_rows.rows_of_curves(curves, at)], documents
 
 
 def _run_id(runs: Mapping[str, str], name: str) -> str:
@@ -117,11 +146,9 @@ def _run_id(runs: Mapping[str, str], name: str) -> str:
     return runs[identifier(name)]
 
 
-def _linear_joints(workspace: Workspace, robot_id: str, said: Document) -> frozenset[str]:
+def _linear_joints(robot_id: str, joints: Iterable[schema.Joint], said: Document) -> frozenset[str]:
     """Return the robot's prismatic joints; InputError where it lacks a joint that the diagnosis names."""
-    with workspace.reading() as session:
-        of_robot = select(schema.Joint.name, schema.Joint.kind).where(schema.Joint.robot_id == robot_id)
-        known = {name: kind for name, kind in session.execute(of_robot)}
+    known = {joint.name: joint.kind for joint in joints}
     named = {*(said.gap.torque or ())}
     named |= {location.joint for location in said.locations if location.joint}
     named |= {joint for cause in said.causes for joint in cause.joints}

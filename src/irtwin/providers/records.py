@@ -21,7 +21,7 @@ from sqlalchemy import ColumnElement, select
 from irtwin.errors import InputError
 from irtwin.json_text import parse_json
 from irtwin.planning.admission import check_motion
-from irtwin.providers.mesh_files import mesh_copies
+from irtwin.providers.mesh_files import MeshCopy, mesh_copies
 from irtwin.providers.structure_rows import device_rows, structure_rows
 from irtwin.robot import description
 from irtwin.robot.collision import CollisionModel
@@ -60,21 +60,29 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
 
     `announce` is told of each mesh that cannot be drawn.
     """
-    robot_id = identifier(data_set.robot.name)
-    now = datetime.now(UTC)
-    listed = [*data_set.runs, *data_set.plans]
-    runs = [_run_row(robot_id, run, now, data_set.folder) for run in listed]
-    taken = {row.run_id for row in runs}
-    if len(taken) < len(runs):
-        raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
-    _check_kept_runs(workspace, robot_id, data_set, runs)
-    series = {
-        row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
-        for row, run in zip(runs, listed, strict=True)
-    }
     meshes, undrawn = mesh_copies(data_set)
     for line in undrawn:
         announce(line)
+    robot, parts, runs = rows_of(data_set, meshes)
+    _check_kept_runs(workspace, robot.robot_id, data_set, runs)
+    series = {
+        row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
+        for row, run in zip(runs, _listed(data_set), strict=True)
+    }
+    documents = {mesh.path: mesh.content for mesh in meshes.values()}
+    return workspace.ingest(robot, parts, runs, series, documents)
+
+
+def rows_of(data_set: log.DataSet, meshes: Mapping[str, MeshCopy]) -> tuple[Robot, list[Base], list[Run]]:
+    """Return the rows of what a data set says: the robot, its parts, and each run; `meshes` by their names.
+
+    Raises InputError where two runs are one by their names.
+    """
+    robot_id = identifier(data_set.robot.name)
+    now = datetime.now(UTC)
+    runs = [_run_row(robot_id, run, now, data_set.folder) for run in _listed(data_set)]
+    if len({row.run_id for row in runs}) < len(runs):
+        raise InputError(f"{data_set.folder}: two runs have the same name in two forms of Unicode; rename one")
     parts: list[Base] = [
         *_source_files(robot_id, data_set),
         *(
@@ -87,8 +95,11 @@ def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str]
         *structure_rows(robot_id, data_set.robot, meshes),
         *device_rows(robot_id, data_set),
     ]
-    documents = {mesh.path: mesh.content for mesh in meshes.values()}
-    return workspace.ingest(_robot_row(robot_id, data_set), parts, runs, series, documents)
+    return _robot_row(robot_id, data_set), parts, runs
+
+
+def _listed(data_set: log.DataSet) -> list[log.Run]:
+    return [*data_set.runs, *data_set.plans]
 
 
 def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], run: log.Run) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +15,8 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
-from irtwin.providers.gap import record
-from irtwin.providers.records import identifier, ingest, robot_iri
+from irtwin.providers.gap import unrecorded
+from irtwin.providers.records import identifier, robot_iri
 from irtwin.report import wording
 from irtwin.report.energy.page import content_policy, figure_scripts, page_data
 from irtwin.report.gap import figures as gap_figures
@@ -29,8 +28,8 @@ from irtwin.report.questions import Answers, Graph, Row, added_to, ask, question
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
 from irtwin.signals.log import DataSet
-from irtwin.storage.database import Workspace
 from irtwin.storage.files import write
+from irtwin.storage.in_memory import in_memory
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 
@@ -58,17 +57,15 @@ def render_gap(
 def render_alone(
     data_set: DataSet, diagnosis: Document, curves: Curves, out: Path, resources: Resources | None = None
 ) -> None:
-    """Write the gap report of a diagnosis by a graph of its own; `resources` as `render_gap` has them."""
-    robot_id = identifier(data_set.robot.name)
-    with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as workspace:
-        ingest(workspace, data_set)
-        record(workspace, robot_id, diagnosis, curves)
-        graph = KnowledgeGraph(resources=resources)
-        graph.load_ontology()
-        mapped = map_database(workspace.engine, graph.resources.paths("mappings"))
-        graph.replace(mapped, GRAPH_SOURCE, GRAPH_ACTIVITY)
-        infer(graph)
-        render_gap(graph, graph.iri(robot_iri(robot_id)), workspace.read_document, out, graph.resources)
+    """Write the gap report of a diagnosis, and no other file; `resources` as `render_gap` has them."""
+    graph = KnowledgeGraph(resources=resources)
+    graph.load_ontology()
+    rows, documents = unrecorded(data_set, diagnosis, curves)
+    with in_memory(rows) as engine:
+        graph.replace(map_database(engine, graph.resources.paths("mappings")), GRAPH_SOURCE, GRAPH_ACTIVITY)
+    infer(graph)
+    robot = graph.iri(robot_iri(identifier(data_set.robot.name)))
+    render_gap(graph, robot, lambda path, checksum: documents[path], out, graph.resources)
 
 
 def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
