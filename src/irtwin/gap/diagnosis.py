@@ -112,7 +112,7 @@ class Diagnosis:
         ids = cause_ids(acted_on, robot.joint_names)
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         written = tuple(writing.cause(robot, *one, self.scale, self.thresholds.criterion) for one in named)
-        apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, ids, robot.joint_names)
+        apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         causes = apart.causes(written)
         found = writing.findings(robot, self.channels, named, written, self.thresholds.matters)
         found = apart.findings(found, causes, self.thresholds.matters)

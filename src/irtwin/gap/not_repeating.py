@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import expit
 
-from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.document import document
 from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.regression.held_out import closed_fraction
 from irtwin.gap.regression.hypotheses import MISSING
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.repeats.removal import Removed
 from irtwin.gap.thresholds import Matters
+from irtwin.gap.writing import fraction_closed, numbers, parameter
 
 _LEAST_P = 1e-6  # of what a p tells
+_MOST = 0.5  # of what is closed in a channel
+_One = TypeVar("_One")
 
 
 def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
@@ -29,11 +31,7 @@ def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
     judged, own = finding.held_out, [one for one in taken if one.disturbance.channel == finding.name]
     if not own:
         return finding
-    before = judged.before.copy()
-    for one in own:
-        place = finding.places.index(one.disturbance.joint)
-        squares = [one.mean_square(runs) for runs in finding.groups]
-        before[:, place] += judged.rows[:, place] * np.array(squares)
+    before = judged.before + sum(_squares(finding, one) for one in own)
     closed = float(np.sum((judged.before - judged.after) / _level(finding)))
     more = float(np.sum((before - judged.before) / _level(finding)))
     part = max(closed, 0.0) / max(max(closed, 0.0) + more, 1e-300)
@@ -45,30 +43,36 @@ def _level(finding: Finding) -> np.ndarray:
     return np.ones(len(finding.places)) if finding.floor is None else finding.floor**2
 
 
+def _squares(finding: Finding, one: Removed) -> np.ndarray:
+    """Return (G, g) the squares of what was taken out in each group left out and equation of its channel."""
+    rows, place = finding.held_out.rows, finding.places.index(one.disturbance.joint)
+    found = np.zeros(rows.shape)
+    found[:, place] = rows[:, place] * np.array([one.mean_square(runs) for runs in finding.groups])
+    return found
+
+
 @dataclass(frozen=True)
 class NotRepeating:
     """What was `taken` out of all that was `found` to differ between repeats.
 
-    `channels`: the findings with what was taken out in them; `ids`: of the other causes.
+    `channels`: the findings with what was taken out in them; `joints`: all of the robot.
     """
 
     taken: tuple[Removed, ...]
     found: tuple[Disturbance, ...]
     floor: Floor
     channels: tuple[Finding, ...]
-    ids: Sequence[str]
     joints: tuple[str, ...]
 
     @property
-    def _names(self) -> list[str]:
-        acted_on = [
-            (one.effect.id, () if one.disturbance.joint is None else (one.disturbance.joint,)) for one in self.taken
-        ]
-        return cause_ids(acted_on, self.joints)
+    def _named(self) -> list[tuple[Removed, str]]:
+        """What was taken out, each with the id of its cause."""
+        ids = cause_ids([(one.effect.id, one.joints) for one in self.taken], self.joints)
+        return list(zip(self.taken, ids, strict=True))
 
     def listed(self) -> tuple[document.NotRepeating, ...] | None:
         """Return all that differs, the largest share first."""
-        explained = {id(one.disturbance): (one, name) for one, name in zip(self.taken, self._names, strict=True)}
+        explained = {id(one.disturbance): (one, name) for one, name in self._named}
         places = [f"{one.kind}@{one.joint or one.channel}" for one in self.found]
         listed = []
         for k, one in enumerate(self.found):
@@ -82,7 +86,7 @@ class NotRepeating:
                     kind=one.kind,
                     rms=float(np.sqrt(one.size)),
                     share=one.share,
-                    quantities=tuple(map(_quantity, one.quantities if by is None else by.quantities)),
+                    quantities=tuple(map(parameter, one.quantities if by is None else by.quantities)),
                     explained_by=name,
                 )
             )
@@ -100,8 +104,7 @@ class NotRepeating:
     def causes(self, others: Sequence[document.Cause]) -> tuple[document.Cause, ...]:
         """Return all causes: what takes most of what is closed in its channel goes before the others."""
         own = []
-        for one, name in zip(self.taken, self._names, strict=True):
-            joints = () if one.disturbance.joint is None else (one.disturbance.joint,)
+        for one, name in self._named:
             evidence = document.Evidence(
                 channel=one.disturbance.channel,
                 share_of_what_is_closed=self._share(one),
@@ -114,16 +117,15 @@ class NotRepeating:
                 document.Cause(
                     id=name,
                     effect=one.effect.id,
-                    joints=joints,
+                    joints=one.joints,
                     scope=MISSING,
                     confidence=float(expit(evidence.log_odds)),
-                    parameters=tuple(map(_quantity, one.quantities)),
+                    parameters=tuple(map(parameter, one.quantities)),
                     indistinguishable_from=(),
                     evidence=evidence,
                 )
             )
-        large = [one for one in own if (one.evidence.share_of_what_is_closed or 0.0) >= 0.5]
-        return (*large, *others, *(one for one in own if one not in large))
+        return _around(others, own, [one.evidence.share_of_what_is_closed or 0.0 for one in own])
 
     def findings(
         self, others: Sequence[document.Finding], causes: Sequence[document.Cause], limits: Matters
@@ -135,21 +137,20 @@ class NotRepeating:
         alone = not any(one.matters for one in others)
         sure = {cause.id: cause.confidence for cause in causes}
         own = []
-        for one, name in zip(self.taken, self._names, strict=True):
-            channel, joint = self._finding(one), one.disturbance.joint
-            closed = self._closing(one)
+        for one, name in self._named:
+            won = self._closing(one)
             own.append(
                 document.Finding(
                     id=name,
                     family=one.effect.family,
-                    joints=() if joint is None else (joint,),
+                    joints=one.joints,
                     scope=MISSING,
-                    channel=channel.name,
+                    channel=one.disturbance.channel,
                     confidence=sure[name],
-                    share=closed.share,
-                    share_interval95=closed.interval,
-                    share_of=closed.share_of,
-                    matters=closed.matters(limits) or (alone and one.disturbance is self.found[0]),
+                    share=won.share,
+                    share_interval95=won.interval,
+                    share_of=won.share_of,
+                    matters=won.matters(limits) or (alone and one.disturbance is self.found[0]),
                     members=(
                         document.Member(
                             cause=name, effect=one.effect.id, family=one.effect.family, confidence=sure[name]
@@ -157,29 +158,19 @@ class NotRepeating:
                     ),
                 )
             )
-        large = [one for one in own if one.share >= 0.5]
-        return (*large, *others, *(one for one in own if one not in large))
+        return _around(others, own, [one.share for one in own])
 
     def _closing(self, one: Removed) -> Closing:
         finding = self._finding(one)
-        judged = finding.held_out
-        squares = np.zeros_like(judged.before)
-        place = finding.places.index(one.disturbance.joint)
-        squares[:, place] = judged.rows[:, place] * np.array([one.mean_square(runs) for runs in finding.groups])
-        return closing(squares, squares[:, place] > 0, judged, finding.floor, finding.attribution.noise)
+        squares = _squares(finding, one)
+        return closing(squares, squares.sum(axis=1) > 0, finding.held_out, finding.floor, finding.attribution.noise)
 
     def shrink(self, shrink: document.Shrink, seed: int) -> document.Shrink:
         """Return how far the gap shrinks, with what was taken out."""
         if not self.taken:
             return shrink
-        closing = [
-            (one.held_out, one.floor)
-            for one in self.channels
-            if one.floor is not None and (one.causes or self._of(one.name))
-        ]
-        known = all(one.floor is not None for one in self.channels if one.causes)
-        closed = closed_fraction(closing, seed) if closing and known else None
-        fraction = closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1]))
+        changed = [one.name for one in self.channels if one.causes or self._of(one.name)]
+        fraction = fraction_closed(self.channels, changed, seed)
         return replace(shrink, closed_fraction=fraction, by_cause=(*shrink.by_cause, *self._by_cause()))
 
     def _of(self, channel: str) -> list[Removed]:
@@ -188,56 +179,49 @@ class NotRepeating:
     def _finding(self, one: Removed) -> Finding:
         return next(each for each in self.channels if each.name == one.disturbance.channel)
 
-    def _squares(self, one: Removed) -> np.ndarray:
+    def _mean_squares(self, one: Removed) -> np.ndarray:
         """Return (g,) its mean square in each equation of its channel, over the groups judged."""
         finding = self._finding(one)
-        found, rows = np.zeros(len(finding.places)), finding.held_out.rows
-        place = finding.places.index(one.disturbance.joint)
-        squares = [one.mean_square(runs) for runs in finding.groups]
-        found[place] = float(rows[:, place] @ squares) / max(float(rows[:, place].sum()), 1.0)
-        return found
+        return finding.held_out.rmse(_squares(finding, one)) ** 2
 
     def _share(self, one: Removed) -> float | None:
         """Return its part of what the causes of its channel close together."""
         finding = self._finding(one)
         level = _level(finding)
-        own = {id(each): float(np.sum(self._squares(each) / level)) for each in self._of(finding.name)}
+        own = {id(each): float(np.sum(self._mean_squares(each) / level)) for each in self._of(finding.name)}
         left = 1 - sum(finding.shares) if finding.shares else 1.0
         return left * own[id(one)] / sum(own.values()) if sum(own.values()) > 0 else None
 
     def _by_cause(self) -> list[document.CauseChange]:
         changes = []
-        for one, name in zip(self.taken, self._names, strict=True):
-            finding, squares = self._finding(one), self._squares(one)
+        for one, name in self._named:
+            finding, squares = self._finding(one), self._mean_squares(one)
             judged = finding.held_out
             before, after = judged.rmse(judged.before), judged.rmse(judged.after)
             changes.append(
                 document.CauseChange(
                     cause=name,
                     effect=one.effect.id,
-                    joints=() if one.disturbance.joint is None else (one.disturbance.joint,),
+                    joints=one.joints,
                     scope=MISSING,
                     channel=finding.name,
                     share=self._share(one),
-                    rmse_before=_numbers(before),
-                    rmse_alone=_numbers(np.sqrt(np.maximum(before**2 - squares, 0.0))),
-                    rmse_when_left_out=_numbers(np.sqrt(after**2 + squares)),
-                    rmse_with_all=_numbers(after),
+                    rmse_before=numbers(before),
+                    rmse_alone=numbers(np.sqrt(np.maximum(before**2 - squares, 0.0))),
+                    rmse_when_left_out=numbers(np.sqrt(after**2 + squares)),
+                    rmse_with_all=numbers(after),
                 )
             )
         return changes
+
+
+def _around(others: Sequence[_One], own: Sequence[_One], shares: Sequence[float]) -> tuple[_One, ...]:
+    """Return all, those of our own that have most of what is closed before the others."""
+    first = [one for one, share in zip(own, shares, strict=True) if share >= _MOST]
+    return (*first, *others, *(one for one in own if one not in first))
 
 
 def _log_odds(p: float) -> float:
     """Return the least log odds against chance that a p leaves, at even odds (Sellke, Bayarri and Berger 2001)."""
     p = max(p, _LEAST_P)
     return -math.log(-math.e * p * math.log(p)) if p < 1 / math.e else 0.0
-
-
-def _numbers(values: np.ndarray) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)
-
-
-def _quantity(one: Quantity) -> document.Parameter:
-    ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
-    return document.Parameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -103,9 +103,8 @@ def findings(
     of_all = [(channel, branch) for channel in channels for branch in branches(channel)]
     of_all.sort(key=lambda pair: -pair[1].closing.size)
     written = {cause.id: cause for cause in causes}
-    own_of_all = [
-        [written[next(name for _, one, name in named if one is each)] for each in branch.causes] for _, branch in of_all
-    ]
+    ids_of = _ids(named)
+    own_of_all = [[written[ids_of[id(each)]] for each in branch.causes] for _, branch in of_all]
     joints = [_joints(robot, own) for own in own_of_all]
     ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
     found = []
@@ -129,6 +128,11 @@ def findings(
             )
         )
     return tuple(found)
+
+
+def _ids(named: Sequence[tuple[Finding, Cause, str]]) -> dict[int, str]:
+    """Return the id of each cause, by that of the object."""
+    return {id(one): name for _, one, name in named}
 
 
 def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding]) -> tuple[document.Cause, ...]:
@@ -185,7 +189,7 @@ def _balance(finding: Finding, one: Cause) -> dict[str, Any]:
 
 def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | None) -> tuple[document.Parameter, ...]:
     """Return a cause's parameters as the catalogue states them, with 95 % intervals that hold the torque's scale."""
-    stated = [_quantity(each if scale is None else scale.widened(each)) for each in quantities(robot, finding, one)]
+    stated = [parameter(each if scale is None else scale.widened(each)) for each in quantities(robot, finding, one)]
     if one.of_bodies:  # most of a body's numbers do not show: those that do
         stated = [each for each in stated if each.interval95 and each.interval95[0] * each.interval95[1] > 0]
     return tuple(stated)
@@ -224,27 +228,29 @@ def shrink(
     """
     changes = {finding.name: _change(finding, seed) for finding in findings}
     torque_too = any(finding.causes for finding in findings if finding.name == "torque")
-    with_floor = [
-        (one.held_out, one.floor)
-        for one in findings
-        if one.floor is not None and (one.causes or (torque_too and one.plain is not None))
-    ]
-    known = all(one.floor is not None for one in findings if one.causes)
-    closed = closed_fraction(with_floor, seed) if with_floor and known else None
+    changed = [one.name for one in findings if one.causes or (torque_too and one.plain is not None)]
+    ids_of = _ids(named)
     return document.Shrink(
         held_out_runs=tuple(runs),
         noise_floor_from=floor.source,
         torque_rmse=changes.get("torque"),
         power_rmse=changes.get("power"),
         energy_error_percent=energies.change(seed) if energies else None,
-        closed_fraction=closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1])),
+        closed_fraction=fraction_closed(findings, changed, seed),
         by_cause=tuple(
-            _by_cause(robot, finding, each, next(name for _, one, name in named if one is each))
-            for finding in findings
-            for each in finding.causes
+            _by_cause(robot, finding, each, ids_of[id(each)]) for finding in findings for each in finding.causes
         ),
         yardstick=yardstick,
     )
+
+
+def fraction_closed(findings: Sequence[Finding], changed: Container[str], seed: int) -> document.ClosedFraction | None:
+    """Return what closes in the channels that are `changed`, whose floor is known; None as `shrink` leaves it out."""
+    with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.name in changed]
+    if not with_floor or any(one.floor is None for one in findings if one.causes):
+        return None
+    found = closed_fraction(with_floor, seed)
+    return found and document.ClosedFraction(value=found[0], interval95=(found[1][0], found[1][1]))
 
 
 def _change(finding: Finding, seed: int) -> document.Change:
@@ -272,17 +278,19 @@ def _by_cause(robot: Robot, finding: Finding, one: Cause, name: str) -> document
         scope=one.scope,
         channel=finding.name,
         share=finding.share(one),
-        rmse_before=_numbers(alone.rmse(alone.before)),
-        rmse_alone=_numbers(alone.rmse(alone.after)),
-        rmse_when_left_out=_numbers(without.rmse(without.after)),
-        rmse_with_all=_numbers(finding.held_out.rmse(finding.held_out.after)),
+        rmse_before=numbers(alone.rmse(alone.before)),
+        rmse_alone=numbers(alone.rmse(alone.after)),
+        rmse_when_left_out=numbers(without.rmse(without.after)),
+        rmse_with_all=numbers(finding.held_out.rmse(finding.held_out.after)),
     )
 
 
-def _numbers(values: np.ndarray) -> tuple[float, ...]:
+def numbers(values: np.ndarray) -> tuple[float, ...]:
+    """Return (g,) values of equations as plain numbers."""
     return tuple(float(value) for value in values)
 
 
-def _quantity(one: Quantity) -> document.Parameter:
+def parameter(one: Quantity) -> document.Parameter:
+    """Return a quantity as the document has it."""
     ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
     return document.Parameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)

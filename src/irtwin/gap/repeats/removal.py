@@ -41,6 +41,11 @@ class Removed:
     gain: float
     t: float
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joint that it acts on; none for the whole robot."""
+        return () if self.disturbance.joint is None else (self.disturbance.joint,)
+
     def mean_square(self, runs: Sequence[str]) -> float:
         """Return its mean square over some runs, 0 where it shows in none."""
         seen = [self.parts[run] for run in runs if run in self.parts]
