@@ -140,11 +140,14 @@ def _left(because: str | None, where: str, differ: str) -> str:
 def _closes(one: Finding, count: int) -> str:
     """Say what the first of so many findings closes by itself."""
     what = "That" if count == 1 else "The first of these"
-    ends = " to ".join(map(wording.share, one.interval))
     of = "gap in" if one.of.startswith("the gap") else "mean square of"
-    return (
-        f" {what} closes {wording.part(one.share)} of the {of} {one.channel} on held-out runs (95 % interval {ends})."
-    )
+    share = f"{wording.part(one.share)} of the {of} {one.channel} on held-out runs"
+    return f" {what} closes {share} {within(one.interval)}."
+
+
+def within(interval: Sequence[float]) -> str:
+    """Say the interval of a share."""
+    return f"(95 % interval {' to '.join(map(wording.share, interval))})"
 
 
 def folded(count: int, channel: str, share: float) -> str:

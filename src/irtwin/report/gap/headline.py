@@ -49,6 +49,6 @@ def _words(name: str) -> str:
 def refused(diagnosis: Document) -> list[str]:
     """Return a line for each effect that was refused as a cause."""
     return [
-        f"refused: {one.effect.replace('_', ' ')}{f' on {listed(one.joints)}' if one.joints else ''}: {one.why}"
+        f"refused: {_words(one.effect)}{f' on {listed(one.joints)}' if one.joints else ''}: {one.why}"
         for one in diagnosis.refused or ()
     ]

@@ -23,7 +23,7 @@ from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
-from irtwin.report.gap.verdict import effect_name
+from irtwin.report.gap.verdict import effect_name, of_cause
 from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
@@ -114,18 +114,14 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
         "likely": row["confidence"] >= LIKELY,
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
-        "parameters": _of(cause, answers, "cause_parameters"),
+        "parameters": of_cause(cause, answers, "cause_parameters"),
         "evidence": [
             ("channel", row["channel"]),
-            *((one["name"], _said(one["value"], one["unit"])) for one in _of(cause, answers, "evidence")),
-            ("probability of rivals", _competitors(_of(cause, answers, "competitors"))),
-            ("runs", ", ".join(one["run_name"] for one in _of(cause, answers, "cause_runs"))),
+            *((one["name"], _said(one["value"], one["unit"])) for one in of_cause(cause, answers, "evidence")),
+            ("probability of rivals", _competitors(of_cause(cause, answers, "competitors"))),
+            ("runs", ", ".join(one["run_name"] for one in of_cause(cause, answers, "cause_runs"))),
         ],
     }
-
-
-def _of(cause: str, answers: Answers, question: str) -> list[Row]:
-    return [row for row in answers[question].rows if row["cause"] == cause]
 
 
 def _competitors(rows: Sequence[Row]) -> str:

@@ -36,7 +36,7 @@ def told(answers: Answers) -> list[Finding]:
 
 def matters(cause: str, answers: Answers) -> bool:
     """Return whether a cause (its IRI) is of a finding that matters."""
-    of = {one["finding"] for one in answers["finding_members"].rows if one["cause"] == cause}
+    of = {one["finding"] for one in of_cause(cause, answers, "finding_members")}
     return any(row["matters"] for row in answers["findings"].rows if row["finding"] in of)
 
 
@@ -85,7 +85,7 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
 
 def closes(share: float, interval: Sequence[float] | None) -> str:
     """Say how much of a gap closes."""
-    within = "" if interval is None else f" (95 % interval {' to '.join(map(wording.share, interval))})"
+    within = "" if interval is None else f" {findings.within(interval)}"
     return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
 
 
@@ -95,14 +95,19 @@ def effect_name(row: Row, variable: str = "effect") -> str:
     return str(label or wording.local_name(row[variable]).replace("_", " "))
 
 
+def of_cause(cause: str, answers: Answers, question: str) -> list[Row]:
+    """Return what a question answers of a cause (its IRI)."""
+    return [row for row in answers[question].rows if row["cause"] == cause]
+
+
 def joints_of(cause: str, answers: Answers) -> list[str]:
     """Return the joints of a cause (its IRI), none for the whole robot."""
-    return [row["joint"] for row in answers["cause_joints"].rows if row["cause"] == cause]
+    return [row["joint"] for row in of_cause(cause, answers, "cause_joints")]
 
 
 def rivals_of(cause: str, answers: Answers) -> list[str]:
     """Return the effects that the data do not tell from a cause (its IRI), with their probabilities if known."""
-    return [_rival(row) for row in answers["rivals"].rows if row["cause"] == cause]
+    return [_rival(row) for row in of_cause(cause, answers, "rivals")]
 
 
 def _rival(row: Row) -> str:
