@@ -15,6 +15,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.friction import TemperatureDependentFriction
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.document.curves import Curves
 from irtwin.gap.document.document import Document, schema
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
@@ -90,6 +91,9 @@ def test_a_missing_friction_is_named_with_its_joint():
     assert "stribeck_friction" in (cause.effect, *cause.rivals)
     assert cause.joints == ("joint_2",)
     assert cause.scope == "missing"
+    friction = diagnosis.curves.friction
+    assert [one.joint for one in friction] == list(ROBOT.joint_names)  # nothing changed: one side
+    assert "Fs" in {one.name for one in friction[1].numbers}
     shrink = diagnosis.to_json()["shrink"]
     assert shrink["closed_fraction"]["value"] > 0.8
     assert shrink["torque_rmse"]["after"] < shrink["torque_rmse"]["before"]
@@ -104,6 +108,12 @@ def test_a_change_is_named_beside_the_reference_runs():
     (parameter,) = diagnosis.to_json()["causes"][0]["parameters"]
     assert parameter["value"] == pytest.approx(3.0, rel=0.1)
     assert parameter["interval95"][0] < 3.0 < parameter["interval95"][1]
+    sides = [one for one in diagnosis.curves.friction if one.joint == "joint_1"]
+    assert [one.role for one in sides] == ["reference", "observed"]
+    before, after = (number.value for one in sides for number in one.numbers if number.name == "Fv")
+    assert after - before == pytest.approx(3.0, rel=0.1)
+    assert [one.joint for one in diagnosis.curves.friction][1:] == list(ROBOT.joint_names)  # one side of the others
+    assert Curves.from_json(json.loads(json.dumps(diagnosis.evidence))) == diagnosis.curves
 
 
 def test_oil_that_thins_otherwise_than_before_is_a_change_which_the_twin_takes():

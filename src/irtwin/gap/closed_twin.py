@@ -1,4 +1,4 @@
-"""The gap closed: the twin with the causes added."""
+"""The gap closed: the twin with the causes added, and the friction that it has in the joints."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import CHANGED, place_of
 from irtwin.identification.progress import Tell
+from irtwin.twin.friction_curve import FrictionCurve, friction_curves
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 
@@ -35,3 +36,25 @@ def closed_twin(case: Case, causes: Sequence[Cause], tell: Tell | None = None) -
     robot, motions = case.given
     used = [motion for run, motion in motions.items() if run in case.observed or not changed]
     return identify(robot, used, [*case.effects, *added], case.prior, tell)
+
+
+def friction(case: Case, causes: Sequence[Cause], closed: Twin, tell: Tell | None = None) -> tuple[FrictionCurve, ...]:
+    """Return the friction of each joint by the closed twin; before it, where it changed, as the other runs show it.
+
+    `tell` is told how far that has come, where it takes long.
+    """
+    robot, motions = case.given
+    found = friction_curves(closed, [motions[run] for run in closed.fitted], "observed")
+    changed = {
+        joint
+        for cause in causes
+        if cause.scope == CHANGED and cause.variants[0].effect.family == "friction"
+        for joint in cause.touched(robot)
+    }
+    if not changed:
+        return found
+    assert case.against is not None
+    others = {run: motion for run, motion in motions.items() if run not in case.observed}
+    former = identify(robot, list(others.values()), case.effects, case.prior, tell)
+    before = friction_curves(former, [others[run] for run in former.fitted], case.against)
+    return (*(one for one in before if one.joint in changed), *found)

@@ -15,7 +15,7 @@ from irtwin.effects.local import LocalEffect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
-from irtwin.gap.closed_twin import closed_twin
+from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
@@ -273,7 +273,12 @@ def diagnose(
         seed=seed,
         experiment=None if proposal is None else proposal.experiment,
         planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
-        curves=drawn(left, located, None if proposal is None else proposal.curve),
+        curves=drawn(
+            left,
+            located,
+            None if proposal is None else proposal.curve,
+            friction(case, causes, identified, tell),
+        ),
         twin=replace(identified, torque_scale=scale),
         energies=energies,
         not_repeating=tuple(differ),

@@ -7,6 +7,7 @@ from typing import Any
 
 from irtwin.gap.document import form
 from irtwin.gap.document.document import Channel
+from irtwin.twin.friction_curve import FrictionCurve
 
 Numbers = tuple[float | None, ...]
 
@@ -63,12 +64,17 @@ class PlannedMotion:
 
 @dataclass(frozen=True, kw_only=True)
 class Curves:
-    """All that is drawn; no map where no torque was measured."""
+    """All that is drawn; no map where no torque was measured.
+
+    `friction`: of each joint by the twin with its causes, and of those whose friction changed as it was before; None
+    where it is not known.
+    """
 
     follows: tuple[Followed, ...]
     runs: tuple[RunError, ...]
     heat_map: ExcessMap | None = None
     experiment: PlannedMotion | None
+    friction: tuple[FrictionCurve, ...] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the curves as JSON."""

@@ -11,12 +11,18 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.localisation.channel_residuals import ChannelResidual, cause_curves, unnamed_curves
 from irtwin.gap.localisation.excess_map import heat_map
 from irtwin.gap.localisation.locations import Location
+from irtwin.twin.friction_curve import FrictionCurve
 
 _UNNAMED = 3  # places that no cause explains, drawn
 
 
-def drawn(left: Sequence[ChannelResidual], located: Sequence[Location], planned: PlannedMotion | None) -> Curves:
-    """Return what a page draws of what the twin left of each channel, of where that lies, and of what is planned."""
+def drawn(
+    left: Sequence[ChannelResidual],
+    located: Sequence[Location],
+    planned: PlannedMotion | None,
+    friction: tuple[FrictionCurve, ...],
+) -> Curves:
+    """Return what a page draws: of what the twin left of each channel, where that lies, what is planned, friction."""
     maps = [
         heat_map([joint for joint in one.finding.places if joint is not None], one.seen, one.level)
         for one in left
@@ -27,6 +33,7 @@ def drawn(left: Sequence[ChannelResidual], located: Sequence[Location], planned:
         runs=tuple(line for one in left for line in _per_run(one.finding)),
         heat_map=next(iter(maps), None),
         experiment=planned,
+        friction=friction or None,
     )
 
 
