@@ -62,9 +62,26 @@ def evidence(verdict: str) -> dict[str, Any]:
         for joint in ("joint_a3", None)
     ]
     found = {"heat_map": _heat_map(3.0), "follows": [curve], "runs": judged}
+    if verdict == "attributed":
+        found |= {"friction": [_friction("joint_a3", "reference", 1.0), _friction("joint_a1", "observed", 2.0)]}
+        found["friction"].append(_friction("joint_a3", "observed", 1.5))
     time = [0.5 * step for step in range(100)]
     move = {"time": time, "joints": ["joint_a3"], "units": ["rad"], "q": [[math.sin(value) for value in time]]}
     return found | {"experiment": move if verdict == "ambiguous" else None}
+
+
+def _friction(joint: str, role: str, size: float) -> dict[str, Any]:
+    torque = [-size, 0.0, size]
+    side = {"speed": [-1.0, 0.0, 1.0], "torque": torque, "low": [t - 0.1 for t in torque]}
+    side["high"] = [t + 0.2 for t in torque]
+    number = {"effect": "coulomb_friction", "name": "Fc", "value": size, "unit": "N m"}
+    numbers = [number | {"lower": size - 0.123, "upper": size + 0.123}]
+    points = side | {"torque": [t + 0.05 for t in torque]} if role == "observed" else None
+    return (
+        {"joint": joint, "role": role, "speed_unit": "rad/s", "unit": "N m", "numbers": numbers}
+        | side
+        | {"measured": points}
+    )
 
 
 def _gap(verdict: str) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from irtwin.providers.records import identifier, robot_iri
 from irtwin.report import wording
 from irtwin.report.energy.page import content_policy, figure_scripts, page_data
 from irtwin.report.gap import figures as gap_figures
+from irtwin.report.gap import friction as gap_friction
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
@@ -39,7 +40,8 @@ def render_gap(
 ) -> None:
     """Write the gap report of a robot (its IRI) to `out`.
 
-    Numbers and sentences come from the questions in `reports/gap`, curves from the evidence file that the graph names.
+    Numbers and sentences come from the questions in `reports/gap`, curves from the evidence file that the graph names,
+    with friction's numbers.
     `resources` are the questions and templates to take, those that ship if None.
     Raises InputError where the graph has no diagnosis of the robot.
     """
@@ -71,6 +73,8 @@ def render_alone(
 def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
     follows = gap_figures.foremost_curves(curves.follows, answers)
     drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
+    friction = gap_friction.figures(curves.friction or ())
+    effect_names = gap_figures.effect_names(answers)
     found = gap_verdict.told(answers)
     scripts = figure_scripts()
     return written(
@@ -89,10 +93,13 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
         hidden_curves=len(curves.follows) - len(follows),
         kinds=NOT_REPEATING,
         places=_places(answers["locations"].rows),
-        effect_names=gap_figures.effect_names(answers),
+        effect_names=effect_names,
+        friction=list(friction),
+        friction_numbers=gap_friction.table(curves.friction or (), effect_names),
+        former_role=next((one.role for one in curves.friction or () if one.role != "observed"), None),
         experiment=experiment(answers),
         drawn=drawn,
-        data=page_data(drawn),
+        data=page_data(drawn | {f"friction_{k}": one for k, one in enumerate(friction.values())}),
         style=style(resources),
         scripts=scripts.html,
         policy=content_policy(scripts.scripts),

@@ -1,0 +1,84 @@
+"""Friction of each joint on the gap page: a small figure a joint, and a table of the numbers that people know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from irtwin.report import wording
+from irtwin.report.colours import MEASURED, MODELLED, PALETTE
+from irtwin.report.energy.figures import Figure, plain
+from irtwin.report.energy.tables import Cell, Line, is_unsure
+from irtwin.twin.friction_curve import FrictionCurve
+
+_BANDED = "33"  # how opaque a band is, in hexadecimal
+
+
+def figures(curves: Sequence[FrictionCurve]) -> dict[str, Figure]:
+    """Return a figure of each joint's friction, on one side or on two, by the joint's name."""
+    joints = dict.fromkeys(curve.joint for curve in reversed(curves))  # the sides that follow hold all of them
+    return {joint: _figure([one for one in curves if one.joint == joint]) for joint in reversed(joints)}
+
+
+def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[Line, ...]:
+    """Return a line for each number of friction and side, with a cell a joint; `names`: of effects, by their ids."""
+    cells: dict[tuple[str, str, str, str], dict[str, Cell]] = {}
+    for curve in curves:
+        for one in curve.numbers:
+            value, interval = wording.interval(one.value, one.lower, one.upper)
+            cell = Cell(value, interval, is_unsure(one.value, one.lower, one.upper))
+            cells.setdefault((one.effect, one.name, one.unit, curve.role), {})[curve.joint] = cell
+    effects = list(dict.fromkeys(effect for effect, *_ in cells))
+    several = len({curve.role for curve in curves}) > 1
+    found = []
+    for key in sorted(cells, key=lambda key: (effects.index(key[0]), key[1])):
+        effect, name, unit, role = key
+        label = names.get(effect, effect.replace("_", " "))
+        found.append(Line(f"{label}, {role}" if several else label, name, unit, cells[key]))
+    return tuple(found)
+
+
+def _figure(sides: Sequence[FrictionCurve]) -> Figure:
+    *former, now = sides
+    data = [trace for side in former for trace in _side(side, PALETTE[0], PALETTE[0])]
+    data += _side(now, MODELLED, MODELLED if former else MEASURED)
+    layout = {
+        "title": {"text": plain(now.joint), "font": {"size": 13}, "x": 0, "xref": "paper", "y": 0.97},
+        "xaxis": {"type": "linear", "title": {"text": f"speed, {now.speed_unit}"}, "zeroline": True},
+        "yaxis": {"title": {"text": f"friction, {now.unit}"}, "zeroline": True},
+        "showlegend": bool(former),
+        "legend": {"x": 0, "y": 1, "xanchor": "left", "yanchor": "top", "traceorder": "normal"},  # no friction is there
+        "hovermode": "closest",
+    }
+    return {"data": data, "layout": layout}
+
+
+def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[dict[str, Any]]:
+    """Return the traces of one side: the band, the curve in it, and what was measured."""
+    x = list(curve.speed)
+    at = f"%{{y:.3~g}} {curve.unit} at %{{x:.3~g}} {curve.speed_unit}<extra></extra>"
+    edge = {
+        "type": "scatter", "mode": "lines", "x": x, "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False,
+    }  # fmt: skip
+    traces: list[dict[str, Any]] = [
+        {**edge, "y": list(curve.low)},
+        {**edge, "y": list(curve.high), "fill": "tonexty", "fillcolor": colour + _BANDED},
+        {
+            "type": "scatter", "mode": "lines", "name": curve.role, "x": x, "y": list(curve.torque),
+            "line": {"color": colour, "width": 2}, "hovertemplate": f"twin {at}",
+        },
+    ]  # fmt: skip
+    if (points := curve.measured) is not None:
+        spread = {
+            "type": "data", "symmetric": False, "thickness": 1, "width": 0,
+            "array": [max(high - mean, 0.0) for high, mean in zip(points.high, points.torque, strict=True)],
+            "arrayminus": [max(mean - low, 0.0) for low, mean in zip(points.low, points.torque, strict=True)],
+        }  # fmt: skip
+        traces.append(
+            {
+                "type": "scatter", "mode": "markers", "x": list(points.speed), "y": list(points.torque),
+                "error_y": spread, "marker": {"color": of_points, "size": 5, "opacity": 0.8}, "showlegend": False,
+                "hovertemplate": f"measured {at}",
+            }
+        )  # fmt: skip
+    return traces
