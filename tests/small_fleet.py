@@ -252,6 +252,9 @@ def _runs() -> Iterator[Base]:
             )  # fmt: skip
 
 
+CUTOFF_WHY = {"Arm_A": "found: 10 times the bandwidth of the widest motion", "Arm_B": "stated"}
+
+
 def _twins() -> Iterator[Base]:
     conditions = {"Arm_A": 42.0, "Arm_B": 250.0, "Arm_C": 30.0}
     for robot, effects in EFFECTS.items():
@@ -259,7 +262,8 @@ def _twins() -> Iterator[Base]:
         yield _activity(made, robot, "identification", "2026-03-05 12:01")
         yield schema.Twin(
             twin_id=twin, robot_id=robot, created=_moment("2026-03-05 12:01"), file=f"twins/{twin}.json",
-            sha256=digest(f"twin of {robot}"), cutoff_hz=10.0, condition_number=conditions[robot],
+            sha256=digest(f"twin of {robot}"), cutoff_hz=10.0, cutoff_why=CUTOFF_WHY.get(robot),
+            condition_number=conditions[robot],
             base_parameter_count=11,
             split="by run", activity_id=made,
             torque_scale_uncertainty=0.1 if robot == "Arm_A" else None,
@@ -415,7 +419,8 @@ def _diagnosis(robot: str, verdict: str, error: float | None) -> Iterator[Base]:
     yield _activity(made, robot, "diagnosis", "2026-03-06 12:00")
     yield gap.GapDiagnosis(
         diagnosis_id=f"{robot}.d1", robot_id=robot, verdict=verdict, created=_moment("2026-03-06 12:00"),
-        energy_error_percent=error, noise_floor_from="repeats", file=f"diagnoses/{robot}.d1.json", sha256="2" * 64,
+        energy_error_percent=error, noise_floor_from="repeats", cutoff_hz=12.5, cutoff_why="stated",
+        file=f"diagnoses/{robot}.d1.json", sha256="2" * 64,
         evidence_file=f"diagnoses/{robot}.d1.evidence.json", evidence_sha256="3" * 64, activity_id=made,
     )  # fmt: skip
 

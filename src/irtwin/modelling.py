@@ -55,8 +55,8 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     """
     given = checked(data_set if isinstance(data_set, DataSet) else read_data_set(Path(data_set))).data_set
     own = own_runs(given.runs)
-    cutoff = cutoff_for(given.robot, own)
-    motions = [condition(run, given.robot, cutoff) for run in own]
+    cutoff = cutoff_for(given.robot, own, given.cutoff)
+    motions = [condition(run, given.robot, cutoff.hz) for run in own]
     twin = fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
     return replace(twin, torque_scale=torque_scale_of(twin, given, motions, ScaleOfTorque()))
 

@@ -8,6 +8,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -40,6 +41,7 @@ from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone
+from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
@@ -97,6 +99,7 @@ def diagnose(
     *,
     twin: Twin | Path | str | None = None,
     withhold: Sequence[str] = (),
+    cutoff: float | None = None,
     seed: int = 0,
     repair: bool = False,
     workspace: Path | str | None = None,
@@ -112,9 +115,10 @@ def diagnose(
 
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
     in their shapes, and its numbers as the prior. `withhold` takes effects out of the twin and leaves them in the
-    catalogue. With a `workspace` the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the
-    robot's. Files to write, each whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the
-    twin with the causes added, `motion_file` the motion of the next experiment, where one is designed.
+    catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is
+    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
+    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
+    motion of the next experiment, where one is designed.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
@@ -127,6 +131,9 @@ def diagnose(
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
+    if cutoff is not None:
+        signals = [run.signals for run in data_set.runs]
+        data_set = replace(data_set, cutoff=checked_cutoff(cutoff, signals, "cutoff"))
     if kept_in is not None and Workspace.is_there(kept_in, database):
         with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
             check_before(place)

@@ -115,11 +115,13 @@ def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
 def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_path):
     out, twin, page, workspace = (tmp_path / name for name in ("out.json", "twin.json", "out.html", "workspace"))
     options = ["--json", out, "--save-twin", twin, "--report", page, "--withhold", "viscous_friction"]
-    options += ["--save-motion", tmp_path / "next.csv"]
+    options += ["--save-motion", tmp_path / "next.csv", "--cutoff", "9.5"]
     done = irtwin("diagnose", small_data_set, *options, "--workspace", workspace)
     assert done.status == 0, done.err
     found = json.loads(out.read_text())
     assert "viscous_friction" in {cause["effect"] for cause in found["causes"]}
+    assert found["cutoff"] == {"hz": 9.5, "stated": True, "why": "stated"}
+    assert "Signals were low-pass filtered at 9.5 Hz (stated)." in done.out
     assert "viscous" in page.read_text()
     assert ("Play it" in done.err or f"Play {tmp_path}/next.csv" in done.err) == (tmp_path / "next.csv").exists()
     assert "next.csv" in done.err
@@ -131,6 +133,7 @@ def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_pat
     for joint in ("joint_1", "joint_2"):
         error = np.std(np.array(said[f"tau_{joint}"]) - np.array(measured[f"tau_{joint}"]))
         assert error < 0.2 * np.std(np.array(measured[f"tau_{joint}"]))
+    assert "9.5,stated" in irtwin("query", "cutoffs", "--workspace", workspace, "--format", "csv").out
     assert irtwin("query", "why_more_energy", "--workspace", workspace, "--format", "csv").out.count("\n") > 1
     adopted = irtwin("adopt", "Arm", "--workspace", workspace)
     assert adopted.status == 0, adopted.err
@@ -141,6 +144,23 @@ def test_an_unknown_effect_cannot_be_withheld(small_data_set, tmp_path):
     done = irtwin("diagnose", small_data_set, "--json", tmp_path / "out.json", "--withhold", "phlogiston")
     assert done.status == 2
     assert "phlogiston" in done.err
+    assert not (tmp_path / "out.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("cutoff", "said"),
+    [
+        ("0", "cutoff should be at least "),
+        ("-3", "cutoff should be at least "),
+        ("1e9", " Hz, half the slowest sampling rate, not 1e+09"),
+        ("nan", "nan is not a finite number"),
+        ("5 Hz", "'5 Hz' is not a valid number"),
+    ],
+)
+def test_a_cutoff_must_be_one_that_the_runs_allow(small_data_set, tmp_path, cutoff, said):
+    done = irtwin("diagnose", small_data_set, "--json", tmp_path / "out.json", "--cutoff", cutoff)
+    assert done.status == 2
+    assert said in done.err
     assert not (tmp_path / "out.json").exists()
 
 

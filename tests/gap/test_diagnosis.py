@@ -75,6 +75,12 @@ def test_no_gap_is_found_where_there_is_none(seed):
     assert diagnosis.floor.source == "repeats"
 
 
+def test_a_stated_cutoff_is_that_of_document_and_twin():
+    diagnosis = diagnose(replace(data_set(runs()), cutoff=7.25))
+    assert valid(diagnosis)["cutoff"] == {"hz": 7.25, "stated": True, "why": "stated"}
+    assert diagnosis.twin.cutoff == 7.25
+
+
 def test_what_two_runs_differ_by_in_the_mean_is_not_blamed_on_an_effect():
     apart = []
     for seed, pose, offset in ((0, -0.8, 2.0), (1, 0.8, -2.0)):  # a tilted base would differ by pose too

@@ -56,6 +56,16 @@ def wandering(count, memory, rng):
     return found / found.std()
 
 
+def test_all_motions_have_the_cutoff_that_is_stated_or_found():
+    found = repeated()
+    assert not found.cutoff.stated
+    stated = case_of(replace(data_set(list(found.runs)), cutoff=7.25), (), DEFAULT)
+    assert stated.cutoff.stated
+    for case in (found, stated):
+        assert {motion.cutoff for motion in case.motions.values()} == {case.cutoff.hz}
+    assert stated.cutoff.hz == 7.25 != found.cutoff.hz
+
+
 @pytest.mark.parametrize("frequency", [0.5, 2.9, 12.0, 30.0])
 def test_a_torque_that_swings_is_a_line_at_its_joint(frequency):
     case = repeated(lambda k, t: in_joint_2(3.0 * np.sin(2 * np.pi * frequency * t + 2.0 * k)))

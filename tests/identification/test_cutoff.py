@@ -11,6 +11,7 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import Run
 from irtwin.twin.identify import identify
 
@@ -30,7 +31,12 @@ def runs(step: float, count: int = 2) -> list[Run]:
 
 def test_a_fine_encoder_leaves_ten_times_the_band() -> None:
     fine = runs(1e-6)
-    assert cutoff_for(ROBOT, fine) == choose_cutoff(fine)
+    found = cutoff_for(ROBOT, fine, None)
+    assert found == Cutoff(choose_cutoff(fine), False, "found: 10 times the bandwidth of the widest motion")
+
+
+def test_a_stated_one_is_taken_as_it_is() -> None:
+    assert cutoff_for(ROBOT, runs(1e-6), 7.25) == Cutoff(7.25, True, "stated")
 
 
 def with_steps(run: Run) -> Run:
@@ -55,7 +61,7 @@ def of_others(robot: Robot, fitted: list[Run], judged: Run, cutoff: float) -> np
 @pytest.mark.slow
 def test_a_lower_cutoff_is_taken_where_it_tells_another_run_better() -> None:
     coarse = [with_steps(run) for run in runs(5e-4, 3)]
-    highest, found = choose_cutoff(coarse), cutoff_for(ROBOT, coarse)
+    highest, found = choose_cutoff(coarse), cutoff_for(ROBOT, coarse, None).hz
     assert found < highest / 2
     left = of_others(ROBOT, coarse[:2], coarse[2], found)
     assert np.all(left < of_others(ROBOT, coarse[:2], coarse[2], highest))
@@ -63,15 +69,19 @@ def test_a_lower_cutoff_is_taken_where_it_tells_another_run_better() -> None:
 
 def test_one_run_is_cut_in_halves() -> None:
     (coarse,) = (with_steps(run) for run in runs(5e-4, 1))
-    assert cutoff_for(ROBOT, [coarse]) < choose_cutoff([coarse])
+    highest, found = choose_cutoff([coarse]), cutoff_for(ROBOT, [coarse], None)
+    halved = round(np.log2(highest / found.hz))
+    times = {1: "once", 2: "twice"}.get(halved, f"{halved} times")
+    assert found.hz == highest / 2**halved < highest
+    assert found.why.endswith(f", {highest:.3g} Hz, halved {times}, as that tells held-out torque better")
 
 
 def test_without_torque_nothing_tells_it() -> None:
     silent = [replace(run, signals=replace(run.signals, torque=None)) for run in runs(5e-4)]
-    assert cutoff_for(ROBOT, silent) == choose_cutoff(silent)
+    assert cutoff_for(ROBOT, silent, None).hz == choose_cutoff(silent)
 
 
 def test_what_cannot_be_cut_in_two_keeps_ten_times_the_band() -> None:
     (run,) = runs(1e-6, 1)
     short = replace(run, signals=run.signals.rows(slice(40)))
-    assert cutoff_for(ROBOT, [short]) == choose_cutoff([short])
+    assert cutoff_for(ROBOT, [short], None).hz == choose_cutoff([short])

@@ -22,6 +22,7 @@ from irtwin.providers.motions import robot_motions
 from irtwin.providers.records import ingest, robot_iri, run_iri
 from irtwin.signals import conditioning
 from irtwin.signals.conditioning import choose_cutoff
+from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -32,6 +33,7 @@ from irtwin.twin.identify import identify
 ROBOT = with_constants(arm(2))
 NAME = ROBOT.name
 EFFECTS = ("rigid_body", "viscous_friction", "coulomb_friction")
+WHY = "found: by the band"
 
 
 def slow_and_fast() -> tuple[Run, ...]:
@@ -54,7 +56,9 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
 @pytest.fixture(autouse=True)
 def by_band(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose the cutoff by the band of the motion alone: what is held out is `tests/identification/test_cutoff.py`."""
-    monkeypatch.setattr(motions, "cutoff_for", lambda robot, runs: choose_cutoff(runs))
+    monkeypatch.setattr(
+        motions, "cutoff_for", lambda robot, runs, stated: Cutoff(stated or choose_cutoff(runs), False, WHY)
+    )
 
 
 def data_set(*more: Run) -> DataSet:
@@ -100,6 +104,7 @@ def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     with workspace.reading() as session:
         twin = session.scalars(select(schema.Twin)).one()
     document = workspace.read_document(twin.file, twin.sha256).decode()
+    assert twin.cutoff_why == WHY
     assert twin.cutoff_hz == from_json(document, Path("twin.json")).cutoff == choose_cutoff(RUNS)
 
 
@@ -143,6 +148,14 @@ def test_another_data_set_of_the_robot_is_conditioned_anew(workspace: Workspace)
     after = robot_motions(workspace, NAME)
     assert after.motions[f"{NAME}.{RUNS[0].name}"].payload_mass == 2.0
     assert np.array_equal(after.motions[f"{NAME}.{RUNS[1].name}"].q, before.motions[f"{NAME}.{RUNS[1].name}"].q)
+
+
+def test_a_cutoff_that_a_data_set_states_is_that_of_all_motions(workspace: Workspace) -> None:
+    before = robot_motions(workspace, NAME)
+    ingest(workspace, replace(data_set(), cutoff=7.25))
+    after = robot_motions(workspace, NAME)
+    assert before.cutoff.hz != after.cutoff.hz == 7.25
+    assert {motion.cutoff for motion in after.motions.values()} == {7.25}
 
 
 def test_nothing_is_kept_of_a_workspace_that_is_gone(tmp_path: Path) -> None:

@@ -84,6 +84,12 @@ def test_a_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path: Path) -> None
     assert (written["lower"], written["upper"]) == (friction.lower, friction.upper)
 
 
+def test_a_twin_says_a_cutoff_that_was_stated(tmp_path: Path) -> None:
+    row, _, document = weighed(tmp_path, cutoff=7.25)
+    assert row.cutoff_hz == document["cutoff"] == 7.25
+    assert row.cutoff_why == "stated"
+
+
 def test_a_simulators_torque_has_a_scale_that_is_exact(tmp_path: Path) -> None:
     row, parameters, _ = weighed(tmp_path, simulated=True)
     assert row.torque_scale_uncertainty == 0.0

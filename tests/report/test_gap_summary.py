@@ -19,6 +19,12 @@ def test_the_gap_stands_before_and_after_with_its_unit():
     assert rows[0]["after"] == pytest.approx(change.after, rel=0.01)
 
 
+def test_the_filter_is_said_where_it_is_known():
+    (said,) = summary.filtered(gap_cases.document("attributed"))
+    assert said == "Signals were low-pass filtered at 9.79 Hz (found: 10 times the bandwidth of the widest motion)."
+    assert summary.filtered(gap_cases.document("ambiguous")) == []
+
+
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
     rows = summary.causes(gap_cases.document("attributed")).rows
     assert [(row["cause"], row["joints"], row["sure, %"]) for row in rows if row["cause"]] == [

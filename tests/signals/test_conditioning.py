@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
-from irtwin.signals.conditioning import choose_cutoff, condition, differentiate
+from irtwin.signals.conditioning import choose_cutoff, condition, cutoff_of_motion, differentiate
 
 ROBOT = arm(3)
 
@@ -59,6 +59,13 @@ def test_jitter_of_sampling_is_evened_out(jitter, seed):
     assert np.ptp(np.diff(found.time)) < 1e-9
     expected = np.column_stack([np.interp(found.time, motion.time, column) for column in motion.dq.T])
     assert relative(found.dq[100:-100], expected[100:-100]) < 0.02
+
+
+def test_what_decided_the_cutoff_is_said():
+    slow = as_run(swing(ROBOT, 3, seconds=20.0))
+    coarse = replace(slow, signals=slow.signals.rows(slice(None, None, 20)))  # at 5 Hz
+    for run, why in ((slow, "10 times the bandwidth of the widest motion"), (coarse, "0.8 of the Nyquist frequency")):
+        assert cutoff_of_motion([run]) == (choose_cutoff([run]), why)
 
 
 def test_cutoff_follows_the_band_of_the_motion_and_not_its_noise():

@@ -106,6 +106,13 @@ def test_a_data_set_is_understood(folder):
     assert one.signals.temperature is None
 
 
+def test_a_cutoff_may_be_stated(folder: Path) -> None:
+    assert read_data_set(folder).cutoff is None
+    with (folder / "dataset.toml").open("a") as file:
+        file.write("[twin]\ncutoff = 30\n")
+    assert read_data_set(folder).cutoff == 30.0
+
+
 def test_parquet_and_csv_say_the_same(tmp_path):
     signals = columns()
     table = pa.table(
@@ -267,6 +274,20 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
             '[twin]\neffect = ["rigid_body"]\n[robot]',
             r"\[twin\] effect is no key .*; did you mean effects\?",
         ),
+        ("[robot]", "twin = 5\n[robot]", r"dataset\.toml: \[twin\] should be a table"),
+        (
+            "[robot]",
+            '[twin]\ncutoff = "5 Hz"\n[robot]',
+            r"dataset\.toml: \[twin\] cutoff should be a number, not '5 Hz'",
+        ),
+        ("[robot]", "[twin]\ncutoff = nan\n[robot]", r"dataset\.toml: \[twin\] cutoff should be a number, not nan"),
+        (
+            "[robot]",
+            "[twin]\ncutoff = 0\n[robot]",
+            r"dataset\.toml: \[twin\] cutoff should be at least 20.4 Hz, .*, not 0",
+        ),
+        ("[robot]", "[twin]\ncutoff = 1e9\n[robot]", r"cutoff should be .* below 50 Hz, half .* rate, not 1e\+09"),
+        ("[robot]", "[twin]\ncut_off = 30\n[robot]", r"\[twin\] cut_off is no key .*; did you mean cutoff\?"),
         ("[robot]", "[twins]\n[robot]", "dataset.toml: twins is no key .*; did you mean twin\\?"),
     ],
 )

@@ -53,6 +53,7 @@ def test_the_keys_of_a_live_stream_are_those_of_the_code() -> None:
         (r"### `\[robot\]`", log.ROBOT_KEYS),
         (r"### `\[robot\.joint\.NAME\]`", log.SHEET_KEYS),
         (r"### `\[\[run\]\]`", log.RUN_KEYS),
+        (r"### `\[twin\]`", log.TWIN_KEYS),
         (r"### `\[robot\.dh\]`", dh_table.DH_KEYS),
         (r"### `\[\[robot\.dh\.row\]\]`", dh_table.ROW_KEYS),
     ],

@@ -39,6 +39,7 @@ from irtwin.storage.revisions.versions import (
     r0008_times_of_runs,
     r0009_no_consumption,
     r0010_log_odds,
+    r0011_cutoff,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -85,11 +86,12 @@ def digest() -> str:
 AFTER_0_1 = {  # columns that revisions have added
     "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles", "started", "ended"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
-    "gap_diagnosis": ("unexplained_because",),
+    "robot": ("cutoff_hz",),
+    "gap_diagnosis": ("unexplained_because", "cutoff_hz", "cutoff_why"),
     "gap_cause": ("gain", "log_odds"),
     "gap_cause_competitor": ("probability",),
     "activity_use": ("relation",),
-    "twin": ("torque_scale_uncertainty", "torque_scale_why"),
+    "twin": ("torque_scale_uncertainty", "torque_scale_why", "cutoff_why"),
     "parameter": ("scaled_lower", "scaled_upper"),
     "base_parameter": ("scaled_lower", "scaled_upper"),
 }
@@ -152,6 +154,7 @@ def test_each_revision_follows_another() -> None:
     assert r0008_times_of_runs.down_revision == r0007_scale_of_torque.revision
     assert r0009_no_consumption.down_revision == r0008_times_of_runs.revision
     assert r0010_log_odds.down_revision == r0009_no_consumption.revision
+    assert r0011_cutoff.down_revision == r0010_log_odds.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:

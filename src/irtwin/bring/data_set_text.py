@@ -66,6 +66,7 @@ def data_set_text(
         "",
         "# [twin]",
         _line("effects", list(BASELINE), "what the twin models; without it, these", False),
+        _line("cutoff", 10.0, "Hz, of the low-pass filter that all runs pass; without it, found", False),
         "",
         "# [topics]  # for runs that are ROS bags in which several topics would do",
         _line("joint_states", "/joint_states", "the topic of the joint states", False),

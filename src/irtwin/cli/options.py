@@ -17,6 +17,8 @@ _WORKSPACE = Path("irtwin-workspace")
 class Number(click.FloatRange):
     """A finite number; a plain range lets NaN pass."""
 
+    name = "number"
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number; fail where it is none, or not finite."""
         number = super().convert(value, param, ctx)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from irtwin.cli.options import (
+    Number,
     announce,
     base_option,
     database_option,
@@ -164,6 +165,12 @@ def case_study(workspace: Path) -> None:
     help="Twin that --save-twin wrote, to hold the data against: its effects are the baseline, its numbers the prior.",
 )
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
+@click.option(
+    "--cutoff",
+    type=Number(),
+    metavar="HZ",
+    help="Cutoff of the low-pass filter that all runs pass. Default: that of dataset.toml, else it is found.",
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Also store the diagnosis there.")
@@ -177,6 +184,7 @@ def diagnose(
     save_motion: Path | None,
     twin: Path | None,
     withhold: tuple[str, ...],
+    cutoff: float | None,
     seed: int,
     repair: bool,
     workspace: Path | None,
@@ -197,6 +205,7 @@ def diagnose(
         dataset,
         twin=twin,
         withhold=withhold,
+        cutoff=cutoff,
         seed=seed,
         repair=repair,
         workspace=workspace,
@@ -209,7 +218,7 @@ def diagnose(
         announce=announce,
     )
     click.echo(line(found.document, found.against))
-    for said in refused(found.document):
+    for said in (*refused(found.document), *summary.filtered(found.document)):
         click.echo(said)
     for table in (summary.gap(found.document), summary.causes(found.document)):
         if table:

@@ -57,6 +57,7 @@ from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.two_processes import begun
 from irtwin.robot.description import Robot
+from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 from irtwin.twin.torque_scale import TorqueScale
@@ -92,6 +93,7 @@ class Diagnosis:
     yardstick: dict[str, Closeable] = field(default_factory=dict)  # each channel's, what could be closed at all
     refusals: Refusals = NOTHING_REFUSED
     scale: TorqueScale | None = None  # of torque, where it was measured
+    cutoff: Cutoff | None = None  # of the filter that all runs passed
 
     @property
     def verdict(self) -> str:
@@ -136,6 +138,7 @@ class Diagnosis:
             not_repeating=apart.listed(),
             refused=tuple(map(writing.refused, self.refusals.refused)) or None,
             torque_scale=None if self.scale is None else writing.torque_scale(self.scale),
+            cutoff=self.cutoff,
         )
 
     @property
@@ -288,6 +291,7 @@ def diagnose(
         yardstick={name: one.shares() for name, one in measures.items() if one is not None},
         refusals=refusals,
         scale=scale,
+        cutoff=case.cutoff,
     )
 
 

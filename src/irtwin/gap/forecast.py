@@ -81,7 +81,7 @@ def _sizes(data_set: DataSet, begun: Baseline) -> Sizes:
         columns = np.append(columns, base + len(tried))
     group = _group(data_set.runs)
     return Sizes(
-        _rows(data_set.runs, len(group), len(columns)),
+        _rows(data_set, len(group), len(columns)),
         columns + 1,
         group,
         base,
@@ -116,10 +116,10 @@ def _group(runs: Sequence[Run]) -> np.ndarray:
     return np.arange(blocks) * groups // blocks
 
 
-def _rows(runs: Sequence[Run], blocks: int, equations: int) -> np.ndarray:
+def _rows(data_set: DataSet, blocks: int, equations: int) -> np.ndarray:
     """Return how many rows a block leaves of each equation, (B, g), behind the filter."""
-    cutoff = choose_cutoff(runs)
-    left = sum(len(run.signals.time) / decimation(_rate(run), cutoff) for run in runs)
+    cutoff = data_set.cutoff or choose_cutoff(data_set.runs)
+    left = sum(len(run.signals.time) / decimation(_rate(run), cutoff) for run in data_set.runs)
     return np.full((blocks, equations), max(1, round(left / blocks)))
 
 

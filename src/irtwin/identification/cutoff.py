@@ -18,7 +18,8 @@ from irtwin.errors import InputError
 from irtwin.identification.fits import fit_torque
 from irtwin.identification.progress import Tell
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import choose_cutoff, condition
+from irtwin.signals.conditioning import condition, cutoff_of_motion
+from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
@@ -27,30 +28,43 @@ _FEWEST_PERIODS = 20  # of the cutoff in what is fitted, and in what is held out
 _BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, in the mean: less is chance
 
 
-def cutoff_for(robot: Robot, runs: Sequence[Run], tell: Tell | None = None) -> float:
-    """Return the cutoff, Hz, for runs that are to be treated alike.
+def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None, tell: Tell | None = None) -> Cutoff:
+    """Return the cutoff for runs that are to be treated alike: the one that is stated, Hz, as it is.
 
-    It is ten times the band of the motion (`choose_cutoff`), or that halved as long as the torque of what is held out
-    is told better so. Without torque nothing tells it. `tell` is told how far that has come, where it takes long.
+    Else it is ten times the band of the motion (`cutoff_of_motion`), or that halved as long as the torque of what is
+    held out is told better so. Without torque nothing tells it. `tell` is told how far that has come, where it takes
+    long.
     """
-    cutoff = choose_cutoff(runs)
+    if stated is not None:
+        return Cutoff(stated, stated=True, why="stated")
+    highest, why = cutoff_of_motion(runs)
+    halved = _halved(robot, runs, highest, tell)
+    if halved:
+        times = {1: "once", 2: "twice"}.get(halved, f"{halved} times")
+        why = f"{why}, {highest:.3g} Hz, halved {times}, as that tells held-out torque better"
+    return Cutoff(highest / 2**halved, stated=False, why=f"found: {why}")
+
+
+def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None) -> int:
+    """Return how often a cutoff, Hz, is halved."""
+    found = 0
     measured = [run for run in runs if run.signals.torque is not None]
     if not measured:
-        return cutoff
+        return found
     share = max(_MOST_SAMPLES // len(measured), 1)
     looked_at = [replace(run, signals=run.signals.rows(slice(share))) for run in measured]
-    halved = 1 if len(looked_at) > 1 else 2
-    seconds = min(float(run.signals.time[-1] - run.signals.time[0]) for run in looked_at) / halved
+    parts = 1 if len(looked_at) > 1 else 2
+    seconds = min(float(run.signals.time[-1] - run.signals.time[0]) for run in looked_at) / parts
     try:
         error = _held_out(robot, looked_at, cutoff, tell)
         while cutoff / 2 * seconds >= _FEWEST_PERIODS:
             lower = _held_out(robot, looked_at, cutoff / 2, tell)
             if lower > error + np.log(1 - _BETTER):
                 break
-            cutoff, error = cutoff / 2, lower
+            cutoff, error, found = cutoff / 2, lower, found + 1
     except InputError:  # too short or too still to be cut in two: the fit of all of it says what is wrong, if anything
         pass
-    return cutoff
+    return found
 
 
 def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None) -> float:

@@ -98,7 +98,7 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     known = robot_motions(workspace, robot_id)
     parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
-    made = twin_made(workspace, robot_id, identify(known.robot, parts.fit, twin.effects), known.keys, parts)
+    made = twin_made(workspace, robot_id, identify(known.robot, parts.fit, twin.effects), known, parts)
     used = [*made.used, f"gap_diagnosis/{found.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")
@@ -179,6 +179,8 @@ def _row(
         created=datetime.now(UTC),
         energy_error_percent=said.gap.energy_error_percent,
         noise_floor_from=said.shrink.noise_floor_from,
+        cutoff_hz=said.cutoff and said.cutoff.hz,
+        cutoff_why=said.cutoff and said.cutoff.why,
         torque_scale_uncertainty=said.torque_scale and said.torque_scale.uncertainty95,
         torque_scale_why=said.torque_scale and said.torque_scale.why,
         file=files[".json"],

@@ -15,7 +15,7 @@ from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
-from irtwin.providers.motions import robot_motions
+from irtwin.providers.motions import RobotMotions, robot_motions
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs, stored_data_set
 from irtwin.signals.motion import Motion
@@ -37,11 +37,12 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
         effects = session.get_one(schema.Robot, robot_id).twin_effects
     parts = split(known.own, known.repeats)
     twin = identify(known.robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
-    return twin_made(workspace, robot_id, twin, known.keys, parts)
+    return twin_made(workspace, robot_id, twin, known, parts)
 
 
-def twin_made(workspace: Workspace, robot_id: str, twin: Twin, keys: dict[str, str], parts: Split) -> Made:
-    """Return the rows and the file of a robot's twin; `keys`: name of a run -> its run_id."""
+def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotions, parts: Split) -> Made:
+    """Return the rows and the file of a robot's twin, which was fitted to `parts` of the known motions."""
+    keys = known.keys
     said = stored_data_set(workspace, robot_id, twin.robot)
     twin = replace(twin, torque_scale=torque_scale_of(twin, said, parts.fit, ScaleOfTorque()))
     document = to_json(twin).encode()
@@ -54,6 +55,7 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, keys: dict[str, s
         file=f"{TWINS}/{twin_id}.json",
         sha256=checksum,
         cutoff_hz=twin.cutoff,
+        cutoff_why=known.cutoff.why,
         condition_number=twin.condition_number,
         base_parameter_count=body_combinations(twin),
         split=parts.rule,

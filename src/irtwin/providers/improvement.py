@@ -210,7 +210,7 @@ def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
 
 
 def _made(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:
-    made = twin_made(workspace, robot_id, twin, known.keys, parts)
+    made = twin_made(workspace, robot_id, twin, known, parts)
     return next(row.twin_id for row in made.rows if isinstance(row, schema.Twin)), made
 
 

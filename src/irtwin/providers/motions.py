@@ -12,6 +12,7 @@ from irtwin.identification.cutoff import cutoff_for
 from irtwin.providers.records import load_robot, load_run
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition
+from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import own_runs
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -25,13 +26,14 @@ class RobotMotions:
     """A robot's motions by run_id, in the order in which they began: what was measured, neither plans nor live runs.
 
     `own` are those that its twin is of: a simulator's stay apart where the robot's own are there. `repeats`: name of a
-    run -> name of the run whose programmed motion it repeats.
+    run -> name of the run whose programmed motion it repeats. `cutoff`: that of all.
     """
 
     robot: Robot
     motions: Mapping[str, Motion]
     own: tuple[Motion, ...]
     repeats: dict[str, str]
+    cutoff: Cutoff
 
     @property
     def keys(self) -> dict[str, str]:
@@ -60,19 +62,21 @@ def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
     robot = load_robot(workspace, robot_id)
     in_order = select(schema.Run.run_id).order_by(schema.Run.start_time, schema.Run.run_id)
     with workspace.reading() as session:
+        stated = session.get_one(schema.Robot, robot_id).cutoff_hz
         run_ids = session.scalars(
             in_order.where(schema.Run.robot_id == robot_id, schema.Run.kind == MEASURED_RUN)
         ).all()
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     own = own_runs(list(runs.values()))
-    cutoff = cutoff_for(robot, own)
-    motions = {run_id: condition(run, robot, cutoff) for run_id, run in runs.items()}
+    cutoff = cutoff_for(robot, own, stated)
+    motions = {run_id: condition(run, robot, cutoff.hz) for run_id, run in runs.items()}
     own_names = {run.name for run in own}
     return RobotMotions(
         robot=robot,
         motions=motions,
         own=tuple(motion for motion in motions.values() if motion.run in own_names),
         repeats={run.name: run.repeat_of for run in runs.values() if run.repeat_of is not None},
+        cutoff=cutoff,
     )
 
 

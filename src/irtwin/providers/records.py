@@ -266,6 +266,7 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
         simulated=row.simulated,
         notes=notes,
         torque_scale_uncertainty=notes.get("torque_scale_uncertainty"),
+        cutoff=row.cutoff_hz,
     )
 
 
@@ -401,6 +402,7 @@ def _robot_row(robot_id: str, data_set: log.DataSet) -> Robot:
         urdf=robot.urdf,
         urdf_sha256=hashlib.sha256(robot.urdf.encode()).hexdigest(),
         twin_effects=None if data_set.effects is None else ",".join(data_set.effects),
+        cutoff_hz=data_set.cutoff,
         notes=json.dumps(dict(data_set.notes), default=str, sort_keys=True),
     )
 

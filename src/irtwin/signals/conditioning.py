@@ -11,7 +11,7 @@ from scipy.interpolate import make_interp_spline
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import REQUIRED
-from irtwin.signals.filter import low_pass
+from irtwin.signals.filter import FEWEST_PERIODS, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import FEWEST
@@ -20,7 +20,6 @@ from irtwin.signals.sampling import holes, interval
 _BAND_SHARE = 0.99  # of the speed's power lies below the band of the motion
 _BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the motion
 _ABOVE_NOISE = 3.0  # times the mean noise: what stands out is motion
-_FEWEST_PERIODS = 10  # of the cutoff in a run
 _NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is chosen
 _STATES = ("q", "dq", "ddq")
 _STATES_WIDER = 3.0  # what is below the cutoff then passes unchanged
@@ -95,6 +94,11 @@ def choose_cutoff(runs: Iterable[Run]) -> float:
     motion and its accelerations as they are and takes away the noise above; at most 0.8 of the Nyquist frequency.
     Of several runs the one of the widest band decides.
     """
+    return cutoff_of_motion(runs)[0]
+
+
+def cutoff_of_motion(runs: Iterable[Run]) -> tuple[float, str]:
+    """Return the cutoff (Hz) as `choose_cutoff` does, and what decided it, in words."""
     return max(_cutoff(run) for run in runs)
 
 
@@ -118,7 +122,7 @@ def _even_time(run: Run) -> np.ndarray:
     return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / interval(time)) + 1)
 
 
-def _cutoff(run: Run) -> float:
+def _cutoff(run: Run) -> tuple[float, str]:
     time, q = run.signals.time, run.signals.q
     even = _even_time(run)
     rate = 1 / (even[1] - even[0])
@@ -131,8 +135,10 @@ def _cutoff(run: Run) -> float:
     power = np.maximum(power - _ABOVE_NOISE * noise * gain, 0.0).sum(axis=1)
     share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
     band = frequency[min(int(np.searchsorted(share, _BAND_SHARE)), len(frequency) - 1)]
-    highest = _NYQUIST_SHARE * rate / 2
-    return float(min(max(_BAND_FACTOR * band, _FEWEST_PERIODS / (even[-1] - even[0])), highest))
+    wanted = float(max(_BAND_FACTOR * band, FEWEST_PERIODS / (even[-1] - even[0])))
+    highest = float(_NYQUIST_SHARE * rate / 2)
+    of_motion = wanted, f"{_BAND_FACTOR:g} times the bandwidth of the widest motion"
+    return min(of_motion, (highest, f"{_NYQUIST_SHARE:g} of the Nyquist frequency"))
 
 
 def _agreeing(logged: np.ndarray | None, derived: np.ndarray) -> np.ndarray:

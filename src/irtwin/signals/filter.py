@@ -10,6 +10,7 @@ import numpy as np
 from scipy.signal import oaconvolve
 
 _LOBES = 3  # of the sinc on either side: 1e-4 lost at a tenth of the cutoff, nothing left from twice it on
+FEWEST_PERIODS = 10  # of the cutoff in a run: the kernel spans six
 _OVERSAMPLING = 4  # samples kept per cutoff period after decimation
 _AT_ONCE = 16  # samples that are filtered and decimated as one product of matrices
 

@@ -13,6 +13,7 @@ from irtwin.input_file import checksum, real_path
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
+from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.dh_table import robot_of_table
 from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
@@ -33,7 +34,7 @@ ROBOT_KEYS = (
 RUN_KEYS = (
     "file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started", "product", "pieces", "cycles",
 )  # fmt: skip
-TWIN_KEYS = ("effects",)
+TWIN_KEYS = ("effects", "cutoff")
 _MOST_MADE = 10**9
 _EARLIEST, _LATEST = 1900, 2200  # years in which a run may have started
 
@@ -82,6 +83,7 @@ class DataSet:
     urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
     plans: tuple[Run, ...] = ()
     torque_scale_uncertainty: float | None = None  # share by which logged torque may be off, 95 %
+    cutoff: float | None = None  # Hz, of the filter that all runs pass; None: it is to be found
     sha256: Mapping[Path, str] = field(default_factory=dict)  # of `dataset.toml` and the URDF, as they were read
 
 
@@ -111,10 +113,8 @@ def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
     Table(file, "", document).check_keys(DATA_SET_KEYS)
     urdf = table.path("urdf", folder) if "urdf" in table.values else None
-    twin = document.get("twin", {})
-    if isinstance(twin, dict):
-        Table(file, "[twin]", twin).check_keys(TWIN_KEYS)
-    effects = twin.get("effects") if isinstance(twin, dict) else None
+    twin = _optional(file, document, "twin", TWIN_KEYS)
+    effects = twin.values.get("effects")
     if effects is not None and not (isinstance(effects, list) and all(isinstance(e, str) for e in effects)):
         raise InputError(f"{file}: [twin] effects should be a list of effect ids")
     return DataSet(
@@ -132,6 +132,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
         plans=tuple(run for run in listed if run.role == PLANNED),
         torque_scale_uncertainty=_torque_scale(table),
         sha256={path: checksum(path) for path in (file, urdf) if path is not None},
+        cutoff=_cutoff(twin, runs),
     )
 
 
@@ -346,12 +347,23 @@ def _torque_scale(table: Table) -> float | None:
 
 def _topics(file: Path, document: Mapping[str, Any], robot: Robot) -> dict[str, str]:
     """Return what [topics] says: the topic of the joint states, and of columns that these do not carry."""
-    values = document.get("topics", {})
+    table = _optional(file, document, "topics", ("joint_states", *number_topics(robot)))
+    return {key: table.text(key) or "" for key in table.values}
+
+
+def _optional(file: Path, document: Mapping[str, Any], name: str, keys: Sequence[str]) -> Table:
+    values = document.get(name, {})
     if not isinstance(values, dict):
-        raise InputError(f"{file}: [topics] should be a table")
-    table = Table(file, "[topics]", values)
-    table.check_keys(("joint_states", *number_topics(robot)))
-    return {key: table.text(key) or "" for key in values}
+        raise InputError(f"{file}: [{name}] should be a table")
+    table = Table(file, f"[{name}]", values)
+    table.check_keys(keys)
+    return table
+
+
+def _cutoff(table: Table, runs: Sequence[Run]) -> float | None:
+    cutoff = table.number("cutoff")
+    said = f"{table.file}: {table.name} cutoff"
+    return None if cutoff is None else checked_cutoff(cutoff, [run.signals for run in runs], said)
 
 
 def _piece(run: Run, number: int, signals: Signals) -> Run:

@@ -26,6 +26,8 @@ class GapDiagnosis(Base):
     created: Mapped[datetime]
     energy_error_percent: Mapped[float | None]  # before anything is added
     noise_floor_from: Mapped[str | None]  # "repeats" or "out_of_band"
+    cutoff_hz: Mapped[float | None]  # of the zero-phase filter
+    cutoff_why: Mapped[str | None]  # in words: stated, or how it was found
     torque_scale_uncertainty: Mapped[float | None]  # a share, half a 95 % interval
     torque_scale_why: Mapped[str | None]  # in words
     file: Mapped[str]

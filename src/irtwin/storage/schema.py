@@ -78,6 +78,7 @@ class Robot(Base):
     urdf: Mapped[str]
     urdf_sha256: Mapped[str]
     twin_effects: Mapped[str | None]  # comma separated: what the data set says that its twin models
+    cutoff_hz: Mapped[float | None]  # of the filter, where the data set states it
     notes: Mapped[str]  # JSON: what the data set says beside the contract; for the graph in `robot_note`
 
 
@@ -265,6 +266,7 @@ class Twin(Base):
     file: Mapped[str]
     sha256: Mapped[str]
     cutoff_hz: Mapped[float | None]  # of the zero-phase filter
+    cutoff_why: Mapped[str | None]  # in words: stated, or how it was found
     condition_number: Mapped[float | None]  # of the scaled base regressor
     base_parameter_count: Mapped[int | None]
     split: Mapped[str]  # in words: which data were fitted, which held out

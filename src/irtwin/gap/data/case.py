@@ -24,6 +24,7 @@ from irtwin.identification.progress import Tell
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition_for_fit
+from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
@@ -37,7 +38,7 @@ class Case:
 
     `prior`: what is known of the twin's coefficients; None: what the catalogue expects; `stated`: what bounds the
     causes. `robot` has the torque constants that a balance of power told where nobody knew them, and `motions` the
-    torque that follows; `given` are the robot and the motions without.
+    torque that follows; `given` are the robot and the motions without. `cutoff` is that of all motions.
     """
 
     robot: Robot
@@ -48,6 +49,7 @@ class Case:
     thresholds: Thresholds
     prior: Prior | None = None
     stated: Stated = NOTHING_STATED
+    cutoff: Cutoff | None = None
 
     @cached_property
     def stack(self) -> Stack:
@@ -161,8 +163,8 @@ def case_of(
     `tell` is told how far that has come, where it takes long. Raises InputError where `baseline` and `admit` do.
     """
     begun = baseline(data_set, withhold, thresholds.given_twin, twin)
-    cutoff = cutoff_for(begun.robot, data_set.runs, tell)
-    given = {run.name: condition_for_fit(run, begun.robot, cutoff) for run in data_set.runs}
+    cutoff = cutoff_for(begun.robot, data_set.runs, data_set.cutoff, tell)
+    given = {run.name: condition_for_fit(run, begun.robot, cutoff.hz) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
     admit(data_set, motions, thresholds.admission)
     case = Case(
@@ -174,6 +176,7 @@ def case_of(
         thresholds,
         begun.prior,
         _stated(data_set),
+        cutoff,
     )
     return case.with_friction_near_zero(tell)
 

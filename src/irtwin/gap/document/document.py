@@ -13,6 +13,7 @@ from irtwin.errors import InputError
 from irtwin.gap.document import form
 from irtwin.gap.document.experiment import Experiment
 from irtwin.gap.document.form import Between, OneOf, goes_with
+from irtwin.signals.cutoff import Cutoff
 
 Share = Annotated[float, Between(0, 1)]
 Interval = tuple[float, float]  # 95 %
@@ -313,6 +314,7 @@ class Document:
     not_repeating: tuple[NotRepeating, ...] | None = None  # none where nothing is repeated, or nothing differs
     refused: tuple[Refused, ...] | None = None
     torque_scale: TorqueScale | None = None
+    cutoff: Cutoff | None = None  # of the filter that all runs passed
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

@@ -32,6 +32,12 @@ def gap(diagnosis: Document) -> Table:
     return Table(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
 
 
+def filtered(diagnosis: Document) -> list[str]:
+    """Return a line on the filter that all runs passed; none where nobody said it."""
+    cutoff = diagnosis.cutoff
+    return [f"Signals were low-pass filtered at {cutoff.hz:.{_DIGITS}g} Hz ({cutoff.why})."] if cutoff else []
+
+
 def causes(diagnosis: Document) -> Table:
     """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals."""
     columns = ("cause", "joints", "sure, %", "parameter", "value", "95 % from", "to", "unit")
