@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
@@ -16,7 +17,6 @@ from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import noise_before, twin_values
 from irtwin.gap.screening.contact import contact
-from irtwin.gap.screening.payloads import untold_payload
 from irtwin.gap.screening.remainder import remainders
 from irtwin.gap.screening.together import each_beside_the_other
 from irtwin.gap.thresholds import DEFAULT
@@ -27,7 +27,7 @@ FORCE = np.array([3.0, -4.0, 4.0])
 
 
 def screened(loaded, touched, still=()):
-    """What is found of payload and contact each by itself, and each beside the other: the runs of both."""
+    """What is tried of payloads and contacts, and in which runs."""
     motions = []
     for seed in range(8):
         motion = replace(swing(ROBOT, seed, seconds=6.0, rate=50.0), run=f"run_{seed}")
@@ -45,23 +45,22 @@ def screened(loaded, touched, still=()):
     system = torque_system(stack, motions, grouping, (), None)
     noise = noise_before(system)
     left = remainders(case, stack, twin_values(system, system.solution((), summed(system.moments(noise)))))
-    alone = contact(ROBOT, left, noise, DEFAULT.contact), untold_payload(ROBOT, system, noise, DEFAULT.some_payload, 0)
-    both = each_beside_the_other(case, stack, system, noise, alone, 0)
-    return [[one and one.runs for one in pair] for pair in (alone, both)]
+    return [
+        (type(one), one.runs) for one in each_beside_the_other(case, stack, system, noise, contact(ROBOT, left, noise))
+    ]
 
 
-def test_a_contact_is_found_beside_a_payload_that_hides_it():
-    alone, both = screened(loaded=(1, 4, 5), touched=(1, 2, 6))
-    assert alone[0] != ("run_1", "run_2", "run_6")
-    assert both == [("run_1", "run_2", "run_6"), ("run_1", "run_4", "run_5")]
+def of_runs(kind, runs):
+    return kind, tuple(f"run_{k}" for k in runs)
 
 
-def test_neither_makes_the_other():
-    for loaded, touched in (((1, 4, 5), ()), ((), (1, 2, 6))):
-        _, both = screened(loaded, touched)
-        assert both == [tuple(f"run_{k}" for k in runs) or None for runs in (touched, loaded)]
+@pytest.mark.parametrize("still", [(), (0,)])
+def test_a_contact_and_a_payload_that_hide_each_other_are_both_tried(still):
+    tried = screened(loaded=(1, 4, 5), touched=(1, 2, 6), still=still)
+    assert of_runs(ExternalContact, (1, 2, 6)) in tried
+    assert of_runs(Payload, (1, 4, 5)) in tried
 
 
-def test_a_joint_that_never_moves_hides_neither():
-    _, both = screened(loaded=(1, 4, 5), touched=(1, 2, 6), still=(0,))
-    assert both == [("run_1", "run_2", "run_6"), ("run_1", "run_4", "run_5")]
+def test_each_is_tried_where_it_is_alone():
+    assert of_runs(Payload, (1, 4, 5)) in screened(loaded=(1, 4, 5), touched=())
+    assert of_runs(ExternalContact, (1, 2, 6)) in screened(loaded=(), touched=(1, 2, 6))

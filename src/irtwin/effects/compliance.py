@@ -190,7 +190,6 @@ class _Compliance(JointEffect):
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
-    rare: ClassVar[bool] = True
 
     def _places(self, robot: Robot) -> list[int]:
         return [robot.index(joint.name) for joint in self.acting(robot)]

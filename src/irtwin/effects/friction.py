@@ -239,7 +239,6 @@ class TemperatureDependentFriction(JointEffect):
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
     manual_test: ClassVar[str | None] = "log joint temperatures, from a cold start"
     channel: ClassVar[str] = "torque"
-    rare: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
 
     k: float = 0.02  # 1/K

@@ -205,7 +205,6 @@ class ExternalContact(Effect):
     manual_test: ClassVar[str | None] = "the same motion with free space around the arm"
     taken_off: ClassVar[str | None] = "in free space"
     channel: ClassVar[str] = "torque"
-    found_among: ClassVar[int] = 128  # starts, stops and runs, as many as tell anything apart
 
     start: float = -np.inf  # s
     stop: float = np.inf  # s

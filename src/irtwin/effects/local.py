@@ -23,12 +23,15 @@ _ENDS = tuple(share / 20 for share in range(12, 20))  # of that way: where a spr
 class LocalEffect(JointEffect):
     """An effect by position and direction alone, at a place q0 that the data tell before it is tried.
 
-    A grid of places at every joint is too many for the search: `gap.screening.local` finds the place where there is
-    one.
+    A grid of places at every joint is too many for the search: `gap.screening.local` finds that which explains most.
     """
 
-    found_among: ClassVar[int] = 128
     q0: float = 0.0  # rad or m
+
+    @property
+    def screened(self) -> bool:
+        """True: its place is screened for."""
+        return True
 
     @abstractmethod
     def law(self, q: np.ndarray, signs: np.ndarray) -> np.ndarray:

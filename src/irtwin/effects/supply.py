@@ -70,7 +70,6 @@ class BusCapacitor(Effect):
     needs: ClassVar[str | None] = "power"
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
-    rare: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"E": (5.0, 500.0)}
 
     E: float = 50.0  # J
@@ -121,7 +120,6 @@ class NoRegeneration(Effect):
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "power"
     stage: ClassVar[int] = 2
-    rare: ClassVar[bool] = True
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return the share that is burnt: all of it, unless data say otherwise."""

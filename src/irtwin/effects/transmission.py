@@ -37,6 +37,11 @@ class TorqueRipple(JointEffect):
 
     N: float = 1.0  # per turn of the joint
 
+    @property
+    def screened(self) -> bool:
+        """Whether it is faster than the orders that are all tried."""
+        return max(SLOW_ORDERS) < self.N
+
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return slow orders, and once and twice per turn of a motor where the robot's gears are known."""
         gears = {joint.gear_ratio for joint in robot.joints if joint.gear_ratio} if robot else set()

@@ -335,7 +335,7 @@ def _torque(
 
     `before` gives the power that the twin takes by the joint torque `predicted`.
     """
-    found = screen(case, stack, plain, seed, tell)
+    found = screen(case, stack, plain, tell)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
             below(motion)

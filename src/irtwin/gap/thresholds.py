@@ -119,71 +119,6 @@ class SameRobot:
 
 
 @dataclass(frozen=True)
-class Contact:
-    """A force at the flange for a while."""
-
-    fewest_joints: int = _threshold(3, "of fewer joints, hardly any agree on a force", "joints", _JUDGEMENT)
-    longest: float = _threshold(0.7, "a longer force is no episode", "share of the run", _JUDGEMENT)
-    alpha: float = _threshold(
-        0.05, "largest p of the whole search, to be tried, and of the same window in one more run", _P, _CASES
-    )
-    decay: float = _threshold(1.1, "decay of chance's gains beyond their median", "upper quartiles, in logs", _CASES)
-    least_decay: float = _threshold(0.25, "that decay at least", "logs", _CASES)
-    steady: float = _threshold(
-        0.5, "a force over the whole run explains no more of the window's gain", "share of the gain", _CASES
-    )
-    agreeing: float = _threshold(
-        0.5, "the first run's force explains so much of what a run's own does", "share of the gain", _CASES
-    )
-    harm: float = _threshold(0.1, "the force may spoil so much in other joints", "share of the gain", _CASES)
-    quiet: float = _threshold(
-        0.1, "runs that gain less at the same time tell what chance reaches", "share of the gain", _CASES
-    )
-
-
-@dataclass(frozen=True)
-class SomePayload:
-    """A payload in some of the runs."""
-
-    fewest_runs: int = _threshold(4, "fewer observed runs cannot be parted", "runs", _JUDGEMENT)
-    least_gain: float = _threshold(0.03, "least that it explains on joints left out", _RESIDUAL, _CASES)
-    alpha: float = _threshold(0.01, "largest p under random signs of groups", _P, _CASES)
-
-
-@dataclass(frozen=True)
-class Ripples:
-    """Torque ripples."""
-
-    least_periods: float = _threshold(
-        1.0, "a joint moves through so many of a ripple's periods", "1", "decisions/gap-whole-periods.md"
-    )
-    least_share: float = _threshold(
-        0.04, "least that a line of the spectrum explains, to be tried", _RESIDUAL, "decisions/gap-fast-ripples.md"
-    )
-
-
-@dataclass(frozen=True)
-class Local:
-    """Worn spots, and springs near the end of a joint's way."""
-
-    alpha: float = _threshold(
-        0.01, "largest p of a place, for all joints and shapes, to be tried", _P, "decisions/gap-local-effects.md"
-    )
-    least_t: float = _threshold(
-        2.3,
-        "least t, between stretches of time, of the shape that is tried",
-        _ERRORS,
-        "decisions/gap-local-effects.md",
-    )
-    least_share: float = _threshold(
-        0.04,
-        "least that it explains of what smooth friction leaves, to be tried",
-        _RESIDUAL,
-        "decisions/gap-local-effects.md",
-    )
-
-
-@dataclass(frozen=True)
 class Criterion:
     """How likely a structure of effects is: see `docs/how-it-decides.md`."""
 
@@ -322,10 +257,6 @@ class Thresholds:
     repeats: Repeats = Repeats()
     not_repeating: NotRepeating = NotRepeating()
     same_robot: SameRobot = field(default_factory=SameRobot)
-    contact: Contact = Contact()
-    some_payload: SomePayload = SomePayload()
-    ripples: Ripples = Ripples()
-    local: Local = Local()
     criterion: Criterion = Criterion()
     power_consistency: PowerConsistency = PowerConsistency()
     scale_of_torque: ScaleOfTorque = ScaleOfTorque()

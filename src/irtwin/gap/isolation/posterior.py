@@ -27,6 +27,7 @@ from irtwin.gap.thresholds import Criterion
 
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
 _SIZES = (1.0, 0.3, 0.1, 0.03)  # of an effect, in units of what is expected
+_SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,10 @@ class Prior:
 
 @dataclass(frozen=True)
 class Posterior:
-    """H hypotheses beside a structure; `owner` (V,): whose each variant of the `evidence` is; `misfit` (V,): RMS."""
+    """H hypotheses beside a structure; V variants of the `evidence`, each of its `owner`, with `prior` and `misfit`.
+
+    `prior` (V,): log odds of each; `misfit` (V,): RMS.
+    """
 
     hypotheses: tuple[Hypothesis, ...]
     owner: np.ndarray
@@ -77,8 +81,9 @@ class Posterior:
         chosen = [k for _, variant in found for k in variant.columns]
         known = [one for one, _ in found]
         log_prior = [
-            prior.log_odds(one, known) - np.log(len(one.variants) * one.variants[0].effect.found_among)
+            prior.log_odds(one, known) - np.log(len(one.variants) * (_SCREENED if shape.effect.screened else 1))
             for one in candidates
+            for shape in one.variants
         ]
         seen = evidence(system, moments, chosen, variants)
         own = np.sqrt(_where_it_explains(system, misfit, seen))
@@ -94,7 +99,7 @@ class Posterior:
     def log_odds(self) -> np.ndarray:
         """(H,) log odds that a hypothesis is true beside the structure, against that nothing more is."""
         by_shape = self._by_shape
-        return np.asarray(self.prior + np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes]))
+        return np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes])
 
     @cached_property
     def shape(self) -> np.ndarray:
@@ -103,11 +108,11 @@ class Posterior:
 
     @cached_property
     def _by_shape(self) -> np.ndarray:
-        """(V,) log evidence of each variant against nothing, without the prior."""
+        """(V,) log odds of each variant against nothing."""
         gains = zip(self.evidence.gain, self.variance, self.evidence.information, strict=True)
         return np.array(
             [
-                self._explaining(gain, variance, len(information)) - self._size(k, variance)
+                self.prior[k] + self._explaining(gain, variance, len(information)) - self._size(k, variance)
                 for k, (gain, variance, information) in enumerate(gains)
             ]
         )
@@ -143,7 +148,7 @@ class Posterior:
 
         size = [self._size(int(k), variance) for k in shape]
         behind = seen.explained[best] - seen.explained[shape]
-        return self.prior[list(near)] - size + left(behind), float(left(seen.explained[best]))
+        return self.prior[shape] - size + left(behind), float(left(seen.explained[best]))
 
     def _explaining(self, gain: np.ndarray | float, variance: float, count: int) -> np.ndarray | float:
         certainty = self.limits.certainty

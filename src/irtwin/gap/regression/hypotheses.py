@@ -35,12 +35,6 @@ class Hypothesis:
     variants: tuple[Variant, ...]
 
     @property
-    def flexibility(self) -> float:
-        """How much it could fit: its coefficients, and the choice among its shapes in bits, screening's too."""
-        shapes = len(self.variants) * self.variants[0].effect.found_among
-        return max(len(variant.columns) for variant in self.variants) + float(np.log2(shapes))
-
-    @property
     def of_bodies(self) -> bool:
         """Whether it is the robot's bodies that differ."""
         return self.variants[0].effect.bodies

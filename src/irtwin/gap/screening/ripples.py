@@ -17,8 +17,8 @@ _TURN = 4096  # parts of a turn by which angles are told apart: ten a period at 
 _FINE = 4  # points of the spectrum for each that is independent
 
 
-def known_ripples(robot: Robot, left: Sequence[Remainder], least_periods: float) -> list[Effect]:
-    """Return the ripples of known orders, each at the joints that move through so many of its periods in observed runs.
+def known_ripples(robot: Robot, left: Sequence[Remainder]) -> list[Effect]:
+    """Return the ripples of known orders, each at the joints that move through one of its periods in observed runs.
 
     Within less than a period a ripple is any curve over the angle: also that of a hose, which stiffens.
     """
@@ -27,16 +27,14 @@ def known_ripples(robot: Robot, left: Sequence[Remainder], least_periods: float)
     found = []
     for ripple in TorqueRipple().candidates(robot):
         periods = turns * ripple.shape["N"]
-        joints = tuple(name for name, many in zip(robot.joint_names, periods, strict=True) if many >= least_periods)
+        joints = tuple(name for name, many in zip(robot.joint_names, periods, strict=True) if many >= 1)
         if joints:
             found.append(ripple.on(*joints))
     return found
 
 
-def fast_ripples(
-    robot: Robot, left: Sequence[Remainder], least_share: float, tell: Tell | None = None
-) -> list[TorqueRipple]:
-    """Return a ripple for each joint whose residual in observed runs has a clear line beyond the slow orders.
+def fast_ripples(robot: Robot, left: Sequence[Remainder], tell: Tell | None = None) -> list[TorqueRipple]:
+    """Return for each joint the ripple beyond the slow orders that explains most of its residual in observed runs.
 
     Slow orders are tried one by one; of the fast ones there are too many, and a line is told from its neighbours only
     as finely as the joint turns far. `tell` is told how far that has come, where it takes long.
@@ -47,25 +45,24 @@ def fast_ripples(
         parts = [(one.motion.q[:, joint], one.residual[:, joint]) for one in left if one.observed]
         angle, residual = (np.concatenate([part[k] for part in parts] or [np.zeros(0)]) for k in range(2))
         kept = np.isfinite(residual)
-        order = _clearest(angle[kept], residual[kept], least_share)
+        order = _clearest(angle[kept], residual[kept])
         if order is not None:
             found.append(TorqueRipple(N=order, joints=(name,)))
     return found
 
 
-def _clearest(angle: np.ndarray, residual: np.ndarray, least_share: float) -> float | None:
-    """Return the order, a turn, of the strongest line among fast ones; None where it explains too little.
+def _clearest(angle: np.ndarray, residual: np.ndarray) -> float | None:
+    """Return the order, a turn, of the strongest line among fast ones; None where there is none.
 
     Sums over parts of a turn take the place of the samples, so that a Fourier transform gives all orders at once.
     """
-    square = float(residual @ residual)
-    if square == 0.0:
+    if not residual.any():
         return None
     part = np.floor((angle - angle.min()) / (2 * np.pi) * _TURN).astype(int)
     sums = np.bincount(part, residual)
     length = _TURN * _FINE * max(1, -(-len(sums) // _TURN))
     orders = np.fft.rfftfreq(length, 1 / _TURN)
-    explained = 2 * np.abs(np.fft.rfft(sums, length)) ** 2 / (len(residual) * square)
-    lines, _ = find_peaks(explained, height=least_share)
+    height = np.abs(np.fft.rfft(sums, length))
+    lines, _ = find_peaks(height)
     fast = [k for k in lines if max(SLOW_ORDERS) < orders[k] <= TorqueRipple.ranges["N"][1]]
-    return float(orders[max(fast, key=lambda k: explained[k])]) if fast else None
+    return float(orders[max(fast, key=lambda k: height[k])]) if fast else None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
@@ -18,59 +17,50 @@ from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
-from irtwin.gap.screening.payloads import untold_payload
 from irtwin.gap.screening.remainder import remainders
 from irtwin.gap.screening.ripples import fast_ripples, known_ripples
-from irtwin.gap.screening.together import Both, each_beside_the_other
+from irtwin.gap.screening.together import each_beside_the_other
 from irtwin.identification.progress import Tell, paced
 from irtwin.identification.two_processes import begun
 
 
 @dataclass(frozen=True)
 class Screened:
-    """Ripples and local effects at their joints, and a contact and a payload in some runs (None: none stands out).
+    """Ripples and local effects at their joints; contacts, and payloads in some runs, beside all that is tried anyway.
 
     `waited` gives these two: contacts are searched for beside other work.
     """
 
-    waited: Callable[[], Both] = lambda: (None, None)
-    ripples: tuple[Effect, ...] = ()
-    local: tuple[LocalEffect, ...] = ()
-
-    @cached_property
-    def both(self) -> Both:
-        """Contact and payload."""
-        return self.waited()
+    waited: Callable[[], tuple[Effect, ...]]
+    placed: tuple[Effect, ...]
 
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects to try with those found: screened ones in their place only, payloads in some runs too."""
-        contact, payload = self.both
-        placed = (LocalEffect, TorqueRipple, *([ExternalContact] if contact else []))
-        found = [one for one in effects if not isinstance(one, placed)]
-        return [*found, *(one for one in (contact, payload) if one), *self.ripples, *self.local]
+        """Return the effects to try: those that a screening places, in that place only."""
+        loads = self.waited()
+        touched = any(isinstance(one, ExternalContact) for one in loads)
+        placed = (LocalEffect, TorqueRipple, *([ExternalContact] if touched else []))
+        return [*(one for one in effects if not isinstance(one, placed)), *loads, *self.placed]
 
 
-def screen(case: Case, stack: Stack, system: System, seed: int, tell: Tell | None = None) -> Screened:
+def screen(case: Case, stack: Stack, system: System, tell: Tell | None = None) -> Screened:
     """Search the runs' torque; system: its equations, with the terms of the twin at least.
 
     `tell` is told how far that has come, where it takes long.
     """
-    noise, limits = noise_before(system), case.thresholds
+    noise = noise_before(system)
     values = twin_values(system, system.solution((), summed(system.moments(noise))))
     left = remainders(case, stack, values, tell=tell)
-    in_contact = begun(lambda: contact(case.robot, left, noise, limits.contact, tell), worth=case.long)
+    in_contact = begun(lambda: contact(case.robot, left, noise, tell), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
-    payload = untold_payload(case.robot, system, noise, limits.some_payload, seed, tell)
-    known_orders = known_ripples(case.robot, left, limits.ripples.least_periods)
-    ripples = (*known_orders, *fast_ripples(case.robot, left, limits.ripples.least_share, tell))
-    local = tuple(local_effects(case.robot, known, left, limits.local, seed, tell))
+    ripples = (*known_ripples(case.robot, left), *fast_ripples(case.robot, left, tell))
+    local = local_effects(case.robot, known, left, tell)
 
-    def both() -> Both:
+    def loads() -> tuple[Effect, ...]:
         told = paced(tell)
         touch = in_contact(lambda: told("  waiting for what shows contacts"))
-        return each_beside_the_other(case, stack, system, noise, (touch, payload), seed, tell)
+        return each_beside_the_other(case, stack, system, noise, touch, tell)
 
-    return Screened(both, ripples, local)
+    return Screened(loads, (*ripples, *local))
 
 
 def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, float] | None] | None:

@@ -2,7 +2,7 @@
 
 A payload that the twin lacks hides a contact, as what it leaves of its runs looks like contacts all the time; and a
 contact in a run speaks for a payload there. So the two are looked for in turn: contacts in what twin and payload leave,
-payloads in what lies apart from the contact.
+payloads in what lies apart from the contact. All that comes is tried.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from irtwin.effects.effect import Effect
 from irtwin.effects.load import ExternalContact, Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
@@ -20,31 +21,32 @@ from irtwin.gap.screening.payloads import beside, untold_payload
 from irtwin.gap.screening.remainder import Remainder, remainders
 from irtwin.identification.progress import Tell
 
-_TURNS = 4  # the second mostly says what the first one did
-
-Both = tuple[ExternalContact | None, Payload | None]
+_TURNS = 2
 
 
 def each_beside_the_other(
-    case: Case, stack: Stack, system: System, noise: np.ndarray, found: Both, seed: int, tell: Tell | None = None
-) -> Both:
-    """Return contact and payload, each told beside the other; `found`: each by itself.
+    case: Case,
+    stack: Stack,
+    system: System,
+    noise: np.ndarray,
+    touch: ExternalContact | None,
+    tell: Tell | None = None,
+) -> tuple[Effect, ...]:
+    """Return the contacts and payloads to try: each by itself, and beside the other; `touch`: the contact by itself.
 
     system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m. `tell` is
     told how far that has come, where it takes long.
     """
-    touch, payload = found
+    found: dict[Effect | None, None] = {touch: None, untold_payload(case.robot, system, noise, tell): None}
     for _ in range(_TURNS):
         apart = _apart_from(system, touch)
-        if touch is not None:
-            payload = untold_payload(case.robot, apart, noise, case.thresholds.some_payload, seed, tell)
+        payload = untold_payload(case.robot, apart, noise, tell)
         left = None if payload is None else _beside(case, stack, apart, noise, payload, tell)
         if left is None:
             break
-        before, touch = touch, contact(case.robot, left, _rms(left, noise), case.thresholds.contact, tell)
-        if before == touch:
-            break
-    return touch, payload
+        touch = contact(case.robot, left, _rms(left, noise), tell)
+        found |= {payload: None, touch: None}
+    return tuple(one for one in found if one is not None)
 
 
 def _apart_from(system: System, touch: ExternalContact | None) -> System:
