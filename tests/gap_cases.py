@@ -144,9 +144,6 @@ def _cause(effect: str, confidence: float, share: float, rivals: list[str], scop
             "gain": 0.83,
             "log_odds": 6.4,
             "probability_of_rivals": {rival: 0.99 - confidence for rival in rivals} | {"backlash": 0.012},
-            "power_says": "mechanical",
-            "gain_in_power_if_mechanical": 0.21,
-            "t_in_power_between_groups": 3.9,
         },
     }
 

@@ -40,6 +40,7 @@ from irtwin.storage.revisions.versions import (
     r0009_no_consumption,
     r0010_log_odds,
     r0011_cutoff,
+    r0012_one_criterion,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -96,7 +97,10 @@ AFTER_0_1 = {  # columns that revisions have added
     "base_parameter": ("scaled_lower", "scaled_upper"),
 }
 OF_0_1 = {  # columns that revisions have dropped, and whether they may be empty
-    "gap_cause": {"gain_on_groups_left_out": False, "t_between_groups": False, "p_adjusted": False},
+    "gap_cause": {
+        **{"gain_on_groups_left_out": False, "t_between_groups": False, "p_adjusted": False},
+        **dict.fromkeys(r0012_one_criterion.APART, True),
+    },
     "gap_cause_competitor": {"gain": True, "correlation": True},
 }
 

@@ -36,7 +36,6 @@ from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
 from irtwin.gap.isolation.finding import Finding, Without, find
 from irtwin.gap.isolation.floor_left import floor_left
-from irtwin.gap.isolation.power_evidence import power_balances
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
@@ -209,9 +208,6 @@ def diagnose(
             case, stack, plain, floor, loaded, predicted, before, frozenset(unknown), seed, tell
         )
         torque = ExplainedTorque(stack, found, loaded)
-        if case.shows("power"):
-            found = replace(found, power_balances=power_balances(case, power_stack, torque))
-            torque = ExplainedTorque(stack, found, loaded)
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None

@@ -144,16 +144,6 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class PowerConsistency:
-    """When power decides between mechanics and the torque sensor."""
-
-    least_gain: float = _threshold(
-        0.03, "least change of power's residual, in logs", "share of its mean square", _CASES
-    )
-    least_t: float = _threshold(2.5, "least t of that change", _ERRORS, _CASES)
-
-
-@dataclass(frozen=True)
 class ScaleOfTorque:
     """How far logged torque may be off on all joints alike; half a 95 % interval each."""
 
@@ -258,7 +248,6 @@ class Thresholds:
     not_repeating: NotRepeating = NotRepeating()
     same_robot: SameRobot = field(default_factory=SameRobot)
     criterion: Criterion = Criterion()
-    power_consistency: PowerConsistency = PowerConsistency()
     scale_of_torque: ScaleOfTorque = ScaleOfTorque()
     detectability: Detectability = Detectability()
     verdict: Verdict = Verdict()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -166,25 +165,9 @@ def _evidence(finding: Finding, one: Cause) -> document.Evidence:
         gain=one.gain,
         log_odds=one.log_odds,
         probability_of_rivals={rival: chance for rival, chance in one.rivals.items() if chance >= _TOLD},
-        **_balance(finding, one),
         runs=runs,
         window=window,
     )
-
-
-def _balance(finding: Finding, one: Cause) -> dict[str, Any]:
-    """Return what torque and power together say of a cause."""
-    if finding.name == "power":
-        electrical = all(variant.effect.channel == "power" for variant in one.variants)
-        return {"power_on_explained_torque_says": "electrical" if electrical else "meter"}
-    said = finding.balance(one)
-    if said is None:
-        return {}
-    return {
-        "power_says": said.kind or "undecided",
-        "gain_in_power_if_mechanical": said.gain,
-        "t_in_power_between_groups": said.t,
-    }
 
 
 def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | None) -> tuple[document.Parameter, ...]:

@@ -209,10 +209,6 @@ def _cause(said: Cause, rank: int, at: Place) -> Iterator[OfDiagnosis]:
         closed_where_it_acts=why.closed_where_it_acts,
         gain=why.gain,
         log_odds=why.log_odds,
-        power_on_explained_torque_says=why.power_on_explained_torque_says,
-        power_says=why.power_says,
-        gain_in_power=why.gain_in_power_if_mechanical,
-        t_in_power=why.t_in_power_between_groups,
         acts_from_s=start,
         acts_until_s=stop,
     )

@@ -237,10 +237,6 @@ class GapCause(OfCause):
     closed_where_it_acts: Mapped[float]  # share of the gap there, 0 to 1, that all causes close
     gain: Mapped[float]  # beside the other causes, in mean squares of what all leave; of old, on groups left out
     log_odds: Mapped[float | None]  # natural, against nothing in its place; none where it was judged before there were
-    power_on_explained_torque_says: Mapped[str | None]  # of a cause of power: "electrical" or "meter"
-    power_says: Mapped[str | None]  # of a cause of torque: "mechanical", "sensor" or "undecided"
-    gain_in_power: Mapped[float | None]  # if it is mechanical
-    t_in_power: Mapped[float | None]
     acts_from_s: Mapped[float | None]  # of the run's clock, where it acts for a while only
     acts_until_s: Mapped[float | None]
 

@@ -89,8 +89,6 @@ class Evidence:
 
     `gain`: what it explains beside the other causes, in mean squares of what all leave; `log_odds`, natural: that it is
     there beside the others, against that nothing is in its place. Rivals are the effects that could be, by id.
-    `power_says`: whether power takes what a cause adds to torque ("mechanical"), only the sensor shows it ("sensor"),
-    or neither is sure ("undecided"); `power_on_explained_torque_says`: of a cause of power, "electrical" or "meter".
     `runs` and `window` (s of the clock): where it acts in some runs, or for a while, only.
     """
 
@@ -100,10 +98,6 @@ class Evidence:
     gain: float
     log_odds: float
     probability_of_rivals: Mapping[str, Share]
-    power_on_explained_torque_says: str | None = None
-    power_says: str | None = None
-    gain_in_power_if_mechanical: float | None = None
-    t_in_power_between_groups: float | None = None
     runs: tuple[str, ...] | None = None
     window: Interval | None = field(default=None, metadata=goes_with("runs"))
 

@@ -14,7 +14,6 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.estimates import BesidePower, estimate_of
-from irtwin.gap.isolation.power_consistency import PowerBalance
 from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.isolation.structure_search import Attribution, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
@@ -34,9 +33,9 @@ class Finding:
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
     W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
-    each cause closes of the squares of each group left out and equation, (C, G, g); `power_balances`: what power says
-    of each; `part`: theirs of all that is closed, beside what does not repeat; `plain`: power's equation on the torque
-    of the twin as it is, where `system` stands on torque that causes explain; `beside`: power's, if both were fitted.
+    each cause closes of the squares of each group left out and equation, (C, G, g); `part`: theirs of all that is
+    closed, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where `system`
+    stands on torque that causes explain; `beside`: power's, if both were fitted.
     """
 
     name: str
@@ -48,7 +47,6 @@ class Finding:
     floor: np.ndarray | None
     estimate: Estimate
     closed_squares: np.ndarray
-    power_balances: tuple[PowerBalance, ...] = ()
     part: float = 1.0
     plain: System | None = None
     beside: BesidePower | None = None
@@ -75,10 +73,6 @@ class Finding:
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
         acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
         return closing(closed, acting, self.held_out, self.floor, self.attribution.noise)
-
-    def balance(self, cause: Cause) -> PowerBalance | None:
-        """Return what power says of a cause, None where it was not asked."""
-        return self.power_balances[self.causes.index(cause)] if self.power_balances else None
 
     @property
     def chosen(self) -> list[int]:
