@@ -13,7 +13,7 @@ STEPS = {
     "contacts": "contacts in",
     "windows": "windows of",
     "ripples": "ripples of",
-    "places of effects": "local wear of",
+    "places of effects": "places of",
     "trials": "hypotheses, beside",
     "judged": "how far the gap closes, group",
     "shares": "causes leave",
