@@ -132,6 +132,10 @@ def test_what_closes_nothing_is_no_gap_and_named_nowhere() -> None:
     assert said("no_gap") == "There is no gap: the twin explains the data down to the noise floor."
 
 
+def test_without_a_noise_floor_nobody_says_that_the_twin_reaches_it() -> None:
+    assert sentence("no_gap", [], "", None, has_floor=False).endswith(": the twin may leave more than noise.")
+
+
 def test_an_unexplained_gap_says_what_part_is_closed() -> None:
     told = said("unexplained", finding(), finding(**(LITTLE | {"share": -0.01})), where=" in the power")
     assert told.startswith(

@@ -85,12 +85,6 @@ class NotRepeating:
         "mean square of the larger of both",
         "decisions/gap-not-repeating.md",
     )
-    least_shared: float = _threshold(
-        1.5,
-        "least mean square of a drift that repeats share: what a twin cannot follow may drift alike in both",
-        "mean square of what the twin leaves, or of the sensor's noise",
-        "decisions/gap-not-repeating.md",
-    )
     least_noise: float = _threshold(1.0, "least RMS of a line or a switching", "RMS of the sensor's noise", _JUDGEMENT)
     periods: float = _threshold(3.0, "periods of a line in a run, at least", "periods", "the spectrum's resolution")
     highest: float = _threshold(0.95, "lines are looked for up to it", "share of the Nyquist frequency", "the sampling")
@@ -138,7 +132,7 @@ class Criterion:
         12.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
     )
     unknown: float = _threshold(
-        0.05, "an effect that the catalogue lacks looks like the cause", _P, "decisions/gap-criterion.md"
+        0.08, "an effect that the catalogue lacks looks like the cause", _P, "decisions/gap-criterion.md"
     )
     least_rival: float = _threshold(0.1, "an effect is named as a rival of a cause from it", _P, _JUDGEMENT)
 

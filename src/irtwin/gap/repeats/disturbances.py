@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,6 @@ from irtwin.effects.effect import Quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.data.noise_floor import sensor_noise
-from irtwin.gap.repeats.alike import Alike, OwnDrift
 from irtwin.gap.repeats.creep import creep
 from irtwin.gap.repeats.lines import Line, lines
 from irtwin.gap.repeats.series import Series
@@ -31,8 +30,6 @@ _NORMAL = 1.96
 
 Located = tuple[str, tuple[Quantity, ...], float, float, Any]
 """Kind, quantities, size, p and shape of a disturbance."""
-Drifts = Callable[[Sequence[Line]], list[OwnDrift]]
-"""What each run drifts by, beside lines."""
 
 
 @dataclass(frozen=True)
@@ -64,35 +61,21 @@ def disturbances(case: Case) -> list[Disturbance]:
     by_power = [pair for pair in pairs if pair.difference("power") is not None]
     tests = (len(case.robot.joints) if by_torque else 0) + (1 if by_power else 0)
     if by_torque:
-        own = _own(case, by_torque)
         raw = {name: _torque(case, runs[name], case.motions[name]) for pair in by_torque for name in _names(pair)}
         for joint, name in enumerate(case.robot.joint_names):
             series = [_of_joint(pair, raw, joint) for pair in by_torque]
             noise = 0.0 if torque_noise is None else float(torque_noise[joint])
             unit = "N" if case.robot.joints[joint].kind == "prismatic" else "N m"
-            found += _of("torque", name, unit, series, by_torque, noise, tests, limits, None, _drifts(own, joint))
+            found += _of("torque", name, unit, series, by_torque, noise, tests, limits, None)
     if by_power:
         series, load = _of_power(case, by_power, runs)
         noise = 0.0 if power_noise is None else float(power_noise[0])
-        found += _of("power", None, "W", series, by_power, noise, tests, limits, load, _drifts(None, 0))
+        found += _of("power", None, "W", series, by_power, noise, tests, limits, load)
     return sorted(found, key=lambda one: -one.share)
 
 
 def _names(pair: Pair) -> tuple[str, str]:
     return pair.first.run, pair.second.run
-
-
-def _own(case: Case, pairs: Sequence[Pair]) -> Alike | None:
-    """Return what the runs of all pairs say by themselves, where motions are too few for the search to find a drift."""
-    measured = {run.name for run in case.runs if run.role != "simulated"}
-    motions = [motion for motion in case.with_torque if motion.run in measured]
-    if not case.grouping.few(motion.run for motion in motions):
-        return None
-    return Alike.of(case.stack, motions, sorted({name for pair in pairs for name in _names(pair)}))
-
-
-def _drifts(own: Alike | None, joint: int) -> Drifts:
-    return lambda found: [] if own is None else own.drifts(joint, [one.frequency for one in found])
 
 
 def _torque(case: Case, run: Run, motion: Motion) -> np.ndarray:
@@ -168,9 +151,8 @@ def _of(
     tests: int,
     limits: NotRepeating,
     load: Switching | None,
-    own: Drifts,
 ) -> list[Disturbance]:
-    """Return the disturbances of one channel; noise: its sensor's, in the band; own: what each run drifts by."""
+    """Return the disturbances of one channel; noise: its sensor's, in the band."""
     found, left = lines(series, tests, limits)
     rest = [one.left() for one in left]
     rest_size = float(np.mean([_in_band(one, pair) for one, pair in zip(rest, pairs, strict=True)])) / 2
@@ -183,7 +165,7 @@ def _of(
         if line.size >= limits.least_size * least:
             kind = LINE if line.purity >= limits.pure else BAND
             located.append((kind, _wave(line, joint, unit), line.size, line.p, line))
-    located += _slow(left, joint, unit, (rest_size, noise**2), tests, limits, own(found))
+    located += _slow(left, joint, unit, (rest_size, noise**2), tests, limits)
     whole = max(float(np.mean(spread)), rest_size + sum(each[2] for each in located))
     return [
         Disturbance(channel, joint, kind, quantities, size, float(min(size / whole, 1.0)), p, shape)
@@ -223,20 +205,15 @@ def _slow(
     sizes: tuple[float, float],
     tests: int,
     limits: NotRepeating,
-    own: Sequence[OwnDrift],
 ) -> list[Located]:
     """Return the drift and the offset between runs: those of the pair of runs that shows most of either.
 
-    A drift that no pair shows may be shared by both: then each run's `own` tells it. What drifts is held against the
-    offset that it began with. `sizes`: the mean squares of what else differs, and of the sensor's noise.
+    What drifts is held against the offset that it began with. `sizes`: the mean squares of what else differs, and of
+    the sensor's noise.
     """
     each, least, alpha = [slow(one) for one in series], limits.least_slow * max(sizes), limits.alpha / (2 * tests)
     drifts = [(one.drift, one.drift_deviation, one.p[1], one.sizes[1]) for one in each]
     found = _most(DRIFT, drifts, joint, f"{unit}/s", least, alpha)
-    if not found and own and all(one.p <= alpha / len(own) for one in own):
-        shared = [(one.drift, one.deviation, one.p, one.size) for one in own]
-        enough = limits.least_shared * max(own[0].rest, sizes[1])
-        found = _most(DRIFT, shared, joint, f"{unit}/s", enough, alpha)
     offsets = [(one.offset, one.offset_deviation, one.p[0], one.sizes[0]) for one in each]
     if found:
         began = [one.from_start() for one in each]

@@ -94,13 +94,19 @@ def sentence(
     closes: str | None,
     because: str | None = None,
     differ: str = "",
+    has_floor: bool = True,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
-    verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains.
+    verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
+    `has_floor`: whether a noise floor is known.
     """
     if verdict == "no_gap":
+        if not findings and not has_floor:
+            return (
+                "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."
+            )
         if not findings:
             return "There is no gap: the twin explains the data down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."

@@ -26,6 +26,7 @@ def sentence(answers: Answers) -> str:
         differing([
             (one["kind"], one["channel"], one["joint"]) for one in answers["disturbances"].rows if not one["cause"]
         ]),
+        judged["floor_from"] is not None,
     )  # fmt: skip
 
 
