@@ -25,7 +25,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("size", [1, 40, 1000, *(pytest.param(size, marks=pytest.mark.nightly) for size in (8, 200))])
+@pytest.mark.parametrize("size", [1, 40, *(pytest.param(size, marks=pytest.mark.nightly) for size in (8, 200, 1000))])
 @pytest.mark.parametrize("command", ["run", "backup"])
 def test_a_full_disk_is_one_line(made: Path, tmp_path: Path, command: str, size: int) -> None:
     """size: kB that the longest file may have, so that each step of the way is met by one."""

@@ -55,7 +55,7 @@ def content(workspace: Path) -> dict[str, object]:
         return {**files, "rows": dump, "graph": graph.triples()}
 
 
-@pytest.mark.parametrize("robot", ["Bad", "Good"])
+@pytest.mark.parametrize("robot", ["Good", pytest.param("Bad", marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("kind", POISONS)
 def test_what_cannot_be_worked_out_changes_nothing(folder: Path, robot: str, kind: str) -> None:
     poison = data_set(folder / "poison", robot, seed=5, **POISONS[kind])
@@ -107,6 +107,7 @@ def test_a_robot_that_cannot_be_worked_out_is_set_aside(folder: Path) -> None:
     assert "remove it with `irtwin drop Bad`" in aside[0]
 
 
+@pytest.mark.nightly
 def test_two_names_in_other_scripts_are_two_robots(folder: Path) -> None:
     for seed, name in enumerate(("机器人", "人器机", "R 1", "R_1", "x" * 250), start=2):
         done = irtwin("run", data_set(folder / f"{seed}", name, seed=seed), "--workspace", folder / "workspace")

@@ -11,7 +11,7 @@ import pytest
 
 from tests.small_robots import waiting_data_set
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")

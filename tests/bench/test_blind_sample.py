@@ -9,7 +9,7 @@ from blind.score import judge
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import read_data_set
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 SEED = 5_000_000  # of neither split
 
@@ -26,29 +26,25 @@ def scored(tmp_path_factory):
     return score
 
 
-@pytest.mark.nightly
 def test_a_healthy_robot_raises_no_alarm(scored):
     assert scored("healthy", "clean_null")["false alarms, clean nulls"] == 0
 
 
-@pytest.mark.nightly
 def test_a_slightly_imperfect_robot_raises_no_alarm(scored):
     assert scored("imperfect", "dirty_null", scope="changed")["false alarms, dirty nulls"] == 0
 
 
-@pytest.mark.parametrize("effect", ["stribeck_friction", pytest.param("copper_loss", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("effect", ["stribeck_friction", "copper_loss"])
 def test_a_missing_effect_is_named_first(scored, effect):
     scores = scored(f"missing_{effect}", "single", (effect,), 3.0)
     assert scores["right effect first"] == 1
 
 
-@pytest.mark.nightly
 def test_a_changed_effect_is_named_with_its_joints_and_scope(scored):
     scores = scored("changed", "single", ("asymmetric_friction",), 3.0, "changed")
     assert scores["right effect first"] == scores["joint right"] == scores["scope right"] == 1
 
 
-@pytest.mark.nightly
 def test_joints_that_never_move_are_no_obstacle(scored):
     scores = scored("poor", "poor", ("payload",), 3.0)
     assert set(scores) == {"right effect first, gap 3, poor"}

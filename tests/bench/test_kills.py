@@ -16,9 +16,8 @@ def commands(tmp_path_factory: pytest.TempPathFactory) -> dict[str, kills.Comman
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "kind", ["run", *(pytest.param(kind, marks=pytest.mark.nightly) for kind in ("live", "diagnose", "repair"))]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", ["run", "live", "diagnose", "repair"])
 def test_a_killed_command_can_be_done_again(commands: dict[str, kills.Command], kind: str, tmp_path: Path) -> None:
     assert kills.killed_often(kind, commands[kind], 1, random.Random(11), tmp_path / "tried") == 0
 

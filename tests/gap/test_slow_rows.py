@@ -44,7 +44,7 @@ def causes(folder: Path, width: float, stronger: float = 1.0) -> dict[str, tuple
     return {cause.effect: tuple(cause.joints) for cause in found.causes if cause.confidence >= 0.5}
 
 
-@pytest.mark.parametrize("width", [0.004, 0.025])
+@pytest.mark.parametrize("width", [0.004, pytest.param(0.025, marks=pytest.mark.nightly)])
 def test_a_turn_over_another_speed_is_no_change_of_friction(tmp_path: Path, width: float) -> None:
     assert causes(tmp_path, width) == {}
 

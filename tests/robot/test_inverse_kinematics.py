@@ -41,7 +41,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=5)
 @given(shares=st.lists(st.floats(0.02, 0.98), min_size=6, max_size=6))
 def test_a_pose_that_was_reached_is_found_again(shares):
     lower, upper = (np.array([getattr(joint, side) for joint in KR6.joints]) for side in ("lower", "upper"))

