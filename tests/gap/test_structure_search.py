@@ -19,6 +19,7 @@ from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 300, 12
+NOISE = 0.6
 EFFECT = catalogue()["cable_drag"]
 
 
@@ -81,6 +82,34 @@ def changing(before, now, twin=()):
 def test_what_is_there_is_found_and_nothing_else():
     assert found(np.eye(4), [0.0, 0.3, 0.0, 0.1]) == ["effect_1", "effect_3"]
     assert found(np.eye(4), np.zeros(4)) == []
+
+
+def frictions(joint):
+    """A joint with Coulomb and viscous friction, and two other forms of friction that together come near them."""
+    generator, blocks = np.random.default_rng(3), []
+    for run in range(RUNS):
+        phase, fastest = 2 * np.pi * generator.random(), generator.uniform(0.3, 1.0)
+        speed = fastest * np.sin(np.linspace(0, 20, ROWS) + phase)
+        sign, size = np.sign(speed), np.abs(speed)
+        columns = np.column_stack([sign, speed, sign * size**0.5, sign * np.exp(-size / 0.1)])
+        measured = columns @ [3.0, 4.5, 0.0, 0.0] + NOISE * generator.standard_normal(ROWS)
+        factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+    names = ("coulomb", "viscous", "nonlinear", "stribeck")
+    columns = tuple(Column(EFFECT, k, Term(name, "N m", spread=5.0)) for k, name in enumerate(names))
+    known = ((catalogue()["torque_offset"], Term("constant", "1")),)
+    system = System(
+        known, columns, np.ones((1, 5), dtype=bool), tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool)
+    )
+    return system, [
+        Hypothesis(name, joint, MISSING, (Variant(EFFECT, (1 + k,), (column.term,)),))
+        for k, (name, column) in enumerate(zip(names, columns, strict=True))
+    ]
+
+
+def test_two_effects_of_a_joint_are_found_though_another_explains_most_by_itself():
+    found = attribute(*frictions("joint_1"), DEFAULT.criterion, np.array([NOISE]))
+    assert {cause.effect for cause in found.causes} == {"coulomb", "viscous"}
 
 
 def test_a_crumb_within_the_misfit_that_no_effect_names_is_no_cause():

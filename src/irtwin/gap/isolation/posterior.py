@@ -129,6 +129,22 @@ class Posterior:
         explained = np.where(self.log_odds > least - _HIDDEN, self.evidence.explained[self.shape], 0.0)
         return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
 
+    def explained(self, place: int) -> float:
+        """Return the squares that a hypothesis explains in its best shape."""
+        return float(self.evidence.explained[self.shape[place]])
+
+    def scale(self, place: int) -> float:
+        """Return the squares that count as one: those of its misfit, as often as that is known."""
+        shape = self.shape[place]
+        return float(self.evidence.rows_that_speak[shape] * self.limits.certainty * self.variance[shape])
+
+    def cost(self, place: int) -> float:
+        """Return how much less likely a hypothesis is than what it explains: its prior, and its freedom."""
+        shape = int(self.shape[place])
+        seen = self.evidence
+        own = self._explaining(seen.gain[shape], self.variance[shape], len(seen.information[shape]))
+        return float(own - self.log_odds[place])
+
     def likeliest_at(self, one: Hypothesis) -> int:
         """Return the place of the likeliest hypothesis of those that could be where one is."""
         near = [k for k, other in enumerate(self.hypotheses) if overlap(other, one)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
@@ -46,8 +47,8 @@ def attribute(
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
     Hypotheses are added one by one, everything refitted; what is less likely than nothing is dropped; then each in turn
-    is taken out and looked for anew. floor: (g,) RMS, 0 or None where unknown; `tell` is told how far it has come,
-    where it takes long.
+    is taken out and looked for anew, and so are two of one joint together. floor: (g,) RMS, 0 or None where unknown;
+    `tell` is told how far it has come, where it takes long.
     """
     candidates = in_scope(candidates, both=system.both)
     search = _Search(system, candidates, Prior.of(candidates), limits, floor, paced(tell))
@@ -55,7 +56,7 @@ def attribute(
     before = search.beside((), noise)
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = visibility(system, system.moments(noise), shapes)
-    found, noise = search.settled(*search.pruned(*search.forward(before, noise)))
+    found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
     known = {(one.effect, one.scope, one.joint): variant for one, variant in found}
     after = search.beside(found, noise)
     known |= {(one.effect, one.scope, one.joint): after.variant(k) for k, one in enumerate(after.hypotheses)}
@@ -82,13 +83,15 @@ class _Search:
             self.tried[asked] = self._beside(found, noise)
         return self.tried[asked]
 
-    def _beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
+    def _beside(self, found: Sequence[Found], noise: np.ndarray, like: Hypothesis | None = None) -> Posterior:
+        """Try all candidates, or those alone that are at the place of one and in its scope."""
         chosen = _columns(found)
         taken = set(chosen)
         left = [
             one
             for one in self.candidates
-            if not any(set(variant.columns) & taken for variant in one.variants)
+            if (like is None or _where(one) == _where(like))
+            and not any(set(variant.columns) & taken for variant in one.variants)
             and not any(_same_place(one, each) for each, _ in found)
         ]
         self.tell(f"  {len(left)} hypotheses, beside {len(found)} that are found")
@@ -166,6 +169,45 @@ class _Search:
                 break
         return found, noise
 
+    def paired(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+        """Look anew for two effects of one joint together: what explains most by itself may be neither of them."""
+        for _ in range(_SWEEPS):
+            for one, other in combinations(found, 2):
+                if one[0].joint and _where(one[0]) == _where(other[0]):
+                    rest = [each for each in found if each is not one and each is not other]
+                    pair = self.likeliest_pair(rest, noise, one[0])
+                    if pair and {_place(each) for each, _ in pair} != {_place(one[0]), _place(other[0])}:
+                        break
+            else:
+                break
+            found = [*rest, *pair]
+            found, noise = self.settled(found, self.left(found, noise))
+        return found, noise
+
+    def likeliest_pair(self, rest: Sequence[Found], noise: np.ndarray, like: Hypothesis) -> list[Found]:
+        """Return the two likeliest hypotheses at the place of one, beside the rest of a structure.
+
+        As in `Posterior.weights` each pair is judged by what it leaves of what the best explains.
+        """
+        pairs: list[list[Found]] = []
+        explained, costs, scales = [], [], []
+        alone = self._beside(rest, noise, like)
+        for first, hypothesis in enumerate(alone.hypotheses):
+            found = hypothesis, alone.variant(first)
+            beside = self._beside([*rest, found], noise, like)
+            second = beside.first(-np.inf)
+            if second is not None:
+                pairs.append([found, (beside.hypotheses[second], beside.variant(second))])
+                explained.append(alone.explained(first) + beside.explained(second))
+                costs.append(alone.cost(first) + beside.cost(second))
+                scales.append(beside.scale(second))
+        if not pairs:
+            return []
+        best = int(np.argmax(explained))
+        behind = np.log1p((explained[best] - np.array(explained)) / scales[best])
+        count = self.limits.certainty + len(_columns(pairs[best]))
+        return pairs[int(np.argmax(-0.5 * count * behind - costs))]
+
     def left(self, found: Sequence[Found], noise: np.ndarray) -> np.ndarray:
         """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations."""
         return self.system.residual_rms(_columns(found), noise)
@@ -235,6 +277,10 @@ def _columns(found: Sequence[Found]) -> list[int]:
 
 def _place(one: Hypothesis) -> tuple[str, str, str | None]:
     return one.effect, one.scope, one.joint
+
+
+def _where(one: Hypothesis) -> tuple[str | None, str]:
+    return one.joint, one.scope
 
 
 def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
