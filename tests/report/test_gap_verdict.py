@@ -12,7 +12,8 @@ def answers(scope, simulated=False, referenced=True):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
         "diagnosis": [
-            {"verdict": "ambiguous", "reason": None} | {"against_simulator": simulated, "referenced": referenced}
+            {"verdict": "ambiguous", "reason": None, "floor_from": "repeats"}
+            | {"against_simulator": simulated, "referenced": referenced}
         ],
         "findings": [
             {"finding": "f1", "family": "load", "family_label": None, "confidence": 0.9, "scope": scope}
