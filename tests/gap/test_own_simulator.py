@@ -68,6 +68,23 @@ def test_the_friction_that_the_simulator_lacks_is_named_on_its_joint(tmp_path):
     assert "stribeck friction" in said
 
 
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.3, marks=pytest.mark.nightly)])
+def test_equal_logs_of_simulator_and_robot_show_no_gap(tmp_path, noise):
+    """Whatever both have that the twin lacks: here friction with a sharp sign, and one that grows with the root."""
+    made, true, rng = [], truth(DRAWN), np.random.default_rng(0)
+    for seed in range(3):
+        motion = swing(DRAWN, seed, seconds=5.0)
+        torque = rigid_torque(DRAWN, motion) + true["Ia"] * motion.ddq + true["Fc"] * np.sign(motion.dq)
+        torque += true["Fv"] * np.sign(motion.dq) * np.sqrt(np.abs(motion.dq))
+        for role in ("simulated", "observed"):
+            heard = torque + (noise * rng.standard_normal(torque.shape) if role == "observed" else 0.0)
+            made.append(replace(as_run(replace(motion, torque=heard, run=f"{role}_{seed}")), role=role))
+    said = irtwin("diagnose", write(tmp_path / "data", DRAWN, made), "--json", tmp_path / "out.json")
+    assert said.status == 0, said.err
+    document = json.loads((tmp_path / "out.json").read_text())
+    assert (document["verdict"], document["causes"]) == ("no_gap", [])
+
+
 @pytest.mark.nightly
 def test_a_simulator_without_friction_lacks_all_of_it(tmp_path):
     _, causes = diagnosed(tmp_path, lambda motion: 0.0, friction=0.0)

@@ -173,7 +173,7 @@ def attributed(
     tell: Tell | None = None,
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
-    candidates = _hypotheses(system, _inside(case, system), without)
+    candidates = _hypotheses(case, system, without)
     apart = system.by_speed
     level = floor if floor is None or apart is system else np.tile(floor, 2)
     found = attribute(apart, candidates, case.thresholds.criterion, level, tell)
@@ -192,9 +192,14 @@ def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
     return case.modelled | {(one.id, None) for one in catalogue().values() if not can_show(one, case.others)}
 
 
-def _hypotheses(system: System, inside: Set[tuple[str, str | None]], without: Set[Without]) -> list[Hypothesis]:
-    """Return what may be missing or have changed, `without` some effects; effects on power may act in every joint."""
-    found = hypotheses(system.columns, system.base, MISSING, inside=inside)
+def _hypotheses(case: Case, system: System, without: Set[Without]) -> list[Hypothesis]:
+    """Return what may be missing or have changed, `without` some effects; effects on power may act in every joint.
+
+    What a simulator and the robot both have, and the twin lacks, is no difference between them.
+    """
+    found = []
+    if not (system.both and case.against == "simulated"):
+        found += hypotheses(system.columns, system.base, MISSING, inside=_inside(case, system))
     if system.both:
         found += hypotheses(system.columns, system.changed, CHANGED)
     return [one for one in found if not {one.effect, (one.effect, one.joint)} & without]
