@@ -20,7 +20,7 @@ from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
 from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
 from irtwin.identification.estimators import Estimate
-from irtwin.identification.progress import Tell
+from irtwin.identification.progress import Tell, paced
 
 _NO_NOISE = 1e-9
 Without = str | tuple[str, str | None]
@@ -173,6 +173,8 @@ def attributed(
     tell: Tell | None = None,
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
+    told = paced(tell)
+    told("  rows in which joints are slow")
     candidates = _hypotheses(case, system, without)
     apart = system.by_speed
     level = floor if floor is None or apart is system else np.tile(floor, 2)

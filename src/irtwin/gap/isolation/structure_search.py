@@ -52,8 +52,12 @@ def attribute(
     """
     candidates = in_scope(candidates, both=system.both)
     search = _Search(system, candidates, Prior.of(candidates), limits, floor, paced(tell))
-    noise = system.residual_rms((), system.residual_rms((), np.ones(len(system.pattern))))
+    search.tell("  what the twin leaves")
+    noise = system.residual_rms((), np.ones(len(system.pattern)))
+    search.tell("  what the twin leaves")
+    noise = system.residual_rms((), noise)
     before = search.beside((), noise)
+    search.tell("  how far each effect would show")
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = visibility(system, system.moments(noise), shapes)
     found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
@@ -94,8 +98,12 @@ class _Search:
             and not any(set(variant.columns) & taken for variant in one.variants)
             and not any(_same_place(one, each) for each, _ in found)
         ]
-        self.tell(f"  {len(left)} hypotheses, beside {len(found)} that are found")
-        moments = self.system.without_noise(self.system.moments(noise), noise, chosen)
+        line = f"  {len(left)} hypotheses, beside {len(found)} that are found"
+        self.tell(line)
+        moments = self.system.moments(noise)
+        self.tell(line)
+        moments = self.system.without_noise(moments, noise, chosen)
+        self.tell(line)
         return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.misfit(noise))
 
     def misfit(self, noise: np.ndarray) -> np.ndarray:

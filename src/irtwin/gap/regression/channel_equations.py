@@ -57,7 +57,9 @@ def torque_system(
         return of_part
 
     blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=bool(effects))
-    noise = shaken_products([pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern)
+    noise = shaken_products(
+        [pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern, tell
+    )
     known = stack.prior_rows(stack.torque_terms)
     found = System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known)
     return enough(replace(found, shaken=noise))

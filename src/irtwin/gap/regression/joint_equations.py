@@ -95,7 +95,7 @@ def joint_equations(
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=True)
-    noise = shaken_products(shaken, equations(), equations(), pattern)
+    noise = shaken_products(shaken, equations(), equations(), pattern, tell)
     alone = [one.of(slice(-1)) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(

@@ -12,13 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from irtwin.identification.accumulate import Equations, Rows, accumulate_any
+from irtwin.identification.progress import Tell, with_progress
 from irtwin.signals.motion import Motion
 
 Pairs = Sequence[tuple[Motion, Motion]]  # motions, each with the same once more, shaken
 
 
 def shaken_products(
-    pairs: Pairs, equations: Equations, again: Equations, pattern: np.ndarray
+    pairs: Pairs, equations: Equations, again: Equations, pattern: np.ndarray, tell: Tell | None = None
 ) -> tuple[np.ndarray, ...] | None:
     """Return each equation's products a row, (k + 1, k + 1), of what shaking changes; None where there is no pair.
 
@@ -40,7 +41,8 @@ def shaken_products(
             undecided = one.undecided | other.undecided
         return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided)
 
-    blocks = accumulate_any([motion for motion, _ in pairs], difference, pattern, by_products=True)
+    motions = [motion for motion, _ in pairs]
+    blocks = accumulate_any(motions, with_progress(difference, motions, tell), pattern, by_products=True)
     found = []
     for equation, row in enumerate(pattern):
         size = int(row.sum()) + 1
