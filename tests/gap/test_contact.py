@@ -29,7 +29,7 @@ def remainder(seed, added=None, observed=True):
     residual = NOISE * low_pass(white, motion.rate, 8.0) * np.sqrt(motion.rate / 2 / 8.0)
     if added is not None:
         residual = residual + added(motion)
-    return Remainder(motion, residual, observed, motion.run)
+    return Remainder(motion, residual, observed)
 
 
 def push(motion):

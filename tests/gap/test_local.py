@@ -24,7 +24,7 @@ def remainders(added=lambda motion: 0.0, observed=True):
         residual = generator.standard_normal((len(motion.time), 3))
         residual[:, 1] += added(motion)
         residual[:20] = np.nan
-        left.append(Remainder(motion, residual, observed, motion.run))
+        left.append(Remainder(motion, residual, observed))
     return left
 
 

@@ -121,9 +121,7 @@ class Effect(ABC):
     add to. Columns of an effect that `needs` "torque" or "power" are built from what other effects predict, never
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
-    so many seconds on either side. What is `imitated` looks like what friction leaves, where joints turn
-    back, if its form is not the twin's. A shape `of_change` is a change's alone: in a twin, part of it is another
-    effect.
+    so many seconds on either side. A shape `of_change` is a change's alone: in a twin, part of it is another effect.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
@@ -145,7 +143,6 @@ class Effect(ABC):
     stage: ClassVar[int] = 0
     memory: ClassVar[bool] = False
     reach: ClassVar[float | None] = None
-    imitated: ClassVar[bool] = False
     family: ClassVar[str]
     requires: ClassVar[frozenset[str]] = frozenset()
     bodies: ClassVar[bool] = False

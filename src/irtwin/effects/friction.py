@@ -109,7 +109,6 @@ class StribeckFriction(JointEffect):
     id: ClassVar[str] = "stribeck_friction"
     family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
-    imitated: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"vs": (0.005, 0.2), "d": (0.5, 2.0)}
 
     vs: float = 0.05  # rad/s
@@ -316,7 +315,6 @@ class PreslidingHysteresis(JointEffect):
     id: ClassVar[str] = "presliding_hysteresis"
     family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
-    imitated: ClassVar[bool] = True
     memory: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (1e-4, 0.2)}
 

@@ -134,7 +134,6 @@ class TimeDelay(JointEffect):
     family: ClassVar[str] = "sensing"
     manual_test: ClassVar[str | None] = "sines of rising frequency, up to 5 Hz"
     channel: ClassVar[str] = "measurement"
-    imitated: ClassVar[bool] = True
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 3
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (5e-4, 0.6)}

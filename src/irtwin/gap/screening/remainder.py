@@ -22,7 +22,6 @@ class Remainder:
     motion: Motion
     residual: np.ndarray
     observed: bool
-    label: str  # of the programmed motion: repeats share it
 
 
 def remainders(
@@ -43,8 +42,7 @@ def remainders(
         residual = torque_residual(stack, motion, values)
         if load is not None and load[0].acts_in(motion):
             residual = residual - as_filtered(motion, load[0].columns(case.robot, motion) @ load[1])
-        observed = motion.run in case.observed
-        left.append(Remainder(_every(motion, step), residual[::step], observed, case.grouping.label[motion.run]))
+        left.append(Remainder(_every(motion, step), residual[::step], motion.run in case.observed))
     return left
 
 
