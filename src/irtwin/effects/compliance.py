@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -37,6 +37,7 @@ _DAMPING = 0.1  # of an elastic joint's swing
 _GAPS = tuple(3e-4 * 2.0 ** (2 * k / 3) for k in range(10))  # rad: 0.3 to 19 mrad, those of worn gears too
 _SMALL = (3e-4, 6e-4)  # rad: tried with a part of the rotor before the gap, too
 _WITHIN = 2.0 ** (np.arange(-1, 2) * 2 / 3)  # of a gap: those before and after it among the gaps
+_SWINGS = (5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 20.0, 40.0)  # Hz: antiresonances of elastic joints
 _SLOWEST = 1.0  # Hz, of that swing: no controller would hold an arm that swings slower
 
 
@@ -171,6 +172,17 @@ def _passed(load: np.ndarray, inertia: np.ndarray, motion: Motion, gaps: Sequenc
     return transmitted(load, inertia, motion.rate, 2 * np.pi * _CONTACT, _CONTACT_DAMPING, gaps, motion.start)
 
 
+def _passed_at(
+    load: np.ndarray, inertia: np.ndarray, motion: Motion, unit: np.ndarray, swings: Sequence[float]
+) -> dict[float, np.ndarray]:
+    """Return (N, n) what passes a spring for each of some antiresonances, Hz; `unit` (N, n): by pose, about one."""
+    count = len(swings)
+    speeds = np.concatenate([2 * np.pi * swing * unit for swing in swings], axis=1)
+    each = np.tile(load, count), np.tile(inertia, count)  # side by side: a step of many takes as long as a step of one
+    (passed,) = transmitted(*each, motion.rate, speeds, _DAMPING, start=motion.start)
+    return dict(zip(swings, np.split(passed, count, axis=1), strict=True))
+
+
 def _free(load: np.ndarray, q: np.ndarray, dq: np.ndarray, rate: float, gap: float) -> np.ndarray:
     """Return (N, n) the share of each sample in which a motor has not crossed the gap since its load changed sign."""
     rows = np.arange(len(load))[:, None]
@@ -193,6 +205,23 @@ class _Compliance(JointEffect):
 
     def _places(self, robot: Robot) -> list[int]:
         return [robot.index(joint.name) for joint in self.acting(robot)]
+
+    def _among(
+        self,
+        predicted: Predicted | None,
+        key: tuple[Hashable, ...],
+        wanted: float,
+        tried: Sequence[float],
+        work: Callable[[Sequence[float]], Mapping[float, np.ndarray]],
+    ) -> np.ndarray:
+        """Return what `work` gives for `wanted`: for all that are `tried` at once, if others will ask."""
+        kept: dict[float, np.ndarray] = {}
+        if predicted is not None:
+            kept = predicted.kept.setdefault((self.id, *key), kept)
+        if wanted not in kept:
+            alone = predicted is None or self.joints is not None or wanted not in tried
+            kept.update(work((wanted,) if alone else tried))
+        return kept[wanted]
 
 
 def _at(acting: list[int], motion: Motion, samples: np.ndarray) -> np.ndarray:
@@ -246,14 +275,10 @@ class Backlash(_Compliance):
         if not self.about:
             passed = _passed(load, inertia, motion, (self.b,))[0]
             return (_at(acting, motion, passed - load),)
-        kept = {} if predicted is None else predicted.kept
-        key = (self.id, self.rotor_share, tuple(acting), motion.start)
-        if self.b not in kept.get(key, {}):
-            tried = _SMALL if self.rotor_share else _GAPS
-            alone = predicted is None or self.joints is not None or self.b not in tried  # no other is asked for
-            gaps = (self.b,) if alone else tried
-            kept[key] = kept.get(key, {}) | _passed_about(load, inertia, motion, gaps)
-        return (_at(acting, motion, kept[key][self.b] - load),)
+        tried = _SMALL if self.rotor_share else _GAPS
+        key = (self.rotor_share, tuple(acting), motion.start)
+        passed = self._among(predicted, key, self.b, tried, lambda gaps: _passed_about(load, inertia, motion, gaps))
+        return (_at(acting, motion, passed - load),)
 
     def parameters(
         self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
@@ -282,7 +307,7 @@ class JointElasticity(_Compliance):
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the link's encoder, and swings of 5 to 40 Hz."""
-        return self.variants(antiresonance=(0.0, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 20.0, 40.0))
+        return self.variants(antiresonance=(0.0, *_SWINGS))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Ia/K, or the share."""
@@ -297,8 +322,14 @@ class JointElasticity(_Compliance):
         if self.antiresonance == 0:
             return (_at(acting, motion, differentiate(differentiate(load, motion.rate), motion.rate)),)
         inertia = load_inertia(robot, motion, predicted)[:, acting]
-        speed = 2 * np.pi * self.antiresonance * np.sqrt(_mean_inertia(robot)[acting] / inertia)
-        (passed,) = transmitted(load, inertia, motion.rate, speed, _DAMPING, start=motion.start)
+        unit = np.sqrt(_mean_inertia(robot)[acting] / inertia)
+        passed = self._among(
+            predicted,
+            (tuple(acting), motion.start),
+            self.antiresonance,
+            _SWINGS,
+            lambda swings: _passed_at(load, inertia, motion, unit, swings),
+        )
         return (_at(acting, motion, passed - load),)
 
     def parameters(

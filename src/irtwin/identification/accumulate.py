@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 from scipy.linalg import lapack
@@ -131,14 +132,72 @@ def accumulate_any(
 def _grown(growing: Sequence[_Growing], equations: Equations) -> list[Block]:
     with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
-        for one in growing:
-            for sample in one.samples(equations):
+        for _, of_motion in groupby(growing, key=lambda one: id(one.motion)):
+            blocks = tuple(of_motion)
+            for first, last, sample in _parts(blocks, equations):
                 if adding:
                     adding.result()
-                adding = other.submit(one.add, sample)
+                adding = other.submit(_add, blocks, first, last, sample)
         if adding:
             adding.result()
     return [one.block() for one in growing]
+
+
+def _parts(growing: Sequence[_Growing], equations: Equations) -> Iterator[tuple[int, int, Rows]]:
+    """Yield the equations of a motion's blocks from sample `first` to `last`, half a kernel more at either end."""
+    motion, (taps, step) = growing[0].motion, _thinning(growing[0].motion)
+    half = len(taps) // 2
+    size = step * max(1, min(_CHUNK // step, _ROWS))
+    begin = half + step * max(0, -(-(growing[0].start - half) // step))  # the same samples stay, wherever one begins
+    end = min(growing[-1].stop, len(motion.time) - half)
+    for first in range(begin, end, size):
+        last = min(first + size, end)
+        yield first, last, equations(motion.part(first - half, last + half))
+
+
+def _add(growing: Sequence[_Growing], first: int, last: int, sample: Rows) -> None:
+    """Filter and decimate a part of a motion, and give each block its own rows."""
+    taps, step = _thinning(growing[0].motion)
+    thin = _Thin.of(sample, growing[0].pattern, taps, step)
+    at = np.arange(first, last, step)
+    for one in growing:
+        begin, end = np.searchsorted(at, (one.start, one.stop))
+        if begin < end:
+            one.add(thin, slice(begin, end))
+
+
+def _thinning(motion: Motion) -> tuple[np.ndarray, int]:
+    """Return the kernel of the filter that a motion's measurement went through, and the step of decimation."""
+    if not motion.cutoff:
+        return np.ones(1), 1
+    return kernel(motion.rate, motion.cutoff), decimation(motion.rate, motion.cutoff)
+
+
+@dataclass(frozen=True)
+class _Thin:
+    """Each equation's rows (N, k_e + 1) of [columns | measurement], filtered and decimated.
+
+    `keep`, `slow`: (N, g), which hold, and which are slow; `slow` is None where none are told apart.
+    """
+
+    rows: list[np.ndarray]
+    keep: np.ndarray
+    slow: np.ndarray | None
+
+    @classmethod
+    def of(cls, sample: Rows, pattern: np.ndarray, taps: np.ndarray, step: int) -> _Thin:
+        half = len(taps) // 2
+        measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
+        keep, slow = np.ones(measured.shape, dtype=bool), None
+        if sample.undecided is not None:
+            keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
+        if sample.slow is not None:
+            slow = decimate(sample.slow.astype(float), np.abs(taps), step) >= _SLOW
+        rows = []
+        for equation, used in enumerate(pattern):
+            columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
+            rows.append(np.column_stack([*columns, measured[:, equation]]))
+        return cls(rows, keep, slow)
 
 
 def _nothing_left(motions: Sequence[Motion]) -> InputError:
@@ -224,58 +283,31 @@ class _Growing:
     """A block, from sample `start` to `stop` (exclusive) of a motion, whose factors grow part by part."""
 
     def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray, kind: type[_Triangle | _Products]):
-        self._motion, self._start, self._stop, self._pattern = motion, start, stop, pattern
-        self._taps = kernel(motion.rate, motion.cutoff) if motion.cutoff else np.ones(1)
-        self._step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
+        self.motion, self.start, self.stop, self.pattern = motion, start, stop, pattern
         self._reduced = [kind(int(row.sum()) + 1) for row in pattern]
         self._slow = [kind(int(row.sum()) + 1) for row in pattern]
-        self.rows = np.zeros(len(pattern), dtype=int)
-        self._slow_rows = np.zeros(len(pattern), dtype=int)
+        self._rows, self._slow_rows = np.zeros((2, len(pattern)), dtype=int)
         self._told_apart = False
 
-    def samples(self, equations: Equations) -> Iterator[Rows]:
-        """Yield the equations part by part, each with half a kernel more at either end."""
-        motion, half, step = self._motion, len(self._taps) // 2, self._step
-        size = step * max(1, min(_CHUNK // step, _ROWS))
-        end = min(self._stop, len(motion.time) - half)
-        for first in range(max(self._start, half), end, size):
-            last = min(first + size, end)
-            yield equations(motion.part(first - half, last + half))
-
-    def add(self, sample: Rows) -> None:
-        """Take in a part, filtered and decimated."""
-        parts, slow = self._thinned(sample)
-        self._told_apart = sample.slow is not None
-        self.rows += [len(part) for part in parts]
-        self._slow_rows += [int(inside.sum()) for inside in slow]
-        for reduced, apart, part, inside in zip(self._reduced, self._slow, parts, slow, strict=True):
-            reduced.add(part[~inside])
-            if inside.any():
-                apart.add(part[inside])
-
-    def _thinned(self, sample: Rows) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Return each equation's rows of [columns | measurement], filtered and decimated, and which are slow."""
-        taps, step = self._taps, self._step
-        half = len(taps) // 2
-        measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
-        keep, slow = np.ones(measured.shape, dtype=bool), np.zeros(measured.shape, dtype=bool)
-        if sample.undecided is not None:
-            keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
-        if sample.slow is not None:
-            slow = decimate(sample.slow.astype(float), np.abs(taps), step) >= _SLOW
-        rows = []
-        for equation, used in enumerate(self._pattern):
-            columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
-            rows.append(np.column_stack([*columns, measured[:, equation]])[keep[:, equation]])
-        return rows, [slow[kept, k] for k, kept in enumerate(keep.T)]
+    def add(self, thin: _Thin, part: slice) -> None:
+        """Take in the rows of a part that are the block's."""
+        self._told_apart = thin.slow is not None
+        for equation, (reduced, apart) in enumerate(zip(self._reduced, self._slow, strict=True)):
+            keep = thin.keep[part, equation]
+            slow = np.zeros_like(keep) if thin.slow is None else thin.slow[part, equation] & keep
+            self._rows[equation] += keep.sum()
+            self._slow_rows[equation] += slow.sum()
+            reduced.add(thin.rows[equation][part][keep & ~slow])
+            if slow.any():
+                apart.add(thin.rows[equation][part][slow])
 
     def block(self) -> Block:
         """Return what the block has become."""
-        time = self._motion.time
-        ends = float(time[self._start]), float(time[self._stop - 1])
+        time = self.motion.time
+        ends = float(time[self.start]), float(time[self.stop - 1])
         fast = tuple(reduced.factor() for reduced in self._reduced)
         if not self._told_apart:
-            return Block(self._motion.run, *ends, self.rows, fast)
+            return Block(self.motion.run, *ends, self._rows, fast)
         both = tuple(np.concatenate([own, slow.factor()]) for own, slow in zip(fast, self._slow, strict=True))
         begin = np.array([len(own) for own in fast])
-        return Block(self._motion.run, *ends, self.rows, both, Slow(begin, self._slow_rows))
+        return Block(self.motion.run, *ends, self._rows, both, Slow(begin, self._slow_rows))
