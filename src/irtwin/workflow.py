@@ -147,9 +147,9 @@ def diagnose(
             check_before(place)
             check_name(place, data_set.robot.name)
     model = None if simulator is None else read_model(Path(simulator), data_set.robot)
-    held_against = data_set if model is None else with_simulated_runs(data_set, model, announce)
-    found = gap.diagnose(held_against, twin=given, withhold=withhold, seed=seed, progress=announce)
-    if model is not None and simulator_file is not None:
+    data_set = with_simulated_runs(data_set, model, announce)
+    found = gap.diagnose(data_set, twin=given, withhold=withhold, seed=seed, progress=announce)
+    if model and simulator_file:
         write(simulator_file, written(model, differences(model, found.document)))
     if json_file is not None:
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
@@ -162,18 +162,22 @@ def diagnose(
         render_alone(data_set, found.document, found.curves, report, resources.resources_of(kept_in))
     if kept_in is not None:
         announce("Storing the diagnosis")
-        robot_id = identifier(data_set.robot.name)
-        closed = None if found.twin is None else to_json(found.twin)
         with Workspace(kept_in, database) as place, rewriting(place, graph_url, announce) as graph:
-            check_name(place, data_set.robot.name)
-            with staged(place, robot_id) as apart:
-                ingest(apart, data_set)
-                record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
-            graph.load_ontology()
-            map_rows(place, graph)
-            reason(graph)
-            validate(graph)
+            _store(place, graph, data_set, found)
     return found
+
+
+def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis) -> None:
+    check_name(place, data_set.robot.name)
+    robot_id = identifier(data_set.robot.name)
+    closed = None if found.twin is None else to_json(found.twin)
+    with staged(place, robot_id) as apart:
+        ingest(apart, data_set)
+        record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
+    graph.load_ontology()
+    map_rows(place, graph)
+    reason(graph)
+    validate(graph)
 
 
 def adopt(

@@ -7,18 +7,21 @@ from dataclasses import replace
 from irtwin.errors import InputError
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.progress import Tell
+from irtwin.input_file import checksum
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator.model import Model
 
 
-def with_simulated_runs(data_set: DataSet, model: Model, tell: Tell | None = None) -> DataSet:
+def with_simulated_runs(data_set: DataSet, model: Model | None, tell: Tell | None = None) -> DataSet:
     """Return the data set with a simulated run beside each observed one: its motion, and the torque of the model.
 
-    A model carries no payload; what the robot carried is known, and the twin has it. Raises InputError where the data
-    set has simulated runs, or no torque was measured.
+    Without a model it stays as it is. A model carries no payload; what the robot carried is known, and the twin has it.
+    Raises InputError where the data set has simulated runs, or no torque was measured.
     """
+    if model is None:
+        return data_set
     if any(run.role == "simulated" for run in data_set.runs):
         raise InputError(f"{data_set.folder}: has simulated runs of its own; leave these out, or the simulator's model")
     observed = [run for run in data_set.runs if run.role == "observed"]
@@ -38,6 +41,7 @@ def _simulated(run: Run, data_set: DataSet, model: Model, cutoff: float) -> Run:
         run,
         name=f"{run.name} in {model.name}",
         file=model.file.path,
+        sha256=checksum(model.file.path),
         role="simulated",
         payload_mass=0.0,
         payload_com=(0.0, 0.0, 0.0),
