@@ -43,6 +43,9 @@ from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone
 from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
+from irtwin.simulator.differences import differences, written
+from irtwin.simulator.model import read_model
+from irtwin.simulator.simulated_runs import with_simulated_runs
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
@@ -98,6 +101,7 @@ def diagnose(
     dataset: Path | str,
     *,
     twin: Twin | Path | str | None = None,
+    simulator: Path | str | None = None,
     withhold: Sequence[str] = (),
     cutoff: float | None = None,
     seed: int = 0,
@@ -109,25 +113,29 @@ def diagnose(
     report: Path | str | None = None,
     twin_file: Path | str | None = None,
     motion_file: Path | str | None = None,
+    simulator_file: Path | str | None = None,
     announce: Announce = lambda line: None,
 ) -> Diagnosis:
-    """Diagnose the gap between a robot's twin and its runs.
+    """Diagnose the gap between a robot's twin, or its simulator, and its runs.
 
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
-    in their shapes, and its numbers as the prior. `withhold` takes effects out of the twin and leaves them in the
-    catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is
-    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
-    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
-    motion of the next experiment, where one is designed.
+    in their shapes, and its numbers as the prior. `simulator` is the file of a model of MuJoCo: what it says of the
+    observed motions is held against the robot, as runs of a simulator are. `withhold` takes effects out of the twin and
+    leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace`
+    the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each
+    whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added,
+    `motion_file` the motion of the next experiment, where one is designed, `simulator_file` the simulator's model with
+    the numbers that the robot has.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
     kept_in = None if workspace is None else Path(workspace)
     check_extensions(resources.resources_of(kept_in))
-    places = [None if file is None else Path(file) for file in (json_file, report, twin_file, motion_file)]
+    files = (json_file, report, twin_file, motion_file, simulator_file)
+    places = [None if file is None else Path(file) for file in files]
     for file in filter(None, places):
         check_place(file)
-    json_file, report, twin_file, motion_file = places
+    json_file, report, twin_file, motion_file, simulator_file = places
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce)
@@ -138,7 +146,11 @@ def diagnose(
         with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
             check_before(place)
             check_name(place, data_set.robot.name)
+    model = None if simulator is None else read_model(Path(simulator), data_set.robot)
+    data_set = with_simulated_runs(data_set, model, announce)
     found = gap.diagnose(data_set, twin=given, withhold=withhold, seed=seed, progress=announce)
+    if model and simulator_file:
+        write(simulator_file, written(model, differences(model, found.document)))
     if json_file is not None:
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
@@ -150,18 +162,22 @@ def diagnose(
         render_alone(data_set, found.document, found.curves, report, resources.resources_of(kept_in))
     if kept_in is not None:
         announce("Storing the diagnosis")
-        robot_id = identifier(data_set.robot.name)
-        closed = None if found.twin is None else to_json(found.twin)
         with Workspace(kept_in, database) as place, rewriting(place, graph_url, announce) as graph:
-            check_name(place, data_set.robot.name)
-            with staged(place, robot_id) as apart:
-                ingest(apart, data_set)
-                record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
-            graph.load_ontology()
-            map_rows(place, graph)
-            reason(graph)
-            validate(graph)
+            _store(place, graph, data_set, found)
     return found
+
+
+def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis) -> None:
+    check_name(place, data_set.robot.name)
+    robot_id = identifier(data_set.robot.name)
+    closed = None if found.twin is None else to_json(found.twin)
+    with staged(place, robot_id) as apart:
+        ingest(apart, data_set)
+        record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
+    graph.load_ontology()
+    map_rows(place, graph)
+    reason(graph)
+    validate(graph)
 
 
 def adopt(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-pytest.importorskip("mujoco", reason="the plant needs irtwin[plant]")
+pytest.importorskip("mujoco", reason="the plant needs irtwin[mujoco]")
 
 from plant.machine import Drawings, Machine, build, read_drawings
 

@@ -164,6 +164,17 @@ def case_study(workspace: Path) -> None:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Twin that --save-twin wrote, to hold the data against: its effects are the baseline, its numbers the prior.",
 )
+@click.option(
+    "--simulator",
+    metavar="MODEL.xml",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Model of the robot in MuJoCo, to hold the data against: what differs is said. Needs irtwin[mujoco].",
+)
+@click.option(
+    "--save-simulator",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="File to write that model to, with the numbers that the robot has; all else stays as it is.",
+)
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option(
     "--cutoff",
@@ -183,6 +194,8 @@ def diagnose(
     save_twin: Path | None,
     save_motion: Path | None,
     twin: Path | None,
+    simulator: Path | None,
+    save_simulator: Path | None,
     withhold: tuple[str, ...],
     cutoff: float | None,
     seed: int,
@@ -191,7 +204,7 @@ def diagnose(
     database: str | None,
     graph_url: str | None,
 ) -> None:
-    """Find where a twin and its robot differ, and why.
+    """Find where a twin, or a simulator, and its robot differ, and why.
 
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     A summary is printed; --report and --json write all of it.
@@ -200,10 +213,15 @@ def diagnose(
     from irtwin.report.gap import summary
     from irtwin.report.gap.headline import line, refused
     from irtwin.report.terminal import show
+    from irtwin.simulator.differences import differences, not_held
+    from irtwin.simulator.model import read_model
 
+    if save_simulator and not simulator:
+        raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
     found = workflow.diagnose(
         dataset,
         twin=twin,
+        simulator=simulator,
         withhold=withhold,
         cutoff=cutoff,
         seed=seed,
@@ -215,15 +233,22 @@ def diagnose(
         report=report,
         twin_file=save_twin,
         motion_file=save_motion,
+        simulator_file=save_simulator,
         announce=announce,
     )
     click.echo(line(found.document, found.against))
     for said in (*refused(found.document), *summary.filtered(found.document)):
         click.echo(said)
-    for table in (summary.gap(found.document), summary.causes(found.document)):
+    tables = [summary.gap(found.document), summary.causes(found.document)]
+    if simulator:
+        model = read_model(simulator, found.description)
+        tables.append(summary.simulator(differences(model, found.document)))
+    for table in tables:
         if table:
             click.echo()
             show(table, counted=False)
+    for said in summary.not_held(not_held(found.document)) if simulator else ():
+        click.echo(f"\n{said}")
     for said in summary.next_steps(found.document):
         click.echo(f"\n{said}")
 

@@ -95,12 +95,13 @@ def sentence(
     because: str | None = None,
     differ: str = "",
     has_floor: bool = True,
+    against: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known.
+    `has_floor`: whether a noise floor is known; `against`: the role of the runs that it is held against, if any.
     """
     if verdict == "no_gap":
         if not findings and not has_floor:
@@ -108,7 +109,8 @@ def sentence(
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."
             )
         if not findings:
-            return "There is no gap: the twin explains the data down to the noise floor."
+            agrees = "simulator agrees with the robot" if against == "simulated" else "twin explains the data"
+            return f"There is no gap: the {agrees} down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."
     told = _told(findings)
     rest = [one for one in findings if one not in told]

@@ -23,6 +23,7 @@ def line(diagnosis: Document, against: str | None) -> str:
             [(one.kind, one.channel, one.joint) for one in diagnosis.not_repeating or () if not one.explained_by]
         ),
         diagnosis.shrink.noise_floor_from is not None,
+        against,
     )
     return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from irtwin.gap.document.document import Document
+from irtwin.gap.document.document import Cause, Document
 from irtwin.knowledge.store.table import Row, Table
+from irtwin.simulator.differences import Difference
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _STEPS = 3  # motions to log that are told
@@ -66,6 +67,35 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
                 "unit": "" if one.unit == "1" else one.unit,
             }
             first = dict.fromkeys(first)  # said once
+
+
+def simulator(found: Sequence[Difference]) -> Table:
+    """Return each number that the simulator's model has wrong, beside the robot's with its 95 % interval."""
+    columns = ("number", "joint", "simulator", "robot", "95 % from", "to", "unit")
+    rows: list[Row] = []
+    for one in found:
+        lower, upper = one.interval95 or (None, None)
+        rows.append(
+            {
+                "number": one.name,
+                "joint": one.joint,
+                "simulator": _short(one.simulator),
+                "robot": _short(one.robot),
+                "95 % from": None if lower is None else _short(lower),
+                "to": None if upper is None else _short(upper),
+                "unit": one.unit,
+            }
+        )
+    return Table(columns, tuple(rows))
+
+
+def not_held(causes: Sequence[Cause]) -> list[str]:
+    """Return a line for each cause that no number of the simulator's model can hold."""
+    return [
+        f"No number of a joint holds {cause.effect.replace('_', ' ')} ({', '.join(cause.joints) or 'whole robot'}): "
+        "the simulator's model keeps that difference."
+        for cause in causes
+    ]
 
 
 def next_steps(diagnosis: Document) -> list[str]:

@@ -27,6 +27,7 @@ def sentence(answers: Answers) -> str:
             (one["kind"], one["channel"], one["joint"]) for one in answers["disturbances"].rows if not one["cause"]
         ]),
         judged["floor_from"] is not None,
+        _against(judged),
     )  # fmt: skip
 
 

@@ -1,0 +1,135 @@
+"""A model file of MuJoCo (MJCF): read without reaching outside its folder, and changed in single numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.parsers import expat
+
+from irtwin.errors import InputError
+from irtwin.input_file import read_input, real_path
+
+_MOST = 20_000_000  # bytes
+_FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
+
+
+@dataclass(frozen=True)
+class Tag:
+    """A start tag: its element, attributes, and the bytes of the file that it takes."""
+
+    element: str
+    attributes: Mapping[str, str]
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class MjcfFile:
+    """The file's bytes and its start tags, in their order; files that it includes are not among them."""
+
+    path: Path
+    content: bytes
+    tags: tuple[Tag, ...]
+
+    def changed(self, numbers: Mapping[tuple[str, str], Mapping[str, float]]) -> bytes:
+        """Return the file with attributes of elements changed, by (element, name); all else stays, byte for byte.
+
+        Raises InputError where the file has no such element: an included file may have it.
+        """
+        content, left = self.content, dict(numbers)
+        for tag in reversed(self.tags):  # from behind: places before stay right
+            values = left.pop((tag.element, tag.attributes.get("name", "")), {})
+            text = content[tag.start : tag.stop]
+            for attribute, value in values.items():
+                text = _with_attribute(text, attribute, repr(value))
+            content = content[: tag.start] + text + content[tag.stop :]
+        if left:
+            element, name = next(iter(left))
+            raise InputError(f'{self.path}: has no <{element} name="{name}"> of its own; give the file that defines it')
+        return content
+
+
+def read_mjcf(path: Path) -> MjcfFile:
+    """Read a model file, and look at those that it names.
+
+    Raises InputError where one is no XML, has entities or more than 20 MB, or names a file outside the folder.
+    """
+    file = _scanned(path)
+    outermost = file.tags[0].element
+    if outermost != "mujoco":
+        raise InputError(f"{path}: outermost element is <{outermost}>; give a model of MuJoCo, <mujoco>")
+    _check_inside(file, path.parent, {})
+    return file
+
+
+def _scanned(path: Path) -> MjcfFile:
+    content = read_input(path, _MOST)
+    tags: list[Tag] = []
+    parser = expat.ParserCreate()
+
+    def begin(element: str, attributes: dict[str, str]) -> None:
+        start = parser.CurrentByteIndex
+        tags.append(Tag(element, attributes, start, _end(content, start)))
+
+    def refuse(*_: object) -> None:
+        raise InputError(f"{path}, line {parser.CurrentLineNumber}: declares a document type; remove it")
+
+    parser.StartElementHandler = begin
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        raise InputError(f"{path}, line {error.lineno}, column {error.offset + 1}: {reason}; mend the XML") from error
+    return MjcfFile(path, content, tuple(tags))
+
+
+def _end(content: bytes, start: int) -> int:
+    """Return where the start tag that begins at a byte is over; `>` may stand in a value."""
+    quote = b""
+    for place in range(start, len(content)):
+        byte = content[place : place + 1]
+        if quote:
+            quote = b"" if byte == quote else quote
+        elif byte in (b'"', b"'"):
+            quote = byte
+        elif byte == b">":
+            return place + 1
+    raise AssertionError("the parser has seen its end")
+
+
+def _check_inside(file: MjcfFile, folder: Path, seen: dict[Path, None]) -> None:
+    """Raise InputError where a file, or one that it includes, names one outside the folder of the model."""
+    seen[file.path] = None
+    folders: dict[str, str] = {}
+    for tag in file.tags:
+        if tag.element == "compiler":
+            folders |= {"meshdir": tag.attributes.get("assetdir", ""), "texturedir": tag.attributes.get("assetdir", "")}
+            folders |= {key: tag.attributes[key] for key in ("meshdir", "texturedir") if key in tag.attributes}
+    for element, named in _files(file):
+        place = folder / folders.get(_FOLDERS.get(element, ""), "") / named
+        real = real_path(place)
+        if real is None or not real.is_relative_to(folder.resolve()):
+            raise InputError(
+                f'{file.path}: <{element} file="{named}"> is outside the folder of the model; move it there'
+            )
+        if element == "include" and place not in seen:
+            _check_inside(_scanned(place), folder, seen)
+
+
+def _files(file: MjcfFile) -> Iterator[tuple[str, str]]:
+    for tag in file.tags:
+        for key, value in tag.attributes.items():
+            if key.startswith("file") and value:
+                yield tag.element, value
+
+
+def _with_attribute(tag: bytes, name: str, value: str) -> bytes:
+    """Return a start tag with an attribute's value changed, or with the attribute added."""
+    said = re.compile(rb"(\s" + name.encode() + rb"\s*=\s*[\"']\s*)[^\s\"']+")
+    if said.search(tag):  # of several numbers the first one: those after it are of higher powers
+        return said.sub(lambda match: match[1] + value.encode(), tag, count=1)
+    end = -2 if tag.endswith(b"/>") else -1
+    return tag[:end].rstrip() + f' {name}="{value}"'.encode() + tag[end:]

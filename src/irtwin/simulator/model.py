@@ -1,0 +1,119 @@
+"""A robot's model in MuJoCo: the torque that it takes for a motion, and the numbers of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.simulator.mjcf_file import MjcfFile, read_mjcf
+
+if TYPE_CHECKING:
+    import mujoco
+
+NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
+
+
+@dataclass(frozen=True)
+class Model:
+    """A compiled model whose `joints` (n,) are the robot's, in its order, by the places of their coordinates.
+
+    `others` are joints of the model that the robot lacks: a gripper's, a free body's. They stay where they begin.
+    """
+
+    file: MjcfFile
+    compiled: mujoco.MjModel
+    joints: tuple[str, ...]
+    positions: np.ndarray  # (n,) in qpos
+    speeds: np.ndarray  # (n,) in qvel
+    others: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self.file.path.stem
+
+    def torque(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+        """Return the (N, n) torque, N m, that a motion (N, n) takes: bodies, armature, damping, springs, dry friction.
+
+        By MuJoCo's inverse dynamics without contacts, limits and other constraints; dry friction has the sign of the
+        speed, where MuJoCo's own turns over a small one.
+        """
+        import mujoco
+
+        data = mujoco.MjData(self.compiled)
+        found = np.empty(q.shape)
+        for row, (position, speed, acceleration) in enumerate(zip(q, dq, ddq, strict=True)):
+            data.qpos[self.positions], data.qvel[self.speeds] = position, speed
+            data.qacc[self.speeds] = acceleration
+            mujoco.mj_inverse(self.compiled, data)
+            found[row] = data.qfrc_inverse[self.speeds]
+        return np.asarray(found + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
+
+    def numbers(self, joint: str) -> Mapping[str, float]:
+        """Return the joint's numbers as the model has them, by what MJCF calls them."""
+        place = self.speeds[self.joints.index(joint)]
+        return {name: float(getattr(self.compiled, f"dof_{name}")[place]) for name in NUMBERS}
+
+
+def read_model(path: Path, robot: Robot) -> Model:
+    """Read a model of the robot.
+
+    Raises InputError where the file is no model, a mesh that gives a body its inertia is missing, or the robot's joints
+    are not among the model's.
+    """
+    file = read_mjcf(path)
+    compiled = _compiled(file)
+    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= 2}
+    lacking = [name for name in robot.joint_names if name not in own]
+    if lacking:
+        raise InputError(
+            f"{path}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: give a model whose "
+            "joints have the names of the robot's"
+        )
+    places = [own[name] for name in robot.joint_names]
+    return Model(
+        file,
+        compiled,
+        tuple(robot.joint_names),
+        compiled.jnt_qposadr[places],
+        compiled.jnt_dofadr[places],
+        tuple(name for name in own if name not in robot.joint_names),
+    )
+
+
+def _compiled(file: MjcfFile) -> mujoco.MjModel:
+    try:
+        import mujoco
+    except ModuleNotFoundError as error:
+        raise InputError(f"{file.path}: reading a model needs MuJoCo; install irtwin[mujoco]") from error
+    try:
+        spec = mujoco.MjSpec.from_file(str(file.path))
+        _drop_pictures(spec, mujoco)
+        compiled = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
+    compiled.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    compiled.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    return compiled
+
+
+def _drop_pictures(spec: mujoco.MjSpec, mujoco: Any) -> None:
+    """Take out what a body with an inertia of its own needs for pictures and contacts alone: files may be missing."""
+    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        return
+    for body in spec.bodies[1:]:
+        if body.explicitinertial:
+            for geom in list(body.geoms):
+                if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
+                    spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for mesh in [mesh for mesh in spec.meshes if mesh.name not in used]:
+        spec.delete(mesh)
+    for texture in list(spec.textures):
+        spec.delete(texture)

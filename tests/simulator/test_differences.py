@@ -1,0 +1,54 @@
+"""A model that has numbers of joints wrong, from the command line: they are named, and written back."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from tests import data_sets, mujoco_models, synthetic
+from tests.data_sets import irtwin
+
+from irtwin.simulator.model import read_model
+
+pytestmark = pytest.mark.slow
+ROBOT = synthetic.arm(3)
+TRUE = synthetic.truth(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("beside")
+    motions = [synthetic.swing(ROBOT, seed, seconds=8.0) for seed in range(4)]
+    runs = [
+        synthetic.as_run(synthetic.measure(ROBOT, motion, noise=0.1, seed=seed), power=None, current=None)
+        for seed, motion in enumerate(motions)
+    ]
+    data = data_sets.write(folder / "data", ROBOT, runs, head="torque_scale_uncertainty = 0.0")
+    numbers = {"armature": TRUE["Ia"], "damping": TRUE["Fv"].copy(), "frictionloss": TRUE["Fc"].copy()}
+    numbers["damping"][1] *= 0.5
+    numbers["frictionloss"][2] *= 1.5
+    wrong = mujoco_models.write(folder / "arm.xml", ROBOT, **numbers)
+    new = folder / "better.xml"
+    return irtwin("diagnose", data, "--simulator", wrong, "--save-simulator", new), wrong, new
+
+
+def test_both_numbers_are_told_as_the_simulators_and_the_robots(told):
+    said = told[0]
+    assert said.status == 0, said.err
+    assert re.search(r"damping +│ joint_2 +│ +2\.25 │ +4\.[45]", said.out), said.out
+    assert re.search(r"frictionloss +│ joint_3 +│ +3 │ +2 ", said.out), said.out
+    assert "No number of a joint holds torque offset (joint_1, joint_3)" in said.out
+
+
+def test_the_models_numbers_become_the_robots(told):
+    _, wrong, new = told
+    model, before = read_model(new, ROBOT), read_model(wrong, ROBOT)
+    assert model.numbers("joint_2")["damping"] == pytest.approx(TRUE["Fv"][1], rel=0.03)
+    assert model.numbers("joint_3")["frictionloss"] == pytest.approx(TRUE["Fc"][2], rel=0.05)
+    assert model.numbers("joint_1") == before.numbers("joint_1")
+
+
+def test_a_file_for_the_model_needs_a_model(tmp_path):
+    said = irtwin("diagnose", tmp_path, "--save-simulator", tmp_path / "new.xml")
+    assert said.status == 2
+    assert "--save-simulator writes the model of --simulator: give that too" in said.err

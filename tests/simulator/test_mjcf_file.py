@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from irtwin.errors import InputError
+from irtwin.simulator.mjcf_file import read_mjcf
+
+TEXT = """<?xml version='1.0'?>
+<!-- an arm; <joint name="lift" damping="7"/> was here -->
+<mujoco model="arm">
+  <default><joint damping="0.6"/></default>
+  <worldbody>
+    <body name="a"><joint name="pan"  axis='0 0 1' damping = '1.0'
+      user="3 > 2"/><geom size=".1"/>
+      <body name="b"><joint name="lift" class="x" ></joint></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def model(folder, text=TEXT):
+    file = folder / "arm.xml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_a_file_with_nothing_changed_is_the_same_bytes(tmp_path):
+    file = model(tmp_path)
+    assert read_mjcf(file).changed({}) == file.read_bytes()
+
+
+def test_changed_numbers_alone_differ(tmp_path):
+    new = {("joint", "pan"): {"damping": 1.25}, ("joint", "lift"): {"armature": 0.5}}
+    expected = TEXT.replace("damping = '1.0'", "damping = '1.25'").replace('class="x" >', 'class="x" armature="0.5">')
+    assert read_mjcf(model(tmp_path)).changed(new).decode() == expected
+
+
+@given(value=st.floats(0, 1e6))
+def test_numbers_are_read_back_as_they_were(tmp_path_factory, value):
+    folder = tmp_path_factory.mktemp("model")
+    changed = read_mjcf(model(folder)).changed({("joint", "lift"): {"frictionloss": value}})
+    tags = read_mjcf(model(folder, changed.decode())).tags
+    (lift,) = [tag for tag in tags if tag.attributes.get("name") == "lift"]
+    assert float(lift.attributes["frictionloss"]) == value
+
+
+def test_an_element_of_another_file_is_not_changed(tmp_path):
+    with pytest.raises(InputError, match=r'arm\.xml: has no <joint name="elbow"> of its own; give the file'):
+        read_mjcf(model(tmp_path)).changed({("joint", "elbow"): {"damping": 1.0}})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco>", r"line 1, column 9: no element found; mend the XML"),
+        ("<robot/>", r"outermost element is <robot>; give a model of MuJoCo"),
+        ('<!DOCTYPE m [<!ENTITY a "b">]><mujoco/>', r"line 1: declares a document type; remove it"),
+        ('<mujoco><include file="../other.xml"/></mujoco>', r'<include file="../other.xml"> is outside the folder'),
+        ('<mujoco><asset><mesh file="/etc/passwd"/></asset></mujoco>', r"outside the folder of the model"),
+        (
+            '<mujoco><compiler meshdir=".."/><asset><mesh file="a.stl"/></asset></mujoco>',
+            r'<mesh file="a.stl"> is outside the folder',
+        ),
+    ],
+)
+def test_what_is_no_model_or_reaches_outside_is_refused(tmp_path, text, said):
+    with pytest.raises(InputError, match=said):
+        read_mjcf(model(tmp_path, text))
+
+
+def test_included_files_are_looked_at_too(tmp_path):
+    (tmp_path / "part.xml").write_text('<mujocoinclude><include file="/etc/hosts"/></mujocoinclude>', encoding="utf-8")
+    with pytest.raises(InputError, match=r"part\.xml: <include file=\"/etc/hosts\"> is outside"):
+        read_mjcf(model(tmp_path, '<mujoco><include file="part.xml"/></mujoco>'))

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import mujoco_models
+from tests.synthetic import arm, rigid_torque, swing, truth
+
+from irtwin.errors import InputError
+from irtwin.simulator.model import read_model
+
+ROBOT = arm(4)
+TRUE = truth(ROBOT)
+NUMBERS = {"armature": TRUE["Ia"], "damping": TRUE["Fv"], "frictionloss": TRUE["Fc"]}
+
+
+def test_a_model_takes_the_torque_of_its_bodies_rotors_and_friction(tmp_path):
+    model = read_model(mujoco_models.write(tmp_path / "arm.xml", ROBOT, **NUMBERS), ROBOT)
+    motion = swing(ROBOT, 1, seconds=2.0)
+    expected = rigid_torque(ROBOT, motion) + TRUE["Ia"] * motion.ddq
+    expected += TRUE["Fc"] * np.sign(motion.dq) + TRUE["Fv"] * motion.dq
+    np.testing.assert_allclose(model.torque(motion.q, motion.dq, motion.ddq), expected, atol=1e-4)
+    assert model.numbers("joint_2") == {name: pytest.approx(values[1]) for name, values in NUMBERS.items()}
+
+
+def test_joints_that_the_robot_lacks_stay_where_they_begin(tmp_path):
+    file = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
+    text = file.read_text().replace("</worldbody>", '<body><joint name="door"/><geom size=".1"/></body></worldbody>')
+    file.write_text(text)
+    model = read_model(file, ROBOT)
+    assert model.others == ("door",)
+    motion = swing(ROBOT, 1, seconds=0.5)
+    found = model.torque(motion.q, motion.dq, motion.ddq)
+    np.testing.assert_allclose(found, rigid_torque(ROBOT, motion), atol=1e-4)
+
+
+def test_meshes_for_pictures_may_be_missing(tmp_path):
+    file = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
+    text = file.read_text().replace("<worldbody>", '<asset><mesh name="m" file="m.stl"/></asset><worldbody>')
+    drawn = text.replace("<joint ", '<geom type="mesh" mesh="m"/><joint ', 1)
+    file.write_text(drawn)
+    assert read_model(file, ROBOT).joints == ROBOT.joint_names
+    file.write_text(drawn.replace("<compiler", '<compiler inertiafromgeom="true"'))
+    with pytest.raises(InputError, match=r"arm\.xml: .*m\.stl.*; MuJoCo cannot load it so"):
+        read_model(file, ROBOT)
+
+
+def test_a_model_of_other_joints_is_refused(tmp_path):
+    file = mujoco_models.write(tmp_path / "arm.xml", arm(3))
+    with pytest.raises(InputError, match=r"has no joint joint_4; its joints are joint_1, joint_2, joint_3: give"):
+        read_model(file, ROBOT)
