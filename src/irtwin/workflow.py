@@ -167,9 +167,7 @@ def diagnose(
     return found
 
 
-def _store(
-    place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis, announce: Announce
-) -> None:
+def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis, announce: Announce) -> None:
     check_name(place, data_set.robot.name)
     robot_id = identifier(data_set.robot.name)
     closed = None if found.twin is None else to_json(found.twin)
