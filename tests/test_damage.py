@@ -155,7 +155,6 @@ def test_damaged_remembered_rows_are_made_anew(made: Path, workspace: Path, dama
 @pytest.fixture
 def unreasoned(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reasoning has tests of its own, and takes long."""
-    monkeypatch.setattr(upkeep, "reason", lambda graph: None)
     monkeypatch.setattr(upkeep, "conclude", lambda graph, announce: None)
     monkeypatch.setattr(upkeep, "populate_others", lambda place, graph, announce: False)
 

@@ -54,6 +54,25 @@ def read_input(path: Path, most: int) -> bytes:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name an existing file") from error
 
 
+def read_text(path: Path, most: int) -> str:
+    """Return the content of a text file, without a byte order mark. Raises InputError as `read_input` and `as_text`."""
+    return as_text(path, read_input(path, most))
+
+
+def as_text(path: Path, content: bytes) -> str:
+    """Return what a file holds as text, without a byte order mark.
+
+    Raises InputError where it is not UTF-8: from which byte of which line on, both counted from 1.
+    """
+    try:
+        return content.decode().removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        *before, last = content[: error.start].split(b"\n")
+        raise InputError(
+            f"{path}, line {len(before) + 1}: not UTF-8 text (byte {len(last) + 1}); save it as UTF-8"
+        ) from error
+
+
 def checksum(path: Path) -> str:
     """Return the SHA-256 of a file, in hexadecimal; of a folder, that of its files' names and checksums."""
     if path.is_file():

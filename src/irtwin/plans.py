@@ -30,7 +30,7 @@ from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
 from irtwin.twin.price import Figure, Price
 from irtwin.twin.twin import Twin
-from irtwin.workflow import conclude, map_rows, populate_apart, rewriting, write_report
+from irtwin.workflow import Announce, conclude, map_rows, populate_apart, rewriting, write_report
 
 T = TypeVar("T")
 
@@ -64,6 +64,7 @@ def plan(
     rate: float = 100.0,
     database: str | None = None,
     graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> tuple[Plan, Kept]:
     """Plan a motion by the twin of a robot of a workspace, and keep it there as a planned run called `name`.
 
@@ -79,7 +80,7 @@ def plan(
 
     if out is not None:
         modelling.check_plan_file(out)
-    made, kept = _keep(robot, name, make, Path(workspace), database, graph_url)
+    made, kept = _keep(robot, name, make, Path(workspace), database, graph_url, announce)
     if out is not None:
         modelling.write_plan(made, out)
     return made, kept
@@ -96,6 +97,7 @@ def predict(
     payload_com: tuple[float, float, float] | None = None,
     database: str | None = None,
     graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> tuple[Expectation, Kept]:
     """Price a file's motion by the twin of a robot of a workspace, and keep it there as a planned run called `name`.
 
@@ -110,7 +112,7 @@ def predict(
 
     if out is not None:
         check_place(out)
-    expected, kept = _keep(robot, name, make, Path(workspace), database, graph_url)
+    expected, kept = _keep(robot, name, make, Path(workspace), database, graph_url, announce)
     if out is not None:
         modelling.write_expectation(expected, out)
     return expected, kept
@@ -125,6 +127,7 @@ def slow(
     name: str,
     database: str | None = None,
     graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> tuple[Figure, Kept]:
     """Make a measured run of a robot so many `times` slower, and keep it as a planned run called `name`.
 
@@ -152,7 +155,7 @@ def slow(
         made = _run(name, signals, known.payload_mass, known.payload_com)
         return None, replace(made, time_scaling_of=known.name, time_scale=times)
 
-    _, kept = _keep(robot, name, make, place_of, database, graph_url)
+    _, kept = _keep(robot, name, make, place_of, database, graph_url, announce)
     with Workspace.existing(place_of, database) as place:
         return stored_saving(place, find_plan(place, kept.robot, kept.run).run_id), kept
 
@@ -164,19 +167,20 @@ def _keep(
     workspace: Path,
     database: str | None,
     graph_url: str | None,
+    announce: Announce,
 ) -> tuple[T, Kept]:
     with Workspace.existing(workspace, database) as place:
         robot_id = find_robot(place, robot)
         check_run_name(place, robot_id, name)
         _, twin = load_twin(place, robot_id)
         made, run = make(twin)
-        with rewriting(place, graph_url) as graph:
+        with rewriting(place, graph_url, announce) as graph:
             with staged(place, robot_id) as apart:
                 run_id = keep_run(apart, robot_id, twin.robot.joint_names, run)
-                populate_apart(apart, lambda line: None)
+                populate_apart(apart, announce)
             graph.load_ontology()
             map_rows(place, graph)
-            conclude(graph, lambda line: None)
+            conclude(graph, announce)
         report = write_report(place, graph_url, robot_id)
         return made, Kept(robot_id, name, stored_price(place, run_id), report)
 

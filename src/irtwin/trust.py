@@ -14,9 +14,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.storage.files import write
 
+_MOST_BYTES = 100_000_000
 _Given = dict[str, dict[str, object]]  # of each place: the folder's number there, and the names that are trusted
 
 
@@ -60,10 +62,10 @@ def _number(workspace: Path) -> int | None:
 def _read() -> _Given:
     file = _file()
     try:
-        given = parse_json(file.read_text(encoding="utf-8")) if file.exists() else {}
+        given = parse_json(read_text(file, _MOST_BYTES)) if file.exists() else {}
         if isinstance(given, dict) and all(isinstance(said, dict) and "names" in said for said in given.values()):
             return given
-    except (OSError, ValueError):
+    except (InputError, OSError, ValueError):
         pass
     raise InputError(f"{file}: cannot be read; remove it, and trust your workspaces again")
 

@@ -15,12 +15,11 @@ from irtwin.alarms.settings import NAME
 from irtwin.alarms.settings import asks as alarm_asks
 from irtwin.asking import WORKSPACE
 from irtwin.errors import InputError
-from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
 from irtwin.next_experiment import proposal_files
+from irtwin.providers.effects_of_ontology import check_effects
 from irtwin.providers.records import find_robot, find_run, run_iri
 from irtwin.resources import resources_of
 from irtwin.storage import files
@@ -49,7 +48,12 @@ def asked(workspace: Path) -> list[str]:
 
 
 def drop(
-    robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+    robot: str,
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> None:
     """Forget a robot, by its name: rows, files, report, journals, and all that the graph says of it.
 
@@ -57,7 +61,7 @@ def drop(
     """
     with (
         Workspace.existing(Path(workspace), database) as place,
-        rewriting(place, graph_url) as graph,
+        rewriting(place, graph_url, announce) as graph,
     ):
         robot_id = find_robot(place, robot)
         journals = of_robot(place.folder / LIVE, robot_id)
@@ -71,8 +75,7 @@ def drop(
             place.mapped_rows.unlink(missing_ok=True)
         graph.load_ontology()
         map_rows(place, graph)
-        reason(graph)
-        validate(graph)  # what was wrong with it goes too
+        conclude(graph, announce)  # what was wrong with it goes too
 
 
 def drop_run(
@@ -82,6 +85,7 @@ def drop_run(
     *,
     database: str | None = None,
     graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> None:
     """Forget a plan that was kept, or a live run, of a robot: rows, series, and all that the graph says of it.
 
@@ -89,13 +93,12 @@ def drop_run(
     stands in a data set or the twin was judged by it, or another run carried it out.
     """
     with Workspace.existing(Path(workspace), database) as place:
-        with rewriting(place, graph_url) as graph:
+        with rewriting(place, graph_url, announce) as graph:
             robot_id = find_robot(place, robot)
             _drop_run(place, robot_id, run)
             graph.load_ontology()
             map_rows(place, graph)
-            reason(graph)
-            validate(graph)
+            conclude(graph, announce)
         if place.report_path(robot_id).exists():
             write_report(place, graph_url, robot_id)
 
@@ -177,6 +180,7 @@ def _fill(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
     """Put all that the database knows into a graph; return whether what else was in the folder's was carried over."""
     announce("Rebuilding the graph from the database")
     graph.load_ontology()
+    check_effects(graph)
     map_rows(place, graph)
     readable = graph.folder is None or _carry_over(place.graph_folder, graph, announce)
     populate_others(place, graph, announce)

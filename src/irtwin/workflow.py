@@ -163,11 +163,11 @@ def diagnose(
     if kept_in is not None:
         announce("Storing the diagnosis")
         with Workspace(kept_in, database) as place, rewriting(place, graph_url, announce) as graph:
-            _store(place, graph, data_set, found)
+            _store(place, graph, data_set, found, announce)
     return found
 
 
-def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis) -> None:
+def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis, announce: Announce) -> None:
     check_name(place, data_set.robot.name)
     robot_id = identifier(data_set.robot.name)
     closed = None if found.twin is None else to_json(found.twin)
@@ -176,25 +176,28 @@ def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Di
         record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
     graph.load_ontology()
     map_rows(place, graph)
-    reason(graph)
-    validate(graph)
+    conclude(graph, announce)
 
 
 def adopt(
-    robot: str, workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None
+    robot: str,
+    workspace: Path | str = WORKSPACE,
+    *,
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
 ) -> Path:
     """Make the twin of a robot's diagnosis the robot's own, populate anew; return the path of the energy report."""
     with Workspace.existing(Path(workspace), database) as place:
-        with rewriting(place, graph_url) as graph:
+        with rewriting(place, graph_url, announce) as graph:
             robot_id = find_robot(place, robot)
             with staged(place, robot_id) as apart:
                 adopt_twin(apart, robot_id)
-                populate_apart(apart, lambda line: None)
+                populate_apart(apart, announce)
             graph.load_ontology()
             map_rows(place, graph)
-            populate_others(place, graph, lambda line: None)  # live runs by the new twin
-            reason(graph)
-            validate(graph)
+            populate_others(place, graph, announce)  # live runs by the new twin
+            conclude(graph, announce)
             next_experiment(place, graph, robot_id)
         return write_report(place, graph_url, robot_id)
 
@@ -216,6 +219,7 @@ def reason_again(
     announce = _clocked(announce)
     with Workspace.existing(Path(workspace), database) as place, rewriting(place, graph_url, announce) as graph:
         graph.load_ontology()
+        check_effects(graph)
         map_rows(place, graph)
         conclude(graph, announce, engine)
 
@@ -310,6 +314,7 @@ def _catch_up(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> No
     announce("Catching up: the graph is behind the database, as a command was broken off or failed")
     with _told(place, graph):
         graph.load_ontology()
+        check_effects(graph)
         map_rows(place, graph)
         populate_others(place, graph, announce)
         conclude(graph, announce)
@@ -367,8 +372,7 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
 
 
 def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) -> None:
-    """Reason over the graph and check its constraints; say what was found. InputError as `check_effects` has it."""
-    check_effects(graph)
+    """Reason over the graph and check its constraints; say what is done and what was found."""
     announce("Reasoning")
     inferred = reason(graph, engine)
     by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
@@ -379,6 +383,7 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
         )
     for contradiction, about in inferred.contradictions.items():
         announce(f"  about {', '.join(shorten(node, graph.base) for node in about)}: {contradiction}")
+    announce("Checking the constraints")
     for violation in validate(graph):
         announce(f"  {violation}")
 

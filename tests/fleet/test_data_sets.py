@@ -49,9 +49,9 @@ def test_a_checksum_is_of_names_and_bytes(tmp_path: Path) -> None:
     ("source", "said"),
     [
         ("empty", "holds no data set; a data set is a folder with dataset.toml"),
-        ("none", "cannot be read (No such file or directory); name a folder of data sets, a list or a URL"),
+        ("none", "cannot be read (No such file or directory); name an existing file"),
         ("bad.txt", "line 2: missing holds no dataset.toml"),
-        ("binary.txt", "cannot be read (not UTF-8 text); name a folder of data sets, a list or a URL"),
+        ("binary.txt", "line 1: not UTF-8 text (byte 1)"),
     ],
 )
 def test_where_there_is_none_one_line_says_so(source: str, said: str, tmp_path: Path) -> None:

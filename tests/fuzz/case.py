@@ -22,7 +22,7 @@ _MOST = 12  # times as often is drawn what was tried least
 
 @dataclass(frozen=True)
 class Case:
-    """What is tried, in order. `sound`: what is there of `sound.PARTS`; `peer`: who answers, and its seed."""
+    """What is tried, in order. `sound`: the parts of `Sound` that are there; `peer`: who answers, and its seed."""
 
     data: DataPlan = _PLAIN
     spoils: tuple[tuple[str, int], ...] = ()

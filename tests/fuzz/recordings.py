@@ -6,6 +6,7 @@ import io
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,20 @@ def _cells(table: pa.Table) -> list[list[str]]:
     return [table.column_names, *([f"{value}" for value in row.values()] for row in table.to_pylist())]
 
 
+def _put(file: Path, suffix: str, write: Callable[[io.BytesIO], object]) -> Path:
+    """Put what is written in a log's place, which stays as it was where that cannot be written."""
+    content = io.BytesIO()
+    write(content)
+    file.unlink()
+    target = file.with_suffix(suffix)
+    target.write_bytes(content.getvalue())
+    return target
+
+
+def _put_parquet(file: Path, table: pa.Table) -> None:
+    _put(file, ".parquet", partial(pa.parquet.write_table, table))
+
+
 def _text(runs: Path, rng: np.random.Generator) -> None:
     """Write the logs as text of some form."""
     for file, table in _tables(runs):
@@ -60,34 +75,35 @@ def _text(runs: Path, rng: np.random.Generator) -> None:
         if rng.integers(4) == 0:
             lines[:0] = [f"# made by {odd(rng)}"[:500].replace("\ud800", "")] * int(rng.integers(1, 90))
         end = some(rng, ["\n", "\r\n", "\r", "\n\n"])
-        file.unlink()
         code = some(rng, _CODES) if rng.integers(3) == 0 else "utf-8"
-        target = file.with_suffix(some(rng, [".csv", ".txt", ".log", ".tsv", "", ".CSV"]))
-        target.write_bytes(end.join(lines).encode(code, "replace"))
+        content = end.join(lines).encode(code, "replace")
+        _put(
+            file,
+            some(rng, [".csv", ".txt", ".log", ".tsv", "", ".CSV"]),
+            lambda out, content=content: out.write(content),
+        )
 
 
 def _names(runs: Path, rng: np.random.Generator) -> None:
     """Rename some columns, in Parquet."""
     for file, table in _tables(runs):
         names = [some(rng, _NAMES) if rng.integers(3) == 0 else name for name in table.column_names]
-        file.unlink()
-        pa.parquet.write_table(table.rename_columns(names), file.with_suffix(".parquet"))
+        _put_parquet(file, table.rename_columns(names))
 
 
 def _times(runs: Path, rng: np.random.Generator) -> None:
     """Write the time as text, or in another unit."""
     for file, table in _tables(runs):
         form, scale = some(rng, _TIMES), some(rng, [1.0, 1e3, 1e6, 1e9, -1.0, 0.0])
-        values: list[object] = list(np.asarray(table.column("time")) * scale)
+        values: list[object] = list(np.asarray(table.column("time").cast(pa.float64())) * scale)
         if rng.integers(2):
             values = [form % value for value in values]
         if rng.integers(3) == 0:
             values[int(rng.integers(len(values)))] = None
         place = table.column_names.index("time")
-        file.unlink()
         with suppress(pa.ArrowException):
             table = table.set_column(place, "time", pa.array(values))
-        pa.parquet.write_table(table, file.with_suffix(".parquet"))
+        _put_parquet(file, table)
 
 
 def _types(runs: Path, rng: np.random.Generator) -> None:
@@ -107,8 +123,7 @@ def _types(runs: Path, rng: np.random.Generator) -> None:
             table = table.append_column(some(rng, _NAMES), some(rng, arrays))
         if rng.integers(3) == 0:
             table = table.set_column(0, "time", some(rng, arrays))
-        file.unlink()
-        pa.parquet.write_table(table, file.with_suffix(".parquet"))
+        _put_parquet(file, table)
 
 
 def _many(runs: Path, rng: np.random.Generator) -> None:
@@ -117,12 +132,11 @@ def _many(runs: Path, rng: np.random.Generator) -> None:
         rows = int(some(rng, [0, 1, 2, 3, table.num_rows]))
         more = {f"x{number}": pa.array([0.0] * rows) for number in range(some(rng, [0, 300, 3000, 12_000]))}
         cut = table.slice(0, rows)
-        file.unlink()
         whole = pa.table({**{name: cut.column(name) for name in cut.column_names}, **more})
         if rng.integers(2):
-            pa.parquet.write_table(whole, file.with_suffix(".parquet"))
+            _put_parquet(file, whole)
         else:
-            pa.csv.write_csv(whole, file.with_suffix(".csv"))
+            _put(file, ".csv", partial(pa.csv.write_csv, whole))
 
 
 def _workbook(runs: Path, rng: np.random.Generator) -> None:
@@ -143,9 +157,7 @@ def _workbook(runs: Path, rng: np.random.Generator) -> None:
             book.create_sheet("ЖЖ")["B3"] = 5
         if rng.integers(6) == 0:
             sheet.merge_cells("A1:C2")
-        file.unlink()
-        target = file.with_suffix(some(rng, [".xlsx", ".xlsm", ".XLSX"]))
-        book.save(target)
+        target = _put(file, some(rng, [".xlsx", ".xlsm", ".XLSX"]), book.save)
         if rng.integers(2):
             _inside(target, rng)
 

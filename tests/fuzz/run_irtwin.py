@@ -16,11 +16,16 @@ from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.templates import environment
+from irtwin.resources import shipped
 from irtwin.storage.database import Workspace
+from irtwin.workflow import map_rows
+
+_SELDOM = ("pyarrow.dataset", "rosbags.highlevel", "sympy", "toppra")  # packages that few commands import
 
 
 def _read_what_ships() -> None:
-    """Do here, once, what each child would do anew: ontology, rules and shapes are worked out for some seconds.
+    """Do here, once, what each child would do anew: ontology, rules, shapes and templates are worked out for seconds.
 
     No store is opened on disk: a fork would lack its threads. What was read moves out of the collector's sight, else
     each child's first collection copies all of it.
@@ -28,13 +33,19 @@ def _read_what_ships() -> None:
     for module in pkgutil.walk_packages(irtwin.__path__, "irtwin."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
+    for name in _SELDOM:
+        importlib.import_module(name)
     graph = KnowledgeGraph()
     graph.load_ontology()
     _ = Ontology.of(graph).borders
     reason(graph)
     validate(graph)
-    with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)):
-        pass
+    with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as place:
+        map_rows(place, graph)
+    templates = environment(shipped())
+    for file in shipped().of("reports", ".html.jinja"):
+        if file.name.startswith(("energy/", "gap/", "layout/")):  # others have filters of their own
+            templates.get_template(file.name)
     gc.collect()
     gc.freeze()
 

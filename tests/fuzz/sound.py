@@ -1,4 +1,4 @@
-"""A sound workspace, its backup and a fleet's results, made once: what is spoilt afterwards is a copy."""
+"""A sound workspace, its backup and a fleet's results, each made once: what is spoilt afterwards is a copy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from tests.fuzz.streams import NOON
 from tests.small_robots import data_set
 
 ROBOT = "arm"
-PARTS = ("workspace", "given.zip", "fleet")
 
 
 class Sound:
@@ -24,30 +23,42 @@ class Sound:
         self._folder, self._joints = folder / f"of_{joints}_joints", joints
 
     def copy(self, part: str, folder: Path) -> None:
-        """Put one of `PARTS` into the folder of a case."""
-        source = self._folder / part
-        if not source.exists():
-            self._make()
+        """Put a part into the folder of a case: "data", "workspace", "given.zip" or "fleet"."""
+        source = self._part(part)
         (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / part)
 
-    def _make(self) -> None:
-        """Take a robot in, find its gap, watch it until it has an alarm; back all that up."""
-        folder, joints = self._folder, self._joints
-        folder.mkdir()
-        data, workspace, archive, fleet, stream = (folder / name for name in ("data", *PARTS, "stream"))
-        made = in_child(lambda: data_set(data, ROBOT, joints=joints) and None, folder)
+    def _part(self, part: str) -> Path:
+        """Make a part unless it is there, of those that it is made of."""
+        place = self._folder / part
+        if not place.exists():
+            {"data": self._data, "workspace": self._watched, "given.zip": self._backup, "fleet": self._fleet}[part](
+                place
+            )
+        return place
+
+    def _data(self, place: Path) -> None:
+        place.parent.mkdir(exist_ok=True)
+        made = in_child(lambda: data_set(place, ROBOT, joints=self._joints) and None, self._folder)
         assert made.status == 0, made.err
-        stream.write_text("".join(_line(number, joints) for number in range(500)))
-        into = ["--workspace", str(workspace)]
-        for words in (
-            ["run", str(data), *into],
-            ["diagnose", str(data), *into],
-            ["live", *into],
-            ["backup", str(archive), *into],
-            ["fleet", "diagnose", str(data), "--workers", "1", "--out", str(fleet)],
-        ):
-            done = in_child(partial(run_irtwin, words), folder, stream if words[0] == "live" else None)
-            assert done.status == 0, done.err
+
+    def _watched(self, place: Path) -> None:
+        """Take a robot in, find its gap, watch it until it has an alarm."""
+        data, into = self._part("data"), ("--workspace", place)
+        stream = self._folder / "stream"
+        stream.write_text("".join(_line(number, self._joints) for number in range(500)))
+        self._do("run", data, *into)
+        self._do("diagnose", data, *into)
+        self._do("live", *into, stdin=stream)
+
+    def _backup(self, place: Path) -> None:
+        self._do("backup", place, "--workspace", self._part("workspace"))
+
+    def _fleet(self, place: Path) -> None:
+        self._do("fleet", "diagnose", self._part("data"), "--workers", "1", "--out", place)
+
+    def _do(self, *words: str | Path, stdin: Path | None = None) -> None:
+        done = in_child(partial(run_irtwin, list(map(str, words))), self._folder, stdin)
+        assert done.status == 0, done.err
 
 
 def _line(number: int, joints: int) -> str:

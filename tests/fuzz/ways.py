@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 from hypothesis import strategies as st
+from openpyxl.utils.exceptions import IllegalCharacterError
 from tests.fuzz import archives, extensions, recordings, spoil, workspaces
 
 _Ways = Mapping[str, Callable[[Path, np.random.Generator], None]]
 _BEYOND_READING = (
     *(pa.ArrowException, OverflowError, OSError, LookupError, RecursionError, ValueError),
-    *(zipfile.BadZipFile, zlib.error, sqlite3.Error),
+    *(zipfile.BadZipFile, zlib.error, sqlite3.Error, IllegalCharacterError),
 )
 _WHERE: dict[str, tuple[str, _Ways]] = {  # what is spoilt -> where it is in a case's folder, and how
     "data": ("data", spoil.WAYS),

@@ -279,6 +279,11 @@ def _rows(path: Path) -> None:
             writer.write_table(batch)
 
 
+@_file("10000 columns.parquet")
+def _columns_that_are_allowed(path: Path) -> None:
+    pq.write_table(pa.table({f"x{k}": np.zeros(30) for k in range(10_000)}), path)
+
+
 @_file("11000 columns.parquet")
 def _wide(path: Path) -> None:
     pq.write_table(

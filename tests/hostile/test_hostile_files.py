@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,14 @@ def test_each_is_refused_in_a_line_or_read(name: str, tmp_path: Path) -> None:
     said = str(refused.value)
     assert "\n" not in said and len(said) < 1000
     assert re.match(REFUSED[name], said.removeprefix(str(path))), said
+
+
+def test_time_grows_with_columns_and_not_with_their_square(tmp_path: Path) -> None:
+    path = tmp_path / "run.parquet"
+    FILES["10000 columns.parquet"](path)
+    began = time.process_time()
+    assert len(read_recording(path, ROBOT, {}).columns) == 10_000
+    assert time.process_time() - began < 20  # s; with their square it is 100
 
 
 @pytest.mark.parametrize(

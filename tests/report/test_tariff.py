@@ -30,7 +30,7 @@ def test_all_of_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("price = ", "not a TOML file"),
+        ("price = ", "not valid TOML"),
         ("price_per_kWh = 0.2", "unknown key 'price_per_kWh': did you mean price_per_kwh?"),
         ("robots = 3", "unknown key 'robots': known are price_per_kwh, currency, co2_kg_per_kwh"),
         ("price_per_kwh = 0.2", "price_per_kwh needs a currency"),

@@ -51,7 +51,7 @@ def test_a_host_that_is_not_ours(new_graph: Callable[[], Path]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("content", "message"), [(None, "cannot read the token"), (b" \n", "the token file is empty")])
+@pytest.mark.parametrize(("content", "message"), [(None, "token: cannot be read"), (b" \n", "the token file is empty")])
 def test_a_token_file_that_says_nothing(
     tmp_path: Path, new_graph: Callable[[], Path], content: bytes | None, message: str
 ) -> None:

@@ -96,5 +96,5 @@ def test_a_file_that_cannot_be_used_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"plant.toml: base_iri begins with http"):
         Workspace(tmp_path)
     (tmp_path / "plant.toml").write_text("base_iri =", encoding="utf-8")
-    with pytest.raises(InputError, match=r"plant.toml: not a TOML file"):
+    with pytest.raises(InputError, match=r"plant.toml: not valid TOML"):
         Workspace(tmp_path)

@@ -14,6 +14,7 @@ from pathlib import Path
 from irtwin.alarms.alarm import ACTIVE, Alarm, Event, message
 from irtwin.alarms.delivery import Delivery
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.storage import files
 
@@ -21,6 +22,7 @@ EVERY = 1.0  # s between two looks
 Look = Callable[[], Sequence[Alarm]]
 Announce = Callable[[str], None]
 _FOLDER, _TOLD = "alarms", "told.json"  # in the workspace
+_MOST_BYTES = 100_000_000
 
 
 class Told:
@@ -32,7 +34,7 @@ class Told:
         self._known: dict[tuple[str | None, ...], Alarm] | None = None
         if file.exists():
             try:
-                alarms = [Alarm.of(row) for row in parse_json(file.read_bytes())]
+                alarms = [Alarm.of(row) for row in parse_json(read_text(file, _MOST_BYTES))]
             except (ValueError, KeyError, TypeError) as error:
                 raise InputError(f"{file}: cannot be understood ({error}); delete it, and all is told anew") from None
             self._known = {alarm.key: alarm for alarm in alarms}

@@ -30,7 +30,8 @@ from urllib.parse import urlsplit
 
 from irtwin.alarms.delivery import Receiver
 from irtwin.errors import InputError
-from irtwin.signals.toml_file import Table, read_toml, shown
+from irtwin.signals.toml_file import Table, shown
+from irtwin.toml_text import read_toml
 
 NAME = "alarms.toml"
 _VARIABLE = re.compile(r"IRTWIN_[A-Z0-9_]{1,100}")

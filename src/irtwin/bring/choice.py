@@ -35,7 +35,8 @@ def meanings(recording: Recording, robot: Robot, told: Told) -> list[Meaning]:
         chosen |= {each.column: each for each in choose(recording, field, candidates, robot)}
     _check(recording, robot, chosen, {each.joint for each in first.values() if each.field == "q"})
     texts = {name: Meaning(name, None, why="holds neither numbers nor times of ISO 8601") for name in recording.texts}
-    return [{**chosen, **texts}[name] for name in recording.names]
+    chosen |= texts
+    return [chosen[name] for name in recording.names]
 
 
 def _per_joint(recording: Recording, field: str, found: Sequence[Meaning], robot: Robot) -> list[Meaning]:

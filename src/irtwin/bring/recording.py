@@ -175,7 +175,8 @@ def _parquet(path: Path) -> Recording:
         names = [each.name for each in schema if not pa.types.is_nested(each.type) and not _is_binary(each.type)]
         table = read_columns(path, file, names)
     columns, texts = as_columns(path, table, ("row", 1))
-    others = [name.strip() for name in schema.names if name not in names]
+    read = set(names)
+    others = [name.strip() for name in schema.names if name not in read]
     return Recording(path, "Parquet", columns, (*texts, *others))
 
 

@@ -132,6 +132,7 @@ def plan(
             rate=rate,
             database=database,
             graph_url=graph_url,
+            announce=say,
         )
     _say_unchecked(made.checks_itself)
     clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
@@ -176,7 +177,7 @@ def predict(
     else:
         expected, kept = plans.predict(
             twin, run, workspace, name=name or run.stem, out=out, payload_mass=payload_mass, payload_com=payload_com,
-            database=database, graph_url=graph_url,
+            database=database, graph_url=graph_url, announce=say,
         )  # fmt: skip
     _say_unchecked(expected.checks_itself)
     click.echo(f"{_where(out, kept)}: {(kept or expected).price or _NO_POWER}")
@@ -207,7 +208,14 @@ def slow(
     from irtwin import plans
 
     saved, kept = plans.slow(
-        robot, run, times, workspace, name=name or f"{run}_{times:g}_slower", database=database, graph_url=graph_url
+        robot,
+        run,
+        times,
+        workspace,
+        name=name or f"{run}_{times:g}_slower",
+        database=database,
+        graph_url=graph_url,
+        announce=say,
     )
     by = "" if saved.half_width is None else f" +- {saved.half_width:.2g}"
     said = f"takes {abs(saved.value):.3g}{by} J {'less' if saved.value >= 0 else 'more'}"

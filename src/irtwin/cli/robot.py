@@ -197,13 +197,10 @@ def _read_positions(file: Path, described: Robot) -> np.ndarray:
     """Return the (N, n) joint positions of a CSV file's columns q_JOINT."""
     import numpy as np
 
-    from irtwin.input_file import read_input
+    from irtwin.input_file import read_text
     from irtwin.signals.channels import CHANNELS
 
-    try:
-        lines = csv.reader(read_input(file, _LARGEST).decode("utf-8-sig").splitlines())
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from error
+    lines = csv.reader(read_text(file, _LARGEST).splitlines())
     head = [name.strip() for name in next(lines, [])]
     wanted = list(CHANNELS["q"].columns(described.joint_names))
     missing = [name for name in wanted if name not in head]

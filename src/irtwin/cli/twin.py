@@ -308,7 +308,7 @@ def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | No
     """
     from irtwin import workflow
 
-    click.echo(workflow.adopt(robot, workspace, database=database, graph_url=graph_url))
+    click.echo(workflow.adopt(robot, workspace, database=database, graph_url=graph_url, announce=say))
 
 
 def _state(finding: Finding) -> str:

@@ -25,9 +25,9 @@ def drop(robot: str, run: str | None, workspace: Path, database: str | None, gra
     from irtwin import upkeep
 
     if run is None:
-        upkeep.drop(robot, workspace, database=database, graph_url=graph_url)
+        upkeep.drop(robot, workspace, database=database, graph_url=graph_url, announce=say)
     else:
-        upkeep.drop_run(robot, run, workspace, database=database, graph_url=graph_url)
+        upkeep.drop_run(robot, run, workspace, database=database, graph_url=graph_url, announce=say)
 
 
 @click.command()

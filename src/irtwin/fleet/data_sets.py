@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 
 _FILE = "dataset.toml"
+_LONGEST = 100_000_000  # bytes of a list: a million places
 _BLOCK = 1 << 20  # bytes read at once
 
 
@@ -30,13 +32,8 @@ def find_data_sets(source: str) -> list[str]:
 def _on_disk(source: Path) -> list[str]:
     if source.is_dir():
         return [str(file.parent.resolve()) for file in source.rglob(_FILE)]
-    try:
-        lines = source.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise InputError(f"{source}: cannot be read ({why}); name a folder of data sets, a list or a URL") from None
     places = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_text(source, _LONGEST).splitlines(), start=1):
         place = line.strip()
         if not place or place.startswith("#"):
             continue

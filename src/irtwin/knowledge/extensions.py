@@ -16,6 +16,7 @@ from rdflib.plugins.sparql.parser import parseQuery
 from sqlalchemy import Engine
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.knowledge.mapping.document import TermMap, TriplesMap
 from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.reader import read_document
@@ -29,7 +30,7 @@ from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL, PREFIXES, shorten
 from irtwin.knowledge.vocabulary import SH as SHACL_TERMS
-from irtwin.resources import Files, Resource, Resources
+from irtwin.resources import MOST_BYTES, Files, Resource, Resources
 
 _TEXTS = (SH.select, SH.ask, SH.construct)
 _NAMES_A_TERM = [swrl.NAMESPACE + name for name in ("classPredicate", "propertyPredicate")]
@@ -271,7 +272,7 @@ def _with_line(file: Resource, message: str) -> str:
 def _line_of(file: Resource, text: str) -> int:
     """Return the line on which a text first stands, by its own first line; 1 where it does not."""
     wanted = next((line.strip() for line in text.splitlines() if line.strip()), "")
-    lines = list(enumerate(file.path.read_text(encoding="utf-8").splitlines(), 1))
+    lines = list(enumerate(read_text(file.path, MOST_BYTES).splitlines(), 1))
     as_name = re.compile(rf"[:#/]{re.escape(wanted)}\b") if re.fullmatch(r"[\w-]+", wanted) else re.compile("$^")
     found = [number for number, line in lines if as_name.search(line)] or [n for n, line in lines if wanted in line]
     return found[0] if wanted and found else 1

@@ -10,12 +10,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.knowledge import locality
 from irtwin.knowledge.locality import Reach
 from irtwin.knowledge.vocabulary import PREFIXES
 
 FILE = "irtwin-reach.json"  # {"made_by": digest, "queries": {text: Reach}, "digest": of the queries}
+
+_MOST_BYTES = 100_000_000
 
 
 @contextmanager
@@ -35,11 +39,11 @@ def kept(folder: Path | None) -> Iterator[None]:
 def _read(file: Path) -> dict[str, Reach]:
     """Return what a file keeps; nothing where other software made it, or it was altered."""
     try:
-        said = parse_json(file.read_text())
+        said = parse_json(read_text(file, _MOST_BYTES))
         if said["made_by"] == _made_by() and said["digest"] == _digest(said["queries"]):
             queries = said["queries"].items()
             return {text: Reach(**{name: frozenset(iris) for name, iris in reach.items()}) for text, reach in queries}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InputError, ValueError, KeyError, TypeError):
         pass
     return {}
 

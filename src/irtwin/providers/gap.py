@@ -93,7 +93,7 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
         raise InputError(
             f"{robot_id}: its diagnosis ({found.verdict}) added nothing to the twin, so there is nothing to adopt"
         )
-    text = workspace.read_document(found.twin_file, found.twin_sha256).decode()
+    text = workspace.read_document(found.twin_file, found.twin_sha256)
     twin = from_json(text, inside(workspace.folder, found.twin_file))
     known = robot_motions(workspace, robot_id)
     parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)

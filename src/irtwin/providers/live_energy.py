@@ -59,7 +59,7 @@ def known_twin(workspace: Workspace, robot_id: str) -> KnownTwin | None:
         row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
     if row is None:
         return None
-    document = workspace.read_document(row.file, row.sha256).decode()
+    document = workspace.read_document(row.file, row.sha256)
     twin = from_json(document, inside(workspace.folder, row.file))
     return KnownTwin(row.twin_id, twin, _bands(workspace, row.twin_id, twin.robot.joint_names))
 

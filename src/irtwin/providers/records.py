@@ -339,7 +339,7 @@ def load_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin]:
         row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
     if row is None:
         raise InputError(f"{workspace.folder}: robot {robot_id} has no twin yet; run its data set first")
-    document = workspace.read_document(row.file, row.sha256).decode()
+    document = workspace.read_document(row.file, row.sha256)
     return row.twin_id, from_json(document, inside(workspace.folder, row.file))
 
 

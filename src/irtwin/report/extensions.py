@@ -7,10 +7,11 @@ from functools import lru_cache
 import jinja2
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.knowledge import extensions
 from irtwin.report.questions import read_questions
 from irtwin.report.templates import environment
-from irtwin.resources import Files, Resource, Resources, shipped
+from irtwin.resources import MOST_BYTES, Files, Resource, Resources, shipped
 
 _REPORTS = {"energy": {"robot", "twin"}, "gap": {"robot", "diagnosis"}, "layout": set[str]()}  # what is bound in each
 
@@ -32,6 +33,8 @@ def _check(files: Files) -> None:
                 _check_question(file, _REPORTS[report])
             elif file.name.endswith(".html.jinja"):
                 _check_template(file, Resources(files))
+            else:
+                read_text(file.path, MOST_BYTES)
 
 
 def _check_question(file: Resource, bound: set[str]) -> None:
@@ -39,7 +42,7 @@ def _check_question(file: Resource, bound: set[str]) -> None:
         (question,) = read_questions([file.path]).values()
     except KeyError:
         raise InputError(f"{file.path}, line 1: a question begins with `# title: ...`; add that line") from None
-    header = file.path.read_text(encoding="utf-8").count("\n") - question.text.count("\n") - 1
+    header = read_text(file.path, MOST_BYTES).count("\n") - question.text.count("\n") - 1
     fault = extensions.sparql_fault(question.text)
     if fault is not None:
         raise InputError(f"{file.path}, line {header + fault[0]}, {fault[1]}")
@@ -56,6 +59,6 @@ def _check_question(file: Resource, bound: set[str]) -> None:
 
 def _check_template(file: Resource, resources: Resources) -> None:
     try:
-        environment(resources).parse(file.path.read_text(encoding="utf-8"))
+        environment(resources).parse(read_text(file.path, MOST_BYTES))
     except jinja2.TemplateSyntaxError as error:
         raise InputError(f"{file.path}, line {error.lineno}: {error.message}") from error

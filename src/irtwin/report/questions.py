@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from irtwin.resources import Resources
+from irtwin.input_file import read_text
+from irtwin.resources import MOST_BYTES, Resources
 
 Row = Mapping[str, Any]  # a variable's Python value, None where it is unbound
 
@@ -60,7 +61,7 @@ def added_to(resources: Resources, report: str) -> list[str]:
 
 
 def read_questions(files: Iterable[Path]) -> dict[str, Question]:
-    """Read questions, by file stem."""
+    """Read questions, by file stem. Raises InputError where one is not UTF-8."""
     return {file.stem: _parse(file) for file in files}
 
 
@@ -70,7 +71,7 @@ def ask(graph: Graph, questions: Mapping[str, Question], bindings: Mapping[str, 
 
 
 def _parse(file: Path) -> Question:
-    text = file.read_text(encoding="utf-8")
+    text = read_text(file, MOST_BYTES)
     header = dict(_HEADER.findall(text))
     bind = tuple(name.strip() for name in header.get("bind", "").split(",") if name.strip())
     return Question(file.stem, header["title"], bind, _HEADER.sub("", text).strip())

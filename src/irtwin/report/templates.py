@@ -10,11 +10,12 @@ from jinja2.bccache import Bucket
 from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
 
+from irtwin.input_file import read_text
 from irtwin.report import wording
 from irtwin.report.apart import written_apart
 from irtwin.report.energy import tables
 from irtwin.report.heading import heading
-from irtwin.resources import Resources
+from irtwin.resources import MOST_BYTES, Resources
 
 
 class _CompiledTemplates(jinja2.BytecodeCache):
@@ -49,7 +50,7 @@ def environment(resources: Resources) -> jinja2.Environment:
 
     def source(name: str) -> tuple[str, str, Callable[[], bool]] | None:
         known = {file.name: file.path for file in resources.of("reports", ".html.jinja")}
-        return (known[name].read_text(encoding="utf-8"), str(known[name]), lambda: True) if name in known else None
+        return (read_text(known[name], MOST_BYTES), str(known[name]), lambda: True) if name in known else None
 
     environment = SandboxedEnvironment(
         loader=jinja2.FunctionLoader(source),
@@ -71,4 +72,4 @@ def environment(resources: Resources) -> jinja2.Environment:
 
 def style(resources: Resources, name: str = "layout/style.css") -> Markup:
     """Return a style sheet of the reports."""
-    return Markup(resources.path("reports", name).read_text(encoding="utf-8"))
+    return Markup(read_text(resources.path("reports", name), MOST_BYTES))

@@ -13,7 +13,7 @@ from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import read_text
 from irtwin.robot.description import Joint, Link, Robot, Shape
 
 _MOVING = ("revolute", "continuous", "prismatic")
@@ -29,11 +29,7 @@ def read_urdf(path: Path | str) -> Robot:
 
     Raises InputError where the file cannot be read, does not parse, or describes no robot that can be modelled.
     """
-    try:
-        text = read_input(Path(path), _LARGEST).decode()
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save the URDF as UTF-8") from error
-    return parse_urdf(text, source=str(path))
+    return parse_urdf(read_text(Path(path), _LARGEST), source=str(path))
 
 
 def parse_urdf(text: str, source: str = "URDF") -> Robot:

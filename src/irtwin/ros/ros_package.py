@@ -15,6 +15,7 @@ import numpy as np
 from irtwin.effects.rigid_body import flange_frame
 from irtwin.errors import InputError
 from irtwin.identification.motion_limits import FULL_SPEED_AFTER
+from irtwin.input_file import read_text
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements, ranges
@@ -23,6 +24,7 @@ from irtwin.ros.collision_pairs import free_pairs, home
 from irtwin.ros.description import described
 from irtwin.storage.files import write
 
+_MOST_BYTES = 100_000  # of a manifest
 _VIEWED = 200  # random poses that the camera is fitted to
 _FIELD = pi / 4  # rad: RViz' field of view, upright
 
@@ -92,7 +94,7 @@ def _check_folder(folder: Path, name: str) -> None:
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return
     manifest = folder / "package.xml"
-    if not (manifest.is_file() and f"<name>{name}</name>" in manifest.read_text(encoding="utf-8", errors="replace")):
+    if not (manifest.is_file() and f"<name>{name}</name>" in read_text(manifest, _MOST_BYTES)):
         raise InputError(f"{folder}: is there already, and is no ROS package {name}; name a new folder")
 
 

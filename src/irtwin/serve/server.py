@@ -23,6 +23,7 @@ from starlette.routing import Route
 
 from irtwin.asking import checked
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.report.plant.tariff import read_tariff
 from irtwin.serve import individuals, ontology, page
@@ -42,6 +43,7 @@ from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
 
 _GRACE = 3  # s that answers under way may still take when the server stops
+_LONGEST_TOKEN = 100_000  # bytes
 _LATE = "Cancel %s running task(s), timeout graceful shutdown exceeded"  # uvicorn's
 
 
@@ -138,10 +140,7 @@ def read_token(file: Path | None) -> str | None:
     """Return the token for updates: from the file, else the environment's IRTWIN_TOKEN, else None."""
     if file is None:
         return os.environ.get("IRTWIN_TOKEN") or None
-    try:
-        token = file.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot read the token: {error}") from None
+    token = read_text(file, _LONGEST_TOKEN).strip()
     if not token:
         raise InputError(f"{file}: the token file is empty; put a token into it")
     return token

@@ -19,7 +19,8 @@ from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled, holes
 from irtwin.signals.sources.bag_source import number_topics
-from irtwin.signals.toml_file import Table, read_toml, shown, take
+from irtwin.signals.toml_file import Table, shown, take
+from irtwin.toml_text import read_toml
 
 PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
 ROLES = ("observed", "reference", "simulated", PLANNED)
@@ -95,7 +96,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
     """
     folder = Path(folder)
     file = folder / "dataset.toml"
-    document = read_toml(file)
+    document = _document(file)
     table = Table(file, "[robot]", take(document, "robot", dict, file, "[robot]"))
     robot = _robot(folder, table)
     repairs = [f"{file}: {_held(robot)}"] if robot.held else []
@@ -206,6 +207,13 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
     return 0.0, (0.0, 0.0, 0.0)
 
 
+def _document(file: Path) -> dict[str, Any]:
+    real = real_path(file)
+    if real is None or not real.exists():
+        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
+    return read_toml(file)
+
+
 def topics_told(file: Path, robot: Robot) -> dict[str, str]:
     """Return what [topics] of the data set around a run says; nothing where none lists the file. Raises InputError."""
     for document, table in _listing(file):
@@ -231,7 +239,7 @@ def read_robot(source: Path) -> Robot:
     file = source / "dataset.toml" if source.is_dir() else source
     if file.suffix != ".toml":
         return read_urdf(file)
-    return _robot(file.parent, Table(file, "[robot]", take(read_toml(file), "robot", dict, file, "[robot]")))
+    return _robot(file.parent, Table(file, "[robot]", take(_document(file), "robot", dict, file, "[robot]")))
 
 
 def _robot(folder: Path, table: Table) -> Robot:

@@ -1,26 +1,18 @@
-"""A data set's TOML file, read as hostile input: every fault names the file, the table and the key."""
+"""A table of a TOML file: every fault names the file, the table and the key."""
 
 from __future__ import annotations
 
 import difflib
 import math
-import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input, real_path
+from irtwin.input_file import real_path
 
 BAG_FOLDER = "metadata.yaml"  # what a folder that is a ROS 2 bag holds
-_LARGEST = 2_000_000  # bytes, of thousands of runs; a million takes the parser up to 2 s
-_GREATEST = 1e300  # of a number
-_DEEPEST = 32  # tables in tables
-_MOST_KEYS = 1000  # of a table: each that nobody knows is held against those that are known
-_KEY = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-_DOTTED = re.compile(rf"(?:^|[\[{{,])[ \t]*{_KEY}(?:[ \t]*\.[ \t]*{_KEY}){{{_DEEPEST},}}[ \t]*[=\]]", re.MULTILINE)
 _NEAR, _VERY_NEAR = 0.7, 0.8  # share of letters in common of a key and its misspelling (`difflib`)
 
 
@@ -87,46 +79,6 @@ class Table:
         if not (real.is_file() or (real / BAG_FOLDER).is_file()):
             raise InputError(f'{self.file}: {self.name} {key} = "{text}": there is no such file')
         return path
-
-
-def read_toml(file: Path) -> dict[str, Any]:
-    """Read a data set's dataset.toml. Raises InputError, naming the file, on what is no TOML or beyond bounds."""
-    real = real_path(file)
-    if real is None or not real.exists():
-        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
-    content = read_input(file, _LARGEST)
-    try:
-        text = content.decode()
-        if _DOTTED.search(text):  # the parser's memory grows with the square of a key's parts
-            raise InputError(f"{file}: not valid TOML: nested too deeply")
-        document = tomllib.loads(text)
-    except ValueError as error:  # an integer of thousands of digits is no TOMLDecodeError
-        raise InputError(f"{file}: not valid TOML: {error}") from error
-    except RecursionError as error:
-        raise InputError(f"{file}: not valid TOML: nested too deeply") from error
-    _check_values(document, file, "", 0)
-    return document
-
-
-def _check_values(value: Any, file: Path, name: str, depth: int) -> None:
-    """Raise on numbers beyond a float, null characters, which neither paths nor databases take, and deep nesting."""
-    if depth > _DEEPEST:
-        raise InputError(f"{file}: not valid TOML: nested too deeply")
-    if isinstance(value, int) and not -_GREATEST <= value <= _GREATEST:
-        raise InputError(f"{file}: {name} is a number beyond {_GREATEST:g}")
-    if isinstance(value, str) and "\0" in value:
-        raise InputError(f"{file}: {name} contains a null character")
-    if isinstance(value, dict) and len(value) > _MOST_KEYS:
-        raise InputError(
-            f"{file}: {name[:100] or 'the file'} has {len(value)} keys; keep at most {_MOST_KEYS} in a table"
-        )
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _check_values(key, file, f"a key of {name}", depth)
-            _check_values(inner, file, f"{name}.{key}".removeprefix("."), depth + 1)
-    if isinstance(value, list):
-        for inner in value:
-            _check_values(inner, file, name, depth + 1)
 
 
 def shown(value: Any) -> str:

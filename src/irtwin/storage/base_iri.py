@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 from urllib.parse import urlsplit
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.toml_text import read_toml
 
 DEFAULT = "https://w3id.org/irtwin/id/"
 KEY = "base_iri"  # of plant.toml
@@ -27,7 +26,6 @@ SERVED = (
     "sparql",
     "tables",
 )
-_MOST_BYTES = 100_000
 _IRI = re.compile(r"[^\x00-\x20<>\"{}|\\^`?#%]+")
 
 
@@ -38,10 +36,7 @@ def said(file: Path) -> str | None:
     """
     if not file.exists():
         return None
-    try:
-        base = tomllib.loads(read_input(file, _MOST_BYTES).decode("utf-8")).get(KEY)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not a TOML file: {error}") from None
+    base = read_toml(file).get(KEY)
     return None if base is None else checked(base, str(file))
 
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import tomllib
 import uuid
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
 from irtwin.storage import files
 from irtwin.storage.object_storage import ObjectStorage, checked_url
+from irtwin.toml_text import read_toml
 from irtwin.trust import how, trust, trusted
 
 FILE = "series.toml"
-_MOST_BYTES = 10_000
 _MOVE = "`irtwin backup FILE`, then `irtwin restore FILE --workspace NEW --series URL` moves them"
 
 
@@ -103,9 +101,9 @@ def _said(folder: Path) -> _Said | None:
 
 def _read(file: Path) -> _Said:
     try:
-        said = tomllib.loads(read_input(file, _MOST_BYTES).decode("utf-8"))
+        said = read_toml(file)
         return _Said(checked_url(str(said["url"])), str(said["workspace"]))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, InputError):
+    except (KeyError, InputError):
         raise InputError(
             f"{file}: damaged: it has to say url and workspace, as it did; put the file back, or `irtwin restore` a "
             "backup into another folder"

@@ -14,7 +14,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
@@ -56,10 +56,7 @@ _BASE_PARAMETER: _Columns = {
 
 def load(path: Path) -> Twin:
     """Read a twin. Raises InputError, naming file and key, where the file is none."""
-    try:
-        return from_json(read_input(path, _LARGEST).decode(), path)
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text; name a twin that irtwin saved") from error
+    return from_json(read_text(path, _LARGEST), path)
 
 
 def to_json(twin: Twin) -> str:
@@ -93,7 +90,7 @@ def to_json(twin: Twin) -> str:
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
-def from_json(text: str, path: Path) -> Twin:
+def from_json(text: str | bytes, path: Path) -> Twin:
     """Return the twin of JSON text; `path` is where it stood. Raises InputError, naming file and key."""
     try:
         document = parse_json(text)

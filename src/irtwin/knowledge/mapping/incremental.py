@@ -73,7 +73,7 @@ def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], f
             schema_version(connection),
             history(connection),
             graph.base,
-            *(path.read_text() for path in documents),
+            *(path.read_text(encoding="utf-8") for path in documents),
             *(statement.sql for statement in statements),
         )
         reached = bookmark(connection) if any(statement.reads for statement in statements) else None

@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import Table
-from irtwin.resources import Files, Resources, shipped
+from irtwin.resources import MOST_BYTES, Files, Resources, shipped
 
 _HEADER = re.compile(r"^# (title|question|theme|of): (.+)$", re.MULTILINE)
 THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
@@ -110,11 +111,8 @@ def _plain(value: Any) -> Any:
 
 
 def read_question(file: Path) -> Question:
-    """Read a named question. Raises InputError where its header lacks something."""
-    try:
-        text = file.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file}: is no UTF-8 ({error.reason} at byte {error.start}); save it as such") from None
+    """Read a named question. Raises InputError where it is not UTF-8, or its header lacks something."""
+    text = read_text(file, MOST_BYTES)
     header = dict(_HEADER.findall(text))
     lacking = [name for name in ("title", "question", "theme") if name not in header]
     if lacking:

@@ -16,9 +16,12 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+from irtwin.errors import InputError
+from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 
 _SUMS = "irtwin-sums.json"  # {"read": {name: [CRC-32, mtime in ns]}, "manifest": [name, size, CRC-32]}
+_MOST_BYTES = 100_000_000  # of it
 _BLOCK, _HEADER = 32768, 7
 _PIECE = 1 << 20
 _TRIES = 20
@@ -76,8 +79,8 @@ def _fault(folder: Path) -> str | None:
 
 def _noted(folder: Path) -> dict[str, Any]:
     try:
-        said = parse_json((folder / _SUMS).read_text())
-    except (OSError, ValueError):
+        said = parse_json(read_text(folder / _SUMS, _MOST_BYTES))
+    except (InputError, ValueError):
         return {}
     return said if isinstance(said, dict) else {}
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
 from irtwin.storage.base_iri import KEY
 from irtwin.storage.database import TARIFF
+from irtwin.toml_text import read_toml
 
 JOULES = 3.6e6  # of a kWh
 _KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
-_MOST_BYTES = 100_000
 
 
 @dataclass(frozen=True)
@@ -43,10 +41,7 @@ def read_tariff(workspace: Path) -> Tariff:
     file = workspace / TARIFF
     if not file.exists():
         return Tariff()
-    try:
-        said = tomllib.loads(read_input(file, _MOST_BYTES).decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not a TOML file: {error}") from None
+    said = read_toml(file)
     for key in said:
         if key not in _KEYS:
             near = get_close_matches(key, _KEYS, n=1)

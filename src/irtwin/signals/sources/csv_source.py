@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.csv
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import as_text, read_input
 from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS, Source, first_line
 
 _LARGEST = 1_000_000_000  # bytes; held in memory while it is read
@@ -80,7 +80,8 @@ class CsvSource(Source):
             raise InputError(f"{self.path}: is empty; a run has one line of column names and one line per sample")
         if b"\n" not in text:
             raise InputError(f"{self.path}: has no sample below its first line; an empty run cannot be used")
-        self._check_characters(text)
+        if not text.isascii():
+            as_text(self.path, text)  # Arrow stumbles over such a line of the wrong length, and says so to nobody
         head = text[: text.index(b"\n")]
         if b"," not in head and (other := next((sign for sign in (b";", b"\t", b"|") if sign in head), None)):
             raise InputError(
@@ -91,18 +92,6 @@ class CsvSource(Source):
         if columns > MOST_COLUMNS:
             raise InputError(f"{self.path}, line 1: {columns} columns; a run has at most {MOST_COLUMNS}")
         return text
-
-    def _check_characters(self, text: bytes) -> None:
-        """Raise where it is not UTF-8: Arrow stumbles over such a line of the wrong length, and says so to nobody."""
-        if text.isascii():
-            return
-        for number, line in enumerate(io.BytesIO(text), start=1):
-            try:
-                line.decode()
-            except UnicodeDecodeError as error:
-                raise InputError(
-                    f"{self.path}, line {number}: not UTF-8 text (byte {error.start + 1}); save the run as UTF-8"
-                ) from error
 
 
 def csv_fault(error: Exception) -> str:

@@ -54,16 +54,18 @@ def read_columns(path: Path, file: ParquetFile, columns: Sequence[str]) -> pa.Ta
     values, pages = (Unpacking(path, path.stat().st_size) for _ in range(2))
     # a page may repeat a value at no cost
     values.take(rows * len(columns) * _BYTES, f"{rows} samples of {len(columns)} columns", "cut it into several")
-    leaves = [file.schema.column(place).path for place in range(len(file.schema))]  # of nested columns, their parts
+    parts, schema = file.schema, file.schema_arrow  # each is made anew when it is asked for
+    leaves = [parts.column(place).path for place in range(len(parts))]  # of nested columns, their parts
     if repeated := [name for name, count in Counter(leaves).items() if count > 1]:
         raise InputError(f"{path}: column {repeated[0][:LONGEST_NAME]} occurs twice; keep one")
+    places = {name: place for place, name in enumerate(leaves)}
     groups = [file.metadata.row_group(group) for group in range(file.num_row_groups)]
     with path.open("rb") as content:
         for name in columns:
             for group in groups:
-                for size in _page_sizes(content, group.column(leaves.index(name))):
+                for size in _page_sizes(content, group.column(places[name])):
                     pages.take(size, f"column {name}", _REMEDY)
-    texts = [name for name in columns if is_text(file.schema_arrow.field(name).type)]
+    texts = [name for name in columns if is_text(schema.field(name).type)]
     with ParquetFile(path, metadata=file.metadata, read_dictionary=texts) as again:
         return again.read(columns=list(columns))
 
