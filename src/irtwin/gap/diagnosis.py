@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.document.cause_ids import cause_ids
+from irtwin.document.curves import Curves
+from irtwin.document.document import Closeable, Cutoff, Document
+from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.local import LocalEffect
@@ -20,10 +24,6 @@ from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
-from irtwin.gap.document.cause_ids import cause_ids
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Closeable, Document
-from irtwin.gap.document.experiment import Experiment
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
@@ -56,7 +56,6 @@ from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.two_processes import begun
 from irtwin.robot.description import Robot
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 from irtwin.twin.torque_scale import TorqueScale
@@ -146,7 +145,7 @@ class Diagnosis:
         return self.curves.to_json()
 
     def to_json(self) -> dict[str, Any]:
-        """Return the document in the form of its schema, `irtwin.gap.document.document.schema()`."""
+        """Return the document in the form of its schema, `irtwin.document.document.schema()`."""
         return self.document.to_json()
 
 

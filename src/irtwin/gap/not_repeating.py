@@ -10,9 +10,9 @@ from typing import TypeVar
 import numpy as np
 from scipy.special import expit
 
+from irtwin.document import document
+from irtwin.document.cause_ids import cause_ids
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.document import document
-from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.hypotheses import MISSING

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from irtwin.document import document
+from irtwin.document.cause_ids import cause_ids
+from irtwin.document.document import Closeable
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.document import document
-from irtwin.gap.document.cause_ids import cause_ids
-from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause

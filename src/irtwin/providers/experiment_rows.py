@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 
-from irtwin.gap.document.experiment import Experiment, Programme
+from irtwin.document.experiment import Experiment, Programme
 from irtwin.storage import experiment_schema as schema
 from irtwin.storage.gap_schema import OfDiagnosis
 

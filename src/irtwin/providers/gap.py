@@ -13,9 +13,9 @@ from typing import Any
 
 from sqlalchemy import select
 
+from irtwin.document.curves import Curves
+from irtwin.document.document import Document
 from irtwin.errors import InputError
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document
 from irtwin.identification.validation import split
 from irtwin.providers import gap_rows
 from irtwin.providers.gap_rows import Place

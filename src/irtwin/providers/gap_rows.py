@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Cause, Change, Document, Finding, Location, NotRepeating
+from irtwin.document.curves import Curves
+from irtwin.document.document import Cause, Change, Document, Finding, Location, NotRepeating
 from irtwin.providers.experiment_rows import rows_of_experiment
 from irtwin.storage import gap_schema
 from irtwin.storage.gap_schema import OfDiagnosis

@@ -9,11 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
+from irtwin.document import form
+from irtwin.document.experiment import Experiment
+from irtwin.document.form import Between, OneOf, goes_with
 from irtwin.errors import InputError
-from irtwin.gap.document import form
-from irtwin.gap.document.experiment import Experiment
-from irtwin.gap.document.form import Between, OneOf, goes_with
-from irtwin.signals.cutoff import Cutoff
 
 Share = Annotated[float, Between(0, 1)]
 Interval = tuple[float, float]  # 95 %
@@ -213,6 +212,15 @@ class TorqueScale:
     source: ScaleSource
     low: float
     high: float
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cutoff:
+    """The cutoff of the low-pass filter that all runs passed, Hz; whether a user stated it; in words, why so."""
+
+    hz: float
+    stated: bool
     why: str
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from irtwin.gap.document import form
-from irtwin.gap.document.document import Channel
-from irtwin.twin.friction_curve import FrictionCurve
+from irtwin.document import form
+from irtwin.document.document import Channel
 
 Numbers = tuple[float | None, ...]
+Known = tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +60,47 @@ class PlannedMotion:
     joints: tuple[str, ...]
     units: tuple[str, ...]
     q: tuple[Numbers, ...]
+
+
+@dataclass(frozen=True)
+class FrictionNumber:
+    """A parameter of a friction effect, with its 95 % interval."""
+
+    effect: str
+    name: str
+    value: float
+    unit: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredFriction:
+    """Measured torque less all of a twin that is no friction, in bins of speed: mean, and quartiles `low`, `high`."""
+
+    speed: Known
+    torque: Known
+    low: Known
+    high: Known
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionCurve:
+    """A joint's friction over the speeds of some runs, in `unit` over `speed_unit`, with its 95 % band `low` to `high`.
+
+    `role`: that of the runs. `measured` is None where no torque was measured.
+    """
+
+    joint: str
+    role: str
+    speed_unit: str
+    unit: str
+    speed: Known
+    torque: Known
+    low: Known
+    high: Known
+    numbers: tuple[FrictionNumber, ...]
+    measured: MeasuredFriction | None
 
 
 @dataclass(frozen=True, kw_only=True)
