@@ -6,19 +6,40 @@ from dataclasses import dataclass
 from typing import Any
 
 from irtwin.document import form
-from irtwin.document.document import Channel
+from irtwin.document.told import part, tells, told
+from irtwin.document.words import Channel, Joint, Regime, Run
 
 Numbers = tuple[float | None, ...]
 Known = tuple[float, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@part("Gap_Regime_Excess", of="regime_Excess_of")
+class RegimeExcess:
+    """The excess of a joint in a regime, `rank` its place among them; None where it did not move so."""
+
+    joint: Joint = told("located_in_Joint", key=True)
+    regime: Regime = told("located_in_Regime", key=True)
+    rank: int = told("Rank")
+    excess: float | None = told("Gap_Excess")
+
+
+@part()
 class ExcessMap:
     """The excess over the noise floor of each joint (a row of `excess`) in each regime (a column)."""
 
     joints: tuple[str, ...]
     regimes: tuple[str, ...]
     excess: tuple[Numbers, ...]
+
+    @property
+    @tells()
+    def cells(self) -> tuple[RegimeExcess, ...]:
+        """The map, joint by joint."""
+        return tuple(
+            RegimeExcess(joint=joint, regime=regime, rank=rank, excess=excess)
+            for joint, values in zip(self.joints, self.excess, strict=True)
+            for rank, (regime, excess) in enumerate(zip(self.regimes, values, strict=True), start=1)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,15 +62,21 @@ class Followed:
     fitted: Numbers | None
 
 
-@dataclass(frozen=True, kw_only=True)
+@part("Gap_Run_Change", of="change_of", ranked=True, unit_of="measure", constants=(("Change_Part", "run"),))
 class RunError:
     """RMSE (N m of a joint, W of the robot) of a run that was left out of the fit, without and with the causes."""
 
-    run: str
-    joint: str | None
-    before: float | None
-    after: float | None
-    floor: float | None
+    run: Run = told("change_in_Run")
+    joint: Joint | None = told("located_in_Joint")
+    before: float | None = told("Change_Before")
+    after: float | None = told("Change_After")
+    floor: float | None = told("Noise_Floor", column="noise_floor")
+
+    @property
+    @tells("Change_Measure")
+    def measure(self) -> str:
+        """What is measured of it."""
+        return "power_rmse" if self.joint is None else "torque_rmse"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +130,7 @@ class FrictionCurve:
     measured: MeasuredFriction | None
 
 
-@dataclass(frozen=True, kw_only=True)
+@part()
 class Curves:
     """All that is drawn; no map where no torque was measured.
 
@@ -112,8 +139,8 @@ class Curves:
     """
 
     follows: tuple[Followed, ...]
-    runs: tuple[RunError, ...]
-    heat_map: ExcessMap | None = None
+    runs: tuple[RunError, ...] = told()
+    heat_map: ExcessMap | None = told(default=None)
     experiment: PlannedMotion | None
     friction: tuple[FrictionCurve, ...] | None = None
 

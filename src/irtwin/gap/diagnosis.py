@@ -11,7 +11,7 @@ import numpy as np
 
 from irtwin.document.cause_ids import cause_ids
 from irtwin.document.curves import Curves
-from irtwin.document.document import Closeable, Cutoff, Document
+from irtwin.document.document import Closeable, Cutoff, Document, Untestable
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Predicted
@@ -32,7 +32,7 @@ from irtwin.gap.experiment.programmes import excitation_of
 from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
+from irtwin.gap.isolation.detectability import can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
 from irtwin.gap.isolation.finding import Finding, Without, find
 from irtwin.gap.isolation.floor_left import floor_left
@@ -130,7 +130,7 @@ class Diagnosis:
             locations=() if verdict == NO_GAP else tuple(map(writing.location, self.locations)),
             findings=found,
             causes=causes,
-            not_testable=tuple(map(writing.untestable, self.untestable)),
+            not_testable=self.untestable,
             shrink=apart.shrink(shrink, self.seed),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
@@ -266,7 +266,7 @@ def diagnose(
         channels=tuple(with_removed(finding, taken) for finding in findings),
         floor=floor,
         locations=tuple(located),
-        untestable=tuple(lacking),
+        untestable=lacking,
         runs=tuple(sorted(case.observed)),
         seed=seed,
         experiment=None if proposal is None else proposal.experiment,
