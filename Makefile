@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test suite compiled nightly check fuzz lint wheel ontology lock clean
+.PHONY: demo test suite compiled nightly check fuzz lint mappings wheel ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -32,6 +32,10 @@ compiled: $(VENV)/test
 # what fails is kept in tests/fuzz/kept, as a test.
 fuzz: $(VENV)/test
 	$(BIN)/python -m tests.fuzz.fuzz
+
+# What the fields of a diagnosis tell, as R2RML. A test says when to run it.
+mappings: $(VENV)/test
+	$(BIN)/python -m irtwin.document.r2rml > mappings/gap.r2rml.ttl
 
 lint: $(VENV)/test
 	$(BIN)/ruff check .

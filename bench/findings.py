@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.document.document import Document, Finding
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.document.document import Document, Finding
 from irtwin.report.wording import share
 from irtwin.signals.log import DataSet, Run, read_data_set
 

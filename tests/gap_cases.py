@@ -6,9 +6,9 @@ import copy
 import math
 from typing import Any
 
+from irtwin.document.curves import Curves
+from irtwin.document.document import Document
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document
 
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
 RUNS = ["reference_1", "reference_2", "work_1", "work_2", "work_3", "work_4"]

@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document
+from irtwin.document.curves import Curves
+from irtwin.document.document import Document
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.running import infer
 from irtwin.knowledge.store.graph import KnowledgeGraph

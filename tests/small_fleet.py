@@ -15,7 +15,6 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from irtwin.storage import experiment_schema as experiment
 from irtwin.storage import gap_schema as gap
 from irtwin.storage import live_schema as live
 from irtwin.storage import schema
@@ -404,13 +403,13 @@ def _diagnoses() -> Iterator[Base]:
     yield gap.GapCauseRival(**of, cause_id="torque_constant_error@j2", effect="payload")
     yield gap.GapCauseCompetitor(**of, cause_id="payload", effect="torque_constant_error", probability=0.4)
     yield gap.GapCauseCompetitor(**of, cause_id="torque_constant_error@j2", effect="payload", probability=0.5)
-    yield experiment.GapExperiment(
+    yield gap.GapExperiment(
         **of, purpose="tell payload from torque_constant_error", separation_now=1.5, expected_separation=8.0, enough=5.0
     )
-    yield experiment.GapExperimentEffect(**of, effect="payload")
-    yield experiment.GapExperimentEffect(**of, effect="torque_constant_error")
-    yield experiment.GapExperimentInstruction(**of, number=1, text="lift a known mass")
-    yield experiment.GapExperimentInstruction(**of, number=2, text="hang another on joint 2")
+    yield gap.GapExperimentEffect(**of, effect="payload")
+    yield gap.GapExperimentEffect(**of, effect="torque_constant_error")
+    yield gap.GapExperimentInstruction(**of, number=1, text="lift a known mass")
+    yield gap.GapExperimentInstruction(**of, number=2, text="hang another on joint 2")
     yield from _diagnosis("Arm_C", "unexplained", None)
 
 

@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from irtwin import asking, workflow
-from irtwin.gap.document import form
-from irtwin.gap.document.document import Document
+from irtwin.document import form
+from irtwin.document.document import Document
 from irtwin.gap.experiment.programmes import Programme, programmes
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from irtwin.document import form
+from irtwin.document.curves import Curves
+from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.gap.document import form
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.experiment import Experiment
 from irtwin.gap.experiment.programmes import Programme, programmes
 from irtwin.next_experiment import motion_text, save_motion
 from irtwin.signals.samples import read_signals

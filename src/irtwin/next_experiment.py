@@ -7,11 +7,11 @@ from pathlib import Path
 
 from sqlalchemy import select
 
+from irtwin.document import form
+from irtwin.document.experiment import Experiment, Programme
 from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.gap.document import form
-from irtwin.gap.document.experiment import Experiment, Programme
 from irtwin.identification.excitation import excite
 from irtwin.json_text import parse_json
 from irtwin.knowledge.questions.queries import ask

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, measure, swing, truth
 
+from irtwin.document.curves import Curves
+from irtwin.document.document import Document, schema
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.friction import TemperatureDependentFriction
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document, schema
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 

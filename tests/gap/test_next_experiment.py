@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, measure, swing
 
+from irtwin.document.form import to_json
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
-from irtwin.gap.document.form import to_json
 from irtwin.gap.experiment.next_experiment import Proposal, next_experiment
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.experiment.programmes import programmes

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from irtwin.document import document
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
-from irtwin.gap.document import document
 from irtwin.gap.isolation import verdict
 from irtwin.gap.isolation.closing import Closing
 from irtwin.gap.isolation.verdict import (

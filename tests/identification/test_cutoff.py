@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, measure, swing
 
+from irtwin.document.document import Cutoff
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import choose_cutoff, condition
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import Run
 from irtwin.twin.identify import identify
 
@@ -32,11 +32,12 @@ def runs(step: float, count: int = 2) -> list[Run]:
 def test_a_fine_encoder_leaves_ten_times_the_band() -> None:
     fine = runs(1e-6)
     found = cutoff_for(ROBOT, fine, None)
-    assert found == Cutoff(choose_cutoff(fine), False, "found: 10 times the bandwidth of the widest motion")
+    why = "found: 10 times the bandwidth of the widest motion"
+    assert found == Cutoff(hz=choose_cutoff(fine), stated=False, why=why)
 
 
 def test_a_stated_one_is_taken_as_it_is() -> None:
-    assert cutoff_for(ROBOT, runs(1e-6), 7.25) == Cutoff(7.25, True, "stated")
+    assert cutoff_for(ROBOT, runs(1e-6), 7.25) == Cutoff(hz=7.25, stated=True, why="stated")
 
 
 def with_steps(run: Run) -> Run:

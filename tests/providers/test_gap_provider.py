@@ -10,9 +10,9 @@ import pytest
 from sqlalchemy import select
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
+from irtwin.document.curves import Curves
+from irtwin.document.document import Document
 from irtwin.errors import InputError
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document
 from irtwin.providers import energy, identification
 from irtwin.providers.gap import adopt, record
 from irtwin.providers.records import ingest, robot_iri, run_iri

@@ -14,15 +14,14 @@ import pytest
 from sqlalchemy import select
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document, Gap, Shrink
+from irtwin.document.curves import Curves
+from irtwin.document.document import Cutoff, Document, Gap, Shrink
 from irtwin.providers import energy, identification, motions, run_state
 from irtwin.providers.gap import adopt, record
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.records import ingest, robot_iri, run_iri
 from irtwin.signals import conditioning
 from irtwin.signals.conditioning import choose_cutoff
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -57,7 +56,9 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
 def by_band(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose the cutoff by the band of the motion alone: what is held out is `tests/identification/test_cutoff.py`."""
     monkeypatch.setattr(
-        motions, "cutoff_for", lambda robot, runs, stated: Cutoff(stated or choose_cutoff(runs), False, WHY)
+        motions,
+        "cutoff_for",
+        lambda robot, runs, stated: Cutoff(hz=stated or choose_cutoff(runs), stated=False, why=WHY),
     )
 
 

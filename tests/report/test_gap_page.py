@@ -13,8 +13,8 @@ import pytest
 from tests import gap_cases, rows
 from tests.gap_pages import figures_of, graph_of, page_of, six_axis
 
+from irtwin.document.curves import Curves
 from irtwin.errors import InputError
-from irtwin.gap.document.curves import Curves
 from irtwin.providers.gap import record
 from irtwin.providers.records import robot_iri
 from irtwin.report.gap.page import render_gap

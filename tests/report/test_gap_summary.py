@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from tests import gap_cases
 
-from irtwin.gap.document.document import Document
+from irtwin.document.document import Document
 from irtwin.report.gap import summary
 
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, measure, rigid_torque, swing, truth
 
+from irtwin.document.curves import FrictionCurve
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.friction import StribeckFriction, TemperatureDependentFriction
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
-from irtwin.twin.friction_curve import FrictionCurve, friction_curves
+from irtwin.twin.friction_curve import friction_curves
 from irtwin.twin.identify import identify
 
 pytestmark = pytest.mark.slow

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from irtwin.document.curves import FrictionCurve
 from irtwin.effects.effect import Effect
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import CHANGED, place_of
 from irtwin.identification.progress import Tell
-from irtwin.twin.friction_curve import FrictionCurve, friction_curves
+from irtwin.twin.friction_curve import friction_curves
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 

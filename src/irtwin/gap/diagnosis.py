@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from irtwin.document.cause_ids import cause_ids
+from irtwin.document.curves import Curves
+from irtwin.document.document import Closeable, Cutoff, Document, Untestable
+from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.local import LocalEffect
@@ -20,10 +24,6 @@ from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
-from irtwin.gap.document.cause_ids import cause_ids
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Closeable, Document
-from irtwin.gap.document.experiment import Experiment
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
@@ -32,7 +32,7 @@ from irtwin.gap.experiment.programmes import excitation_of
 from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.detectability import Untestable, can_show, untestable
+from irtwin.gap.isolation.detectability import can_show, untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
 from irtwin.gap.isolation.finding import Finding, Without, find
 from irtwin.gap.isolation.floor_left import floor_left
@@ -56,7 +56,6 @@ from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.two_processes import begun
 from irtwin.robot.description import Robot
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 from irtwin.twin.torque_scale import TorqueScale
@@ -131,7 +130,7 @@ class Diagnosis:
             locations=() if verdict == NO_GAP else tuple(map(writing.location, self.locations)),
             findings=found,
             causes=causes,
-            not_testable=tuple(map(writing.untestable, self.untestable)),
+            not_testable=self.untestable,
             shrink=apart.shrink(shrink, self.seed),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
@@ -146,7 +145,7 @@ class Diagnosis:
         return self.curves.to_json()
 
     def to_json(self) -> dict[str, Any]:
-        """Return the document in the form of its schema, `irtwin.gap.document.document.schema()`."""
+        """Return the document in the form of its schema, `irtwin.document.document.schema()`."""
         return self.document.to_json()
 
 
@@ -267,7 +266,7 @@ def diagnose(
         channels=tuple(with_removed(finding, taken) for finding in findings),
         floor=floor,
         locations=tuple(located),
-        untestable=tuple(lacking),
+        untestable=lacking,
         runs=tuple(sorted(case.observed)),
         seed=seed,
         experiment=None if proposal is None else proposal.experiment,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.gap.document.document import Change
+from irtwin.document.document import Change
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.moments import summed
 from irtwin.signals.motion import Motion

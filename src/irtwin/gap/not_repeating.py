@@ -10,9 +10,10 @@ from typing import TypeVar
 import numpy as np
 from scipy.special import expit
 
+from irtwin.document import document
+from irtwin.document.cause_ids import cause_ids
+from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.document import document
-from irtwin.gap.document.cause_ids import cause_ids
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.hypotheses import MISSING
@@ -86,7 +87,7 @@ class NotRepeating:
                     kind=one.kind,
                     rms=float(np.sqrt(one.size)),
                     share=one.share,
-                    quantities=tuple(map(parameter, one.quantities if by is None else by.quantities)),
+                    quantities=tuple(map(_quantity, one.quantities if by is None else by.quantities)),
                     explained_by=name,
                 )
             )
@@ -219,6 +220,10 @@ def _around(others: Sequence[_One], own: Sequence[_One], shares: Sequence[float]
     """Return all, those of our own that have most of what is closed before the others."""
     first = [one for one, share in zip(own, shares, strict=True) if share >= _MOST]
     return (*first, *others, *(one for one in own if one not in first))
+
+
+def _quantity(one: Quantity) -> document.Quantity:
+    return document.Quantity(**vars(parameter(one)))
 
 
 def _log_odds(p: float) -> float:

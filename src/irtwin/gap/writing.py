@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from irtwin.document import document
+from irtwin.document.cause_ids import cause_ids
+from irtwin.document.document import Closeable
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.document import document
-from irtwin.gap.document.cause_ids import cause_ids
-from irtwin.gap.document.document import Closeable
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.detectability import Untestable
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.quantities import quantities
 from irtwin.gap.isolation.refusal import Refused
@@ -188,11 +187,6 @@ def torque_scale(one: TorqueScale) -> document.TorqueScale:
     return document.TorqueScale(
         uncertainty95=one.uncertainty, source=one.source, low=one.low, high=one.high, why=one.why
     )
-
-
-def untestable(one: Untestable) -> document.Untestable:
-    """Return an effect that the data cannot show."""
-    return document.Untestable(effect=one.effect, why=one.why)
 
 
 def shrink(

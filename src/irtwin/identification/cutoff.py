@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from irtwin.document.document import Cutoff
 from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -19,7 +20,6 @@ from irtwin.identification.fits import fit_torque
 from irtwin.identification.progress import Tell
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition, cutoff_of_motion
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
@@ -36,13 +36,13 @@ def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None, tell: Te
     long.
     """
     if stated is not None:
-        return Cutoff(stated, stated=True, why="stated")
+        return Cutoff(hz=stated, stated=True, why="stated")
     highest, why = cutoff_of_motion(runs)
     halved = _halved(robot, runs, highest, tell)
     if halved:
         times = {1: "once", 2: "twice"}.get(halved, f"{halved} times")
         why = f"{why}, {highest:.3g} Hz, halved {times}, as that tells held-out torque better"
-    return Cutoff(highest / 2**halved, stated=False, why=f"found: {why}")
+    return Cutoff(hz=highest / 2**halved, stated=False, why=f"found: {why}")
 
 
 def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None) -> int:

@@ -13,12 +13,12 @@ from typing import Any
 
 from sqlalchemy import select
 
+from irtwin.document.curves import Curves
+from irtwin.document.document import Document
 from irtwin.errors import InputError
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Document
 from irtwin.identification.validation import split
 from irtwin.providers import gap_rows
-from irtwin.providers.gap_rows import Place
+from irtwin.providers.gap_rows import Of
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made, software
@@ -27,6 +27,7 @@ from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.files import inside
+from irtwin.storage.rows import values
 from irtwin.storage.schema import Base
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
@@ -91,7 +92,8 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
         raise InputError(f"{robot_id}: no diagnosis in {workspace.folder}; run `irtwin diagnose` with it first")
     if found.twin_file is None or found.twin_sha256 is None:
         raise InputError(
-            f"{robot_id}: its diagnosis ({found.verdict}) added nothing to the twin, so there is nothing to adopt"
+            f"{robot_id}: its diagnosis ({values(found)['verdict']}) added nothing to the twin, so there is nothing to "
+            "adopt"
         )
     text = workspace.read_document(found.twin_file, found.twin_sha256)
     twin = from_json(text, inside(workspace.folder, found.twin_file))
@@ -132,57 +134,16 @@ def _rows(
     motion: str | None = None,
 ) -> tuple[gap_schema.GapDiagnosis, list[gap_schema.OfDiagnosis], dict[str, bytes]]:
     """Return the row of a diagnosis, those of its parts, and the documents that it names, by their path."""
-    row, documents = _row(robot_id, diagnosis, curves, twin, motion)
-    ids = {run.run_id.removeprefix(f"{robot_id}."): run.run_id for run in runs}
-    at = Place(row.diagnosis_id, robot_id, partial(_run_id, ids), _linear_joints(robot_id, joints, diagnosis))
-    return row, [*gap_rows.rows(diagnosis, at), *gap_rows.rows_of_curves(curves, at)], documents
-
-
-def _run_id(runs: Mapping[str, str], name: str) -> str:
-    if identifier(name) not in runs:
-        raise InputError(
-            f'run "{name}" of the diagnosis is not in the workspace; run `irtwin run` on its data set first'
-        )
-    return runs[identifier(name)]
-
-
-def _linear_joints(robot_id: str, joints: Iterable[schema.Joint], said: Document) -> frozenset[str]:
-    """Return the robot's prismatic joints; InputError where it lacks a joint that the diagnosis names."""
-    known = {joint.name: joint.kind for joint in joints}
-    named = {*(said.gap.torque or ())}
-    named |= {location.joint for location in said.locations if location.joint}
-    named |= {joint for cause in said.causes for joint in cause.joints}
-    named |= {joint for cause in said.refused or () for joint in cause.joints}
-    if named - known.keys():
-        raise InputError(
-            f"{robot_id} has no joint {', '.join(sorted(named - known.keys()))}; diagnose a data set of this robot"
-        )
-    return frozenset(name for name, kind in known.items() if kind == "prismatic")
-
-
-def _row(
-    robot_id: str, said: Document, curves: Curves, twin: str | None, motion: str | None
-) -> tuple[gap_schema.GapDiagnosis, dict[str, bytes]]:
-    given = {
-        ".json": _text(said.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
-        ".motion.csv": motion,
-    }  # fmt: skip
-    texts = {kind: text for kind, text in given.items() if text is not None}
+    texts = _texts(diagnosis, curves, twin, motion)
     sums = {kind: hashlib.sha256(text.encode()).hexdigest() for kind, text in texts.items()}
     diagnosis_id = f"{robot_id}.{sums['.json'][:12]}"
     files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}" for kind in texts}
+    ids = {run.run_id.removeprefix(f"{robot_id}."): run.run_id for run in runs}
+    of = Of(diagnosis_id, robot_id, partial(_run_id, ids), {joint.name: joint.kind for joint in joints})
     row = gap_schema.GapDiagnosis(
         diagnosis_id=diagnosis_id,
         robot_id=robot_id,
-        verdict=said.verdict,
-        unexplained_because=said.unexplained_because,
         created=datetime.now(UTC),
-        energy_error_percent=said.gap.energy_error_percent,
-        noise_floor_from=said.shrink.noise_floor_from,
-        cutoff_hz=said.cutoff and said.cutoff.hz,
-        cutoff_why=said.cutoff and said.cutoff.why,
-        torque_scale_uncertainty=said.torque_scale and said.torque_scale.uncertainty95,
-        torque_scale_why=said.torque_scale and said.torque_scale.why,
         file=files[".json"],
         sha256=sums[".json"],
         evidence_file=files[".evidence.json"],
@@ -191,8 +152,27 @@ def _row(
         twin_sha256=sums.get(".twin.json"),
         motion_file=files.get(".motion.csv"),
         motion_sha256=sums.get(".motion.csv"),
+        **gap_rows.row(diagnosis, of),
     )
-    return row, {files[kind]: text.encode() for kind, text in texts.items()}
+    documents = {files[kind]: text.encode() for kind, text in texts.items()}
+    return row, [*gap_rows.rows(diagnosis, curves, of)], documents
+
+
+def _texts(said: Document, curves: Curves, twin: str | None, motion: str | None) -> dict[str, str]:
+    """Return the files that hold a diagnosis, by their endings."""
+    given = {
+        ".json": _text(said.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
+        ".motion.csv": motion,
+    }  # fmt: skip
+    return {kind: text for kind, text in given.items() if text is not None}
+
+
+def _run_id(runs: Mapping[str, str], name: str) -> str:
+    if identifier(name) not in runs:
+        raise InputError(
+            f'run "{name}" of the diagnosis is not in the workspace; run `irtwin run` on its data set first'
+        )
+    return runs[identifier(name)]
 
 
 def _text(value: object) -> str:

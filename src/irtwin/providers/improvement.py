@@ -12,10 +12,10 @@ from datetime import UTC, datetime
 
 from sqlalchemy import func, select
 
+from irtwin.document.experiment import Experiment
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.document.experiment import Experiment
 from irtwin.identification.validation import FIT_SHARE, Split
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions

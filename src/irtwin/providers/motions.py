@@ -8,11 +8,11 @@ from weakref import WeakKeyDictionary
 
 from sqlalchemy import select
 
+from irtwin.document.document import Cutoff
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.providers.records import load_robot, load_run
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import own_runs
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema

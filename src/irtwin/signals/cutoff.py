@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.filter import FEWEST_PERIODS
 from irtwin.signals.sampling import interval
-
-
-@dataclass(frozen=True)
-class Cutoff:
-    """The cutoff, Hz; whether a user stated it; and where it comes from, in words."""
-
-    hz: float
-    stated: bool
-    why: str
 
 
 def checked_cutoff(hz: float, runs: Sequence[Signals], said: str) -> float:

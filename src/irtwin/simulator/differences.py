@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.document import Cause, Document
+from irtwin.document.document import Cause, Document
 from irtwin.simulator.model import Model
 
 _NUMBERS = {

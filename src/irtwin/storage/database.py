@@ -14,8 +14,7 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 from irtwin.resources import Resources, resources_of
 from irtwin.storage import base_iri, engine, files, series_place
-from irtwin.storage import experiment_schema as _experiment_schema  # noqa: F401  its tables are made with the others
-from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  likewise
+from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import migrate, stamp

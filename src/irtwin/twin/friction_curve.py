@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.document.curves import FrictionCurve, FrictionNumber, MeasuredFriction
 from irtwin.effects.effect import Effect, Predicted, force_unit
 from irtwin.effects.stack import Stack
 from irtwin.identification.uncertainty import NORMAL
@@ -23,47 +23,6 @@ _FEWEST = 20  # samples in a bin
 _STATES = 60  # poses, temperatures and loads over which a law that depends on them is averaged
 _RARE = 0.002  # of all samples are faster than the curve shows
 _MOVED = 10 * STANDSTILL  # rad/s or m/s: a joint that was never faster shows no curve
-
-
-@dataclass(frozen=True)
-class FrictionNumber:
-    """A parameter of a friction effect, with its 95 % interval."""
-
-    effect: str
-    name: str
-    value: float
-    unit: str
-    lower: float
-    upper: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeasuredFriction:
-    """Measured torque less all of a twin that is no friction, in bins of speed: mean, and quartiles `low`, `high`."""
-
-    speed: Numbers
-    torque: Numbers
-    low: Numbers
-    high: Numbers
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrictionCurve:
-    """A joint's friction over the speeds of some runs, in `unit` over `speed_unit`, with its 95 % band `low` to `high`.
-
-    `role`: that of the runs. `measured` is None where no torque was measured.
-    """
-
-    joint: str
-    role: str
-    speed_unit: str
-    unit: str
-    speed: Numbers
-    torque: Numbers
-    low: Numbers
-    high: Numbers
-    numbers: tuple[FrictionNumber, ...]
-    measured: MeasuredFriction | None
 
 
 def friction_curves(twin: Twin, motions: Sequence[Motion], role: str) -> tuple[FrictionCurve, ...]:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import TorqueOffset
@@ -24,7 +25,6 @@ from irtwin.identification.progress import Tell
 from irtwin.identification.torque_constants import torque_constants
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition_for_fit
-from irtwin.signals.cutoff import Cutoff
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
-from irtwin.gap.document.document import Closeable
+from irtwin.document.document import Closeable
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.identification.progress import Tell, paced
 from irtwin.signals.filter import decimation, low_pass

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.document.curves import PlannedMotion
+from irtwin.document.experiment import Considered, Experiment, Question
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
-from irtwin.gap.document.curves import PlannedMotion
-from irtwin.gap.document.experiment import Considered, Experiment, Question
 from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
 from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
 from irtwin.gap.experiment.separation import fitted, unimitated

@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from irtwin.document import experiment
+from irtwin.document.experiment import Settings
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
-from irtwin.gap.document import experiment
-from irtwin.gap.document.experiment import Settings
 from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import JointLimits, Workspace
 from irtwin.identification.progress import Tell, paced

@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.document.document import Untestable
 from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.thresholds import Detectability
 from irtwin.signals.motion import Motion
-
-
-@dataclass(frozen=True)
-class Untestable:
-    """An effect that the data cannot show, and why."""
-
-    effect: str
-    why: str
 
 
 def can_show(effect: Effect, motions: Iterable[Motion]) -> bool:
@@ -33,7 +25,7 @@ def untestable(
     channels: Sequence[tuple[str, Attribution]],
     motions: Iterable[Motion],
     limits: Detectability,
-) -> list[Untestable]:
+) -> tuple[Untestable, ...]:
     """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
     measured = {name for name, _ in channels}
     motions = tuple(motions)
@@ -44,18 +36,18 @@ def untestable(
             name = hypothesis.effect
             if found.visible[k, 0] > visible.get(name, -np.inf):
                 visible[name], share[name] = found.visible[k].tolist()
-    reasons = []
+    whys = {}
     for effect in known:
         if effect.id in inside:
             continue
         channel = effect.signal
         if channel not in measured:
-            reasons.append(Untestable(effect.id, f"no {channel} was measured"))
+            whys[effect.id] = f"no {channel} was measured"
         elif not can_show(effect, motions):
-            reasons.append(Untestable(effect.id, f"no {' and no '.join(sorted(effect.requires))} was measured"))
+            whys[effect.id] = f"no {' and no '.join(sorted(effect.requires))} was measured"
         elif effect.id not in visible or visible[effect.id] == 0:
-            reasons.append(Untestable(effect.id, "nothing in these runs brings it about"))
+            whys[effect.id] = "nothing in these runs brings it about"
         elif visible[effect.id] < limits.least_visible:
             imitated = 100 * (1 - share[effect.id])
-            reasons.append(Untestable(effect.id, f"the rest of the twin imitates {imitated:.0f} % of it on these runs"))
-    return reasons
+            whys[effect.id] = f"the rest of the twin imitates {imitated:.0f} % of it on these runs"
+    return tuple(Untestable(effect=effect, why=why) for effect, why in whys.items())

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irtwin.document import document
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.document import document
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.spread import spread

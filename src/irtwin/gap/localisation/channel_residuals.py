@@ -8,8 +8,8 @@ from itertools import compress
 
 import numpy as np
 
+from irtwin.document.curves import Followed
 from irtwin.gap.data.case import Case
-from irtwin.gap.document.curves import Followed
 from irtwin.gap.isolation.explained import Explained
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.localisation.excess_map import Map, joint_maps, level_of, robot_maps

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from irtwin.gap.document.curves import Curves, PlannedMotion, RunError
+from irtwin.document.curves import Curves, FrictionCurve, PlannedMotion, RunError
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.localisation.channel_residuals import ChannelResidual, cause_curves, unnamed_curves
 from irtwin.gap.localisation.excess_map import heat_map
 from irtwin.gap.localisation.locations import Location
-from irtwin.twin.friction_curve import FrictionCurve
 
 _UNNAMED = 3  # places that no cause explains, drawn
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.gap.document.curves import ExcessMap
+from irtwin.document.curves import ExcessMap
 from irtwin.gap.localisation.regimes import (
     JOINT_PARTS,
     JOINT_REGIMES,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import false_discovery_control, t
 
-from irtwin.gap.document.document import FALSE_PLACES, LEAST_SHARE
+from irtwin.document.document import FALSE_PLACES, LEAST_SHARE
 from irtwin.gap.localisation.excess_map import Map
 from irtwin.gap.localisation.regimes import (
     ACCELERATING,

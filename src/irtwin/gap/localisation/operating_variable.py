@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from irtwin.gap.document.curves import Followed
+from irtwin.document.curves import Followed
 from irtwin.gap.regression.residuals import Trace
 from irtwin.signals.channels import CHANNELS
 

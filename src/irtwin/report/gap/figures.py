@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from irtwin.gap.document.curves import Curves, Followed, PlannedMotion
+from irtwin.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
 from irtwin.report.energy.figures import Figure, plain

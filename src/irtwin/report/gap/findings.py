@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from irtwin.gap.document.document import LIKELY
+from irtwin.document.document import LIKELY
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted

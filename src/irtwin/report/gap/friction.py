@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from irtwin.document.curves import FrictionCurve
 from irtwin.report import wording
 from irtwin.report.colours import MEASURED, MODELLED, PALETTE
 from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.energy.tables import Cell, Line, is_unsure
-from irtwin.twin.friction_curve import FrictionCurve
 
 _BANDED = "33"  # how opaque a band is, in hexadecimal
 

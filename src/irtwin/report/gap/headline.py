@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from irtwin.gap.document.document import Document, Finding
+from irtwin.document.document import Document, Finding
 from irtwin.report.gap import findings
 from irtwin.report.gap.verdict import closes, differing, where
 from irtwin.report.wording import listed

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from irtwin.document.curves import Curves
+from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, LIKELY, Document
 from irtwin.errors import InputError
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import FALSE_PLACES, LEAST_SHARE, LIKELY, Document
 from irtwin.json_text import parse_json
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.rules.running import infer

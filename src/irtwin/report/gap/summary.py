@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from irtwin.gap.document.document import Cause, Document
+from irtwin.document.document import Cause, Document
 from irtwin.knowledge.store.table import Row, Table
 from irtwin.simulator.differences import Difference
 

@@ -6,7 +6,7 @@ the field that it `goes_with`, is None. What a value may be is an annotation: `A
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from functools import cache
 from sys import float_info
@@ -82,8 +82,10 @@ def from_json(kind: type[Part], given: object, where: str) -> Part:
 def schema(kind: Any) -> Json:
     """Return the JSON Schema of a part, or of what it is made of."""
     if get_origin(kind) is Annotated:
-        base, said = get_args(kind)
-        allowed: Json = said.schema(schema(base))
+        base, *said = get_args(kind)
+        allowed = schema(base)
+        for one in _limits(said):
+            allowed = one.schema(allowed)
         return allowed
     if get_origin(kind) in (UnionType, Union):
         return _or_null(schema(_known(kind)))
@@ -100,6 +102,11 @@ def schema(kind: Any) -> Json:
         length = {} if others == [...] else {"minItems": len(others) + 1, "maxItems": len(others) + 1}
         return {"type": "array", "items": schema(inner)} | length
     return {"type": _TYPES[kind]}
+
+
+def _limits(said: Iterable[Any]) -> Iterator[Any]:
+    """Yield those of a type's annotations that say what a value may be."""
+    return (one for one in said if isinstance(one, Between | OneOf))
 
 
 def _written(part: Any, one: Field[Any]) -> bool:
@@ -135,9 +142,10 @@ def _hints(kind: type) -> dict[str, Any]:
 
 def _read(kind: Any, given: Any, where: str) -> Any:
     if get_origin(kind) is Annotated:
-        base, said = get_args(kind)
+        base, *said = get_args(kind)
         value = _read(base, given, where)
-        said.check(value, where)
+        for one in _limits(said):
+            one.check(value, where)
         return value
     if get_origin(kind) in (UnionType, Union):
         return None if given is None else _read(_known(kind), given, where)

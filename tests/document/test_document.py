@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import gap_cases
 
+from irtwin.document import form
+from irtwin.document.cause_ids import cause_ids
+from irtwin.document.curves import Curves
+from irtwin.document.document import Cause, Document, Gap, Location, Shrink, schema
+from irtwin.document.experiment import Experiment
 from irtwin.errors import InputError
-from irtwin.gap.document import form
-from irtwin.gap.document.cause_ids import cause_ids
-from irtwin.gap.document.curves import Curves
-from irtwin.gap.document.document import Cause, Document, Gap, Location, Shrink, schema
-from irtwin.gap.document.experiment import Experiment
 
 CONTRACT = json.loads((resources.files("irtwin.gap") / "diagnosis.schema.json").read_text())
 JOINTS = ["joint_1", "joint_2", "joint_3"]
