@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
+from irtwin.effects.friction import sharp_sign
 from irtwin.gap.document.document import Closeable
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.identification.progress import Tell, paced
@@ -25,7 +26,6 @@ _WAVES = 60  # random features
 _DIMENSIONS = 3  # at most, that one random feature depends on
 _SCALES = (0.25, 0.5, 1.0)  # waves over the range of a variable
 _RIDGES = (1e-3, 1e-2, 1e-1)  # of the mean square of a feature
-_STANDSTILL = 1e-3  # rad/s
 _MEMORY = (0.1, 0.5)  # s
 
 
@@ -83,102 +83,81 @@ def flexible_regression(
     direction, as friction jumps with it. None where there are fewer than two groups or too few samples.
     `tell` is told how far that has come, where it takes long.
     """
-    told = paced(tell)
-    parts = list(_parts(channel, motions, told))
+    told, torque = paced(tell), channel.finding.name == "torque"
+    own = [motion for motion in motions if (motion.torque if torque else motion.power) is not None]
+    warm = all(motion.temperature is not None for motion in own)
+    share = max(1, _SAMPLES // max(len(own), 1))
+    thinned = max(1, min(share * len(own), sum(len(motion.time) for motion in own)) // _ROWS)
+    parts = []
+    for motion in own:
+        told(f"  how much of {channel.finding.name} could be closed, {motion.run}")
+        parts += [_seen(channel, part, thinned, torque, warm) for part in _stretches(motion, share)]
     if not parts:
         return None
-    group = np.concatenate([part.group for part in parts])
+    group, plain, closed, signs, variables = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(np.unique(group)) < 2 or len(group) < 10 * _FOLDS:
         return None
-    plain, closed = (np.concatenate([getattr(part, name) for part in parts]) for name in ("plain", "closed"))
     generator = np.random.default_rng(seed)
     sums = []
     for equation in range(plain.shape[1]):
         told(f"  how much of {channel.finding.name} could be closed, {equation + 1} of {plain.shape[1]}")
-        variables = np.concatenate([part.variables[equation] for part in parts])
-        signs = np.concatenate([part.signs[:, equation] for part in parts])
-        features = _features(variables, signs, generator)
+        features = _features(variables[:, equation], signs[:, equation], generator)
         residuals = np.column_stack([plain[:, equation], closed[:, equation]])
         sums.append(_regressed(features, residuals, group))
-    plain_squares, plain_left, closed_squares, closed_left = np.array(sums).T
+    squares = np.array(sums).T
     least = channel.thresholds.experiment.least_gap
-    return FlexibleRegression(plain_squares, plain_left, closed_squares, closed_left, channel.finding.floor, least)
+    return FlexibleRegression(squares[0], squares[1], squares[2], squares[3], channel.finding.floor, least)
 
 
-@dataclass(frozen=True)
-class _Part:
-    plain: np.ndarray
-    closed: np.ndarray
-    signs: np.ndarray
-    variables: list[np.ndarray]
-    group: np.ndarray
+def _stretches(motion: Motion, most: int) -> list[Motion]:
+    """Return stretches of a run that have so many samples together: all of it, where it has no more."""
+    length = min(most, len(motion.time))
+    count = _STRETCHES if length < len(motion.time) else 1
+    starts = np.linspace(0, len(motion.time) - length // count, count).astype(int).tolist()
+    return [motion.part(start, start + length // count) for start in starts]
 
 
-def _parts(channel: PlannedEquations, motions: Sequence[Motion], told: Tell) -> Iterator[_Part]:
-    """Yield stretches of the runs, thinned, with what the twin leaves of them.
-
-    Temperature is a variable where all runs have it.
-    """
-    own = [m for m in motions if (m.torque if channel.finding.name == "torque" else m.power) is not None]
-    warm = all(motion.temperature is not None for motion in own)
-    share = max(1, _SAMPLES // max(len(own), 1))
-    total = min(share * len(own), sum(len(motion.time) for motion in own))
-    for motion in own:
-        told(f"  how much of {channel.finding.name} could be closed, {motion.run}")
-        length = min(share, len(motion.time))
-        count = _STRETCHES if length < len(motion.time) else 1
-        starts = np.linspace(0, len(motion.time) - length // count, count).astype(int)
-        for start in starts:
-            part = motion.part(int(start), int(start) + length // count)
-            yield from _part(channel, part, max(1, total // _ROWS), warm)
-
-
-def _part(channel: PlannedEquations, part: Motion, thinned: int, warm: bool) -> Iterator[_Part]:
+def _seen(channel: PlannedEquations, part: Motion, thinned: int, torque: bool, warm: bool) -> tuple[np.ndarray, ...]:
+    """Return of N samples the group, what the twin leaves with and without causes, directions, variables (N, g, v)."""
     plain, closed, undecided = channel.residuals(part)
     if part.cutoff:
         undecided = np.abs(low_pass(undecided.astype(float), part.rate, part.cutoff)) > 0.1
-    step = max(thinned, decimation(part.rate, part.cutoff) if part.cutoff else 1)
     group = channel.groups(part.run, part.time)
-    kept = np.zeros(len(group), dtype=bool)
-    kept[::step] = True
+    kept = np.arange(len(group)) % max(thinned, decimation(part.rate, part.cutoff) if part.cutoff else 1) == 0
     kept &= (group >= 0) & np.isfinite(plain).all(axis=1)
-    if not kept.any():
-        return
-    torque = channel.finding.name == "torque"
-    variables = _of_joints(channel, part, warm) if torque else [_of_power(channel, part, warm)]
-    speeds = part.dq if torque else np.zeros((len(part.time), 1))
-    signs = np.where(np.abs(speeds) < _STANDSTILL, 0.0, np.sign(speeds))
-    decided = np.where(undecided, np.nan, 1.0)[kept]
-    yield _Part(
-        plain[kept] * decided, closed[kept] * decided, signs[kept], [one[kept] for one in variables], group[kept]
-    )
+    signs = sharp_sign(part.dq) if torque else np.zeros((len(part.time), 1))
+    variables = (_of_joints if torque else _of_power)(channel, part, warm)
+    decided = np.where(undecided, np.nan, 1.0)
+    return tuple(each[kept] for each in (group, plain * decided, closed * decided, signs, variables))
 
 
-def _of_joints(channel: PlannedEquations, part: Motion, warm: bool) -> list[np.ndarray]:
-    """Return each joint's variables, (N, v)."""
-    signs = np.where(np.abs(part.dq) < _STANDSTILL, 0.0, np.sign(part.dq))
-    before = [_remembered(signs, part.rate, seconds) for seconds in _MEMORY]
-    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
-    found = []
-    for joint in range(part.dq.shape[1]):
-        near = [k for k in (joint - 1, joint + 1) if 0 <= k < part.dq.shape[1]]
-        heat = [part.temperature[:, [joint]]] if warm and part.temperature is not None else []
-        others = [values[:, [joint]] for values in (part.dq, part.ddq, load, *before)]
-        beside = [values[:, near] for values in (part.q, part.dq, part.ddq)]
-        speed = np.abs(part.dq[:, [joint]])
-        found.append(np.concatenate([part.q[:, [joint]], speed, *others, *beside, time, *heat], axis=1))
-    return found
+def _of_joints(channel: PlannedEquations, part: Motion, warm: bool) -> np.ndarray:
+    """Return each joint's variables, (N, n, v); a neighbour that is not there is still."""
+    dq, load = part.dq, channel.load(part)
+    before = [_remembered(sharp_sign(dq), part.rate, seconds) for seconds in _MEMORY]
+    own = [part.q, np.abs(dq), dq, part.ddq, load, *before, np.repeat(_since(part), dq.shape[1], axis=1)]
+    for values in (part.q, dq, part.ddq):
+        wide = np.pad(values, ((0, 0), (1, 1)))
+        own += [wide[:, :-2], wide[:, 2:]]
+    heat = [part.temperature] if warm and part.temperature is not None else []
+    return np.asarray(np.stack([*own, *heat], axis=2))
 
 
 def _of_power(channel: PlannedEquations, part: Motion, warm: bool) -> np.ndarray:
-    """Return the variables of power, (N, v)."""
-    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
-    work = load * part.dq
+    """Return the variables of power, (N, 1, v)."""
+    dq, load = part.dq, channel.load(part)
+    work = load * dq
     total = work.sum(axis=1, keepdims=True)
+    sums = [total, np.abs(work).sum(axis=1, keepdims=True), _since(part)]
     slow = [_remembered(total, part.rate, seconds) for seconds in _MEMORY]
-    sums = [total, np.abs(work).sum(axis=1, keepdims=True), *slow, time]
     heat = [part.temperature] if warm and part.temperature is not None else []
-    return np.concatenate([work, load**2, np.abs(load), np.abs(part.dq), part.dq**2, *sums, *heat], axis=1)
+    columns = np.hstack([work, load**2, np.abs(load), np.abs(dq), dq**2, *sums, *slow, *heat])
+    return np.asarray(columns[:, None])
+
+
+def _since(part: Motion) -> np.ndarray:
+    """Return the time since the run began, (N, 1) s."""
+    return np.asarray((part.time - (part.whole or part).time[0])[:, None])
 
 
 def _remembered(values: np.ndarray, rate: float, seconds: float) -> np.ndarray:
