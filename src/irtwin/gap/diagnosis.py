@@ -16,7 +16,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin, friction
-from irtwin.gap.data.baseline import baseline, said_of_twin
+from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
@@ -170,7 +170,7 @@ def diagnose(
     diagnosed.
     """
     tell = Told(progress or (lambda line: None))
-    expected = forecast(data_set, baseline(data_set, withhold, thresholds.given_twin, twin))
+    expected = forecast(data_set)
     if expected.long:
         tell(expected.line)
     tell(f"Filtering {len(data_set.runs)} runs")
