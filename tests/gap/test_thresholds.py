@@ -37,9 +37,7 @@ def test_one_is_changed_and_the_others_stay():
 
 @pytest.mark.parametrize("name", ["criterion.least", "misfit", "criterion", "criterion.", ""])
 def test_an_unknown_name_is_refused(name):
-    with pytest.raises(
-        InputError, match=f'there is no threshold "{re.escape(name)}"; choose from admission.least_time'
-    ):
+    with pytest.raises(InputError, match=f'there is no threshold "{re.escape(name)}"; choose from data.shortest'):
         DEFAULT.changed(name, 1.0)
 
 

@@ -188,7 +188,7 @@ def diagnose(
         stack = case.stack.with_effects(stack.effects)
         plain = _plain(case, stack, tell)
     tell.step("  the noise floor")
-    floor = noise_floor(case.runs, case.motions, thresholds.repeats)
+    floor = noise_floor(case.runs, case.motions, thresholds.data)
     if case.shows("torque") and plain is not None:
         _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain, tell)
@@ -234,7 +234,7 @@ def diagnose(
         if one.id not in blamed and not one.disturbance and not isinstance(one, screened)
     ]
     lacking = untestable(
-        silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
+        silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.criterion
     )
     left = [
         channel_residual(case, one, predicted if one.finding.name == "torque" else torque, tell) for one in explained
@@ -256,7 +256,7 @@ def diagnose(
         planned,
         [catalogue()[one.effect] for one in lacking],
         case.seen,
-        thresholds.experiment,
+        thresholds.matters.apart,
         lambda: excitation(lambda: tell.step("  waiting for the exciting motion")),
         tell,
     )
@@ -310,7 +310,7 @@ def _torque_source(case: Case, stack: Stack, plain: System | None, tell: Progres
         through_power = ThroughPower(stack, case.with_power)
         return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
     if case.shows("torque"):
-        check_same_robot(case.runs, stack, plain, case.thresholds.same_robot)
+        check_same_robot(case.runs, stack, plain, case.thresholds.data)
     left_out = LeftOut(stack, plain, tell)
     return stack, left_out.torque, left_out.below
 

@@ -105,7 +105,7 @@ def flexible_regression(
         residuals = np.column_stack([plain[:, equation], closed[:, equation]])
         sums.append(_regressed(features, residuals, group))
     squares = np.array(sums).T
-    least = channel.thresholds.experiment.least_gap
+    least = channel.thresholds.matters.floors**2
     return FlexibleRegression(squares[0], squares[1], squares[2], squares[3], channel.finding.floor, least)
 
 
