@@ -13,8 +13,9 @@ from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.experiment.flexible_regression import FlexibleRegression, flexible_regression
-from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.finding import find
+from irtwin.gap.localisation.channel_residuals import channel_residual
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.thresholds import DEFAULT
@@ -49,11 +50,14 @@ def of(motions, tried=("stribeck_friction",)):
         modelled=frozenset((effect, None) for effect in BASELINE),
         robot=ROBOT,
         observed=grouping.observed,
+        seen=motions,
+        others=[],
+        grouping=grouping,
         thresholds=DEFAULT,
     )
     finding = find("torque", case, system, np.full(2, NOISE), 0)
-    channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
-    return finding, flexible_regression(channel, motions, 0)
+    explained = ExplainedTorque(stack, finding, lambda motion: Predicted(predicted(motion)))
+    return finding, flexible_regression(channel_residual(case, explained, predicted), 0)
 
 
 def on_second(function):

@@ -250,7 +250,7 @@ def diagnose(
     located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None, tell)
     tell("Designing the next experiment")
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
-    measures = {channel.finding.name: flexible_regression(channel, case.seen, seed, tell) for channel in planned}
+    measures = {one.finding.name: flexible_regression(one, seed, tell) for one in left}
     proposal = next_experiment(
         case.robot,
         planned,

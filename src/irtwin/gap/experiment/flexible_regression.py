@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +11,13 @@ from scipy.signal import lfilter
 
 from irtwin.effects.friction import sharp_sign
 from irtwin.gap.document.document import Closeable
-from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.gap.localisation.channel_residuals import ChannelResidual
+from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.progress import Tell, paced
-from irtwin.signals.filter import decimation, low_pass
+from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
-_SAMPLES = 24_000  # whose residual is computed
 _ROWS = 5_000  # that the regression sees
-_STRETCHES = 4  # of a run, where it has more samples than its share
 _FOLDS = 8
 _TENTS = 7  # over each variable
 _WAVES = 60  # random features
@@ -73,91 +71,76 @@ class FlexibleRegression:
         )
 
 
-def flexible_regression(
-    channel: PlannedEquations, motions: Sequence[Motion], seed: int, tell: Tell | None = None
-) -> FlexibleRegression | None:
-    """Regress what the twin leaves on what the motion is, groups of runs left out in turn.
+def flexible_regression(left: ChannelResidual, seed: int, tell: Tell | None = None) -> FlexibleRegression | None:
+    """Regress what the twin leaves on what the motion is, groups of observed runs left out in turn.
 
-    motions: the observed ones. A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed,
-    acceleration, load, temperature, time and what went before, of the joint and of its neighbours, each also times the
-    direction, as friction jumps with it. None where there are fewer than two groups or too few samples.
+    A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed, acceleration, load,
+    temperature, time and what went before, of the joint and of its neighbours, each also times the direction, as
+    friction jumps with it. None where there are fewer than two groups or too few samples.
     `tell` is told how far that has come, where it takes long.
     """
-    told, torque = paced(tell), channel.finding.name == "torque"
-    own = [motion for motion in motions if (motion.torque if torque else motion.power) is not None]
-    warm = all(motion.temperature is not None for motion in own)
-    share = max(1, _SAMPLES // max(len(own), 1))
-    thinned = max(1, min(share * len(own), sum(len(motion.time) for motion in own)) // _ROWS)
+    told, finding = paced(tell), left.finding
+    torque, motions = finding.name == "torque", [trace.motion for trace in left.refitted]
+    warm = all(motion.temperature is not None for motion in motions)
+    thinned = max(1, sum(len(motion.time) for motion in motions) // _ROWS)
     parts = []
-    for motion in own:
-        told(f"  how much of {channel.finding.name} could be closed, {motion.run}")
-        parts += [_seen(channel, part, thinned, torque, warm) for part in _stretches(motion, share)]
-    if not parts:
-        return None
-    group, plain, closed, signs, variables = (np.concatenate(each) for each in zip(*parts, strict=True))
+    for plain, closed in zip(left.refitted, left.after or left.refitted, strict=True):
+        motion = plain.motion
+        told(f"  how much of {finding.name} could be closed, {motion.run}")
+        group = _groups(finding.system, motion)
+        kept = np.arange(len(group)) % max(thinned, decimation(motion.rate, motion.cutoff) if motion.cutoff else 1) == 0
+        kept &= group >= 0
+        signs = sharp_sign(motion.dq) if torque else np.zeros((len(group), 1))
+        variables = (_of_joints if torque else _of_power)(motion, plain.torque, warm)
+        parts.append([each[kept] for each in (group, plain.residual, closed.residual, signs, variables)])
+    group, before, after, signs, variables = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(np.unique(group)) < 2 or len(group) < 10 * _FOLDS:
         return None
     generator = np.random.default_rng(seed)
     sums = []
-    for equation in range(plain.shape[1]):
-        told(f"  how much of {channel.finding.name} could be closed, {equation + 1} of {plain.shape[1]}")
+    for equation in range(before.shape[1]):
+        told(f"  how much of {finding.name} could be closed, {equation + 1} of {before.shape[1]}")
         features = _features(variables[:, equation], signs[:, equation], generator)
-        residuals = np.column_stack([plain[:, equation], closed[:, equation]])
-        sums.append(_regressed(features, residuals, group))
+        sums.append(_regressed(features, np.column_stack([before[:, equation], after[:, equation]]), group))
     squares = np.array(sums).T
-    least = channel.thresholds.matters.floors**2
-    return FlexibleRegression(squares[0], squares[1], squares[2], squares[3], channel.finding.floor, least)
+    return FlexibleRegression(squares[0], squares[1], squares[2], squares[3], finding.floor, left.least)
 
 
-def _stretches(motion: Motion, most: int) -> list[Motion]:
-    """Return stretches of a run that have so many samples together: all of it, where it has no more."""
-    length = min(most, len(motion.time))
-    count = _STRETCHES if length < len(motion.time) else 1
-    starts = np.linspace(0, len(motion.time) - length // count, count).astype(int).tolist()
-    return [motion.part(start, start + length // count) for start in starts]
+def _groups(system: System, motion: Motion) -> np.ndarray:
+    """Return (N,) the group in which samples of a run are left out; -1 for none."""
+    found = np.full(len(motion.time), -1)
+    for block, group in zip(system.blocks, system.group, strict=True):
+        if block.run == motion.run:
+            found[(motion.time >= block.start) & (motion.time <= block.stop)] = group
+    return found
 
 
-def _seen(channel: PlannedEquations, part: Motion, thinned: int, torque: bool, warm: bool) -> tuple[np.ndarray, ...]:
-    """Return of N samples the group, what the twin leaves with and without causes, directions, variables (N, g, v)."""
-    plain, closed, undecided = channel.residuals(part)
-    if part.cutoff:
-        undecided = np.abs(low_pass(undecided.astype(float), part.rate, part.cutoff)) > 0.1
-    group = channel.groups(part.run, part.time)
-    kept = np.arange(len(group)) % max(thinned, decimation(part.rate, part.cutoff) if part.cutoff else 1) == 0
-    kept &= (group >= 0) & np.isfinite(plain).all(axis=1)
-    signs = sharp_sign(part.dq) if torque else np.zeros((len(part.time), 1))
-    variables = (_of_joints if torque else _of_power)(channel, part, warm)
-    decided = np.where(undecided, np.nan, 1.0)
-    return tuple(each[kept] for each in (group, plain * decided, closed * decided, signs, variables))
-
-
-def _of_joints(channel: PlannedEquations, part: Motion, warm: bool) -> np.ndarray:
+def _of_joints(motion: Motion, load: np.ndarray, warm: bool) -> np.ndarray:
     """Return each joint's variables, (N, n, v); a neighbour that is not there is still."""
-    dq, load = part.dq, channel.load(part)
-    before = [_remembered(sharp_sign(dq), part.rate, seconds) for seconds in _MEMORY]
-    own = [part.q, np.abs(dq), dq, part.ddq, load, *before, np.repeat(_since(part), dq.shape[1], axis=1)]
-    for values in (part.q, dq, part.ddq):
+    dq = motion.dq
+    before = [_remembered(sharp_sign(dq), motion.rate, seconds) for seconds in _MEMORY]
+    own = [motion.q, np.abs(dq), dq, motion.ddq, load, *before, np.repeat(_since(motion), dq.shape[1], axis=1)]
+    for values in (motion.q, dq, motion.ddq):
         wide = np.pad(values, ((0, 0), (1, 1)))
         own += [wide[:, :-2], wide[:, 2:]]
-    heat = [part.temperature] if warm and part.temperature is not None else []
+    heat = [motion.temperature] if warm and motion.temperature is not None else []
     return np.asarray(np.stack([*own, *heat], axis=2))
 
 
-def _of_power(channel: PlannedEquations, part: Motion, warm: bool) -> np.ndarray:
+def _of_power(motion: Motion, load: np.ndarray, warm: bool) -> np.ndarray:
     """Return the variables of power, (N, 1, v)."""
-    dq, load = part.dq, channel.load(part)
-    work = load * dq
+    dq, work = motion.dq, load * motion.dq
     total = work.sum(axis=1, keepdims=True)
-    sums = [total, np.abs(work).sum(axis=1, keepdims=True), _since(part)]
-    slow = [_remembered(total, part.rate, seconds) for seconds in _MEMORY]
-    heat = [part.temperature] if warm and part.temperature is not None else []
+    sums = [total, np.abs(work).sum(axis=1, keepdims=True), _since(motion)]
+    slow = [_remembered(total, motion.rate, seconds) for seconds in _MEMORY]
+    heat = [motion.temperature] if warm and motion.temperature is not None else []
     columns = np.hstack([work, load**2, np.abs(load), np.abs(dq), dq**2, *sums, *slow, *heat])
     return np.asarray(columns[:, None])
 
 
-def _since(part: Motion) -> np.ndarray:
+def _since(motion: Motion) -> np.ndarray:
     """Return the time since the run began, (N, 1) s."""
-    return np.asarray((part.time - (part.whole or part).time[0])[:, None])
+    return np.asarray((motion.time - motion.time[0])[:, None])
 
 
 def _remembered(values: np.ndarray, rate: float, seconds: float) -> np.ndarray:

@@ -28,14 +28,16 @@ from irtwin.signals.motion import Motion
 class ChannelResidual:
     """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
-    `before`, `after`: traces without and with the causes, and `seen` the map of the first; `touched`: the joints that
+    `before`, `after`: traces without and with the causes, and `seen` the map of the first; `refitted`: those without
+    them by a fit to all runs; `touched`: the joints that
     each cause acts on, none for the whole robot; `added`: what it adds to each trace, (N, g), and `acts` the map of all
     of it. `reference`: the map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean
-    square beyond which a gap lies; a run stands out where it is larger by the share `more`.
+    square beyond which a gap lies; `least`: the share of it beyond which a run, or a gap, is worth a word.
     """
 
     finding: Finding
     before: list[Trace]
+    refitted: list[Trace]
     after: list[Trace]
     touched: list[tuple[str, ...]]
     added: list[list[np.ndarray]]
@@ -43,7 +45,7 @@ class ChannelResidual:
     acts: Map | None
     reference: Map | None
     level: np.ndarray
-    more: float
+    least: float
 
     @property
     def acting(self) -> np.ndarray:
@@ -83,6 +85,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque, tell: Tel
     return ChannelResidual(
         finding,
         before,
+        traces(case.seen, fitted_values(finding, reference=False)) if reference else before,
         after,
         [cause.touched(case.robot) for cause in finding.causes],
         added,
@@ -189,7 +192,7 @@ def _standing_out(left: ChannelResidual, place: int) -> tuple[str, ...]:
     """Return the runs whose mean square stands out over the level, the worst first."""
     squares = {trace.motion.run: trace.residual[:, place] ** 2 for trace in left.before}
     means = {run: float(np.nanmean(own)) for run, own in squares.items() if np.isfinite(own).any()}
-    above = [run for run, mean in means.items() if mean > (1 + left.more) * left.level[place].min()]
+    above = [run for run, mean in means.items() if mean > (1 + left.least) * left.level[place].min()]
     return tuple(sorted(above, key=lambda run: -means[run]))
 
 
