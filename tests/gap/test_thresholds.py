@@ -44,3 +44,8 @@ def test_an_unknown_name_is_refused(name):
 def test_they_cannot_be_changed_in_place():
     with pytest.raises(dataclasses.FrozenInstanceError):
         DEFAULT.criterion.misfit = 1.0
+
+
+@pytest.mark.parametrize(("hypotheses", "least"), [(1, 0.0), (40, 0.06), (240, 0.10)])
+def test_the_more_hypotheses_the_more_an_effect_has_to_show(hypotheses, least):
+    assert DEFAULT.criterion.visible(hypotheses) == pytest.approx(least, abs=0.01)
