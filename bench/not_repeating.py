@@ -94,7 +94,7 @@ def few(data_set: DataSet, rng: np.random.Generator) -> DataSet:
 def disturbed(data_set: DataSet, kind: str, turn: int, rng: np.random.Generator) -> tuple[DataSet, Put]:
     """Return the data set with a disturbance of a kind, the `turn`-th of it."""
     case = case_of(data_set, (), DEFAULT)
-    torque, power = sensor_noise(data_set.runs, case.motions, DEFAULT.repeats)
+    torque, power = sensor_noise(data_set.runs, case.motions, DEFAULT.data)
     assert torque is not None and power is not None
     names = data_set.robot.joint_names
     joint, times = int(rng.integers(len(names))), float(rng.choice(AMPLITUDES))

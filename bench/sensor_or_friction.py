@@ -50,7 +50,7 @@ def main() -> None:
     for place in parser.parse_args().cases:
         data_set = read_data_set(place)
         motions = case_of(data_set, (), DEFAULT).motions
-        floor = noise_floor(data_set.runs, motions, DEFAULT.repeats).torque
+        floor = noise_floor(data_set.runs, motions, DEFAULT.data).torque
         assert floor is not None, f"{place}: no torque"
         for joint, name in enumerate(data_set.robot.joint_names):
             for power in (True, False):

@@ -14,7 +14,6 @@ from irtwin.effects.friction import StribeckFriction
 from irtwin.errors import InputError
 from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.thresholds import GivenTwin
 from irtwin.signals.log import DataSet
 from irtwin.twin.files import from_json, to_json
 from irtwin.twin.identify import identify
@@ -98,20 +97,18 @@ def test_a_twin_of_another_robot_is_refused(robot, bare):
     with pytest.raises(
         InputError, match=r"dataset\.toml: the twin is of another robot, arm_\d with the joints joint_1"
     ):
-        baseline(logged(0), (), GivenTwin(), foreign)
+        baseline(logged(0), (), 0.2, foreign)
 
 
 def test_withholding_what_a_given_twin_lacks(bare):
     with pytest.raises(InputError, match="--withhold payload: the twin does not have this effect; it has rigid_body"):
-        baseline(logged(0), ["payload"], GivenTwin(), bare)
-    assert "copper_loss" not in [
-        effect.id for effect in baseline(logged(0), ["copper_loss"], GivenTwin(), bare).effects
-    ]
+        baseline(logged(0), ["payload"], 0.2, bare)
+    assert "copper_loss" not in [effect.id for effect in baseline(logged(0), ["copper_loss"], 0.2, bare).effects]
 
 
 def test_a_given_twin_goes_before_what_the_data_set_says(bare):
     stated = replace(logged(0), effects=(*BASELINE, "cable_drag"))
-    assert {effect.id for effect in baseline(stated, (), GivenTwin(), bare).effects} == {*BASELINE, "copper_loss"}
+    assert {effect.id for effect in baseline(stated, (), 0.2, bare).effects} == {*BASELINE, "copper_loss"}
     (first, *_) = said_of_twin(stated, bare)
     assert first.endswith("give way to the twin that is given: it has copper_loss; it lacks cable_drag")
     assert len(said_of_twin(replace(stated, effects=(*BASELINE, "copper_loss")), bare)) == 1
@@ -120,7 +117,7 @@ def test_a_given_twin_goes_before_what_the_data_set_says(bare):
 def test_effects_of_some_runs_stay_with_their_runs(bare):
     passing = replace(catalogue()["external_contact"], runs=("run_1",))
     held = replace(bare, effects=(*bare.effects, passing))
-    assert passing not in baseline(logged(0), (), GivenTwin(), held).effects
+    assert passing not in baseline(logged(0), (), 0.2, held).effects
     assert any("external_contact" in line for line in said_of_twin(logged(0), held))
 
 
@@ -128,7 +125,7 @@ def test_shapes_and_joints_are_kept_and_sheets_completed(bare):
     sticks = StribeckFriction(vs=0.02, joints=("joint_2",))
     sheet = tuple(replace(joint, torque_constant=8.0) for joint in ROBOT.joints)
     given = replace(bare, effects=(*bare.effects, sticks), robot=replace(ROBOT, joints=sheet))
-    begun = baseline(logged(0), (), GivenTwin(), given)
+    begun = baseline(logged(0), (), 0.2, given)
     assert sticks in begun.effects
     assert [joint.torque_constant for joint in begun.robot.joints] == [8.0, 8.0]
 
@@ -149,7 +146,7 @@ def test_the_prior_decides_what_short_data_leave_open():
 
 
 def test_each_number_may_have_moved(bare):
-    exact, loose = bare.prior, baseline(logged(0), (), GivenTwin(), bare).prior
+    exact, loose = bare.prior, baseline(logged(0), (), 0.2, bare).prior
     more = np.sqrt(np.diag(loose.covariance - exact.covariance))
     assert np.all(more >= 0.2 * np.abs(exact.values))
     assert np.all(more > 0)

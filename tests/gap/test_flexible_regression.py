@@ -13,8 +13,9 @@ from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.experiment.flexible_regression import FlexibleRegression, flexible_regression
-from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.finding import find
+from irtwin.gap.localisation.channel_residuals import channel_residual
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.thresholds import DEFAULT
@@ -43,19 +44,20 @@ def of(motions, tried=("stribeck_friction",)):
         return stack.real_torque(motion, values)
 
     effects = [shape for effect in tried for shape in catalogue()[effect].candidates(ROBOT)]
-    grouping = Grouping(
-        {m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.admission.fewest_groups
-    )
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.data.fewest_motions)
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     case = SimpleNamespace(
         modelled=frozenset((effect, None) for effect in BASELINE),
         robot=ROBOT,
         observed=grouping.observed,
+        seen=motions,
+        others=[],
+        grouping=grouping,
         thresholds=DEFAULT,
     )
     finding = find("torque", case, system, np.full(2, NOISE), 0)
-    channel = PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
-    return finding, flexible_regression(channel, motions, 0)
+    explained = ExplainedTorque(stack, finding, lambda motion: Predicted(predicted(motion)))
+    return finding, flexible_regression(channel_residual(case, explained, predicted), 0)
 
 
 def on_second(function):

@@ -45,7 +45,7 @@ class Explained:
 
 
 def test_what_a_cause_adds_to_one_of_two_repeats_is_taken_off(case):
-    floor = noise_floor(case.runs, case.motions, DEFAULT.repeats)
+    floor = noise_floor(case.runs, case.motions, DEFAULT.data)
     assert floor.torque[0] > 1 and floor.power > 2
     left = floor_left(case, floor, Explained(), lambda motion, torque: (2 * torque[:, 0], torque[:, 0]))
     assert left.torque[0] == pytest.approx(NOISE, rel=0.2)
@@ -53,17 +53,17 @@ def test_what_a_cause_adds_to_one_of_two_repeats_is_taken_off(case):
 
 
 def test_power_that_nobody_measured_keeps_its_floor(case):
-    floor = noise_floor(case.runs, case.motions, DEFAULT.repeats)
+    floor = noise_floor(case.runs, case.motions, DEFAULT.data)
     left = floor_left(case, floor, Explained(), None)
     assert left.power == floor.power and left.torque[0] < floor.torque[0]
 
 
 def test_a_floor_is_never_raised(case):
-    low = replace(noise_floor(case.runs, case.motions, DEFAULT.repeats), torque=np.array([0.1]), power=0.1)
+    low = replace(noise_floor(case.runs, case.motions, DEFAULT.data), torque=np.array([0.1]), power=0.1)
     left = floor_left(case, low, Explained(), lambda motion, torque: (2 * torque[:, 0], torque[:, 0]))
     assert (left.torque[0], left.power) == (0.1, 0.1)
 
 
 def test_a_floor_from_above_the_band_stays(case):
-    floor = replace(noise_floor(case.runs, case.motions, DEFAULT.repeats), source="out_of_band")
+    floor = replace(noise_floor(case.runs, case.motions, DEFAULT.data), source="out_of_band")
     assert floor_left(case, floor, Explained(), None) is floor

@@ -16,6 +16,7 @@ from irtwin.gap.localisation.excess_map import heat_map, joint_maps, level_of, r
 from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import followed
 from irtwin.gap.localisation.regimes import JOINT_REGIMES
+from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import MISSING, Variant
 from irtwin.gap.regression.residuals import Trace
 from irtwin.gap.thresholds import DEFAULT
@@ -52,16 +53,15 @@ def on(joint, function):
 
 
 def labels(*kinds):
-    return {trace.motion.run: trace.motion.run for kind in kinds for trace in kind}
+    own = {trace.motion.run: trace.motion.run for kind in kinds for trace in kind}
+    return Grouping(own, frozenset(own), DEFAULT.data.fewest_motions)
 
 
 def located(observed, others=(), acting=None, leaving=None):
-    seen, known = joint_maps((observed, others), labels(observed, others), DEFAULT)
+    seen, known = joint_maps((observed, others), labels(observed, others), DEFAULT.data.slow)
     follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
-    level = level_of(FLOOR, seen, known, DEFAULT.places.fewest_samples)
-    return locate(
-        "torque", JOINTS, follows, seen, level, limits=DEFAULT.places, reference=known, acting=acting, leaving=leaving
-    )
+    level = level_of(FLOOR, seen, known)
+    return locate("torque", JOINTS, follows, seen, level, reference=known, acting=acting, leaving=leaving)
 
 
 def test_noise_has_no_place():
@@ -110,10 +110,10 @@ def test_a_cause_of_which_no_place_is_sure_has_those_to_which_it_adds():
     observed = traces(noise=0.3)
     inertia = on(1, lambda m, t: 0.1 * m.ddq[:, 1])
     added = [replace(trace, residual=inertia(trace.motion, trace.torque)) for trace in observed]
-    seen, acts = joint_maps((observed, added), labels(observed, added), DEFAULT)
+    seen, acts = joint_maps((observed, added), labels(observed, added), DEFAULT.data.slow)
     acting = np.array([False, True, False])
-    level = level_of(FLOOR, seen, None, DEFAULT.places.fewest_samples)
-    places = locate("torque", JOINTS, [None] * 3, seen, level, limits=DEFAULT.places, acting=acting, acts=acts)
+    level = level_of(FLOOR, seen, None)
+    places = locate("torque", JOINTS, [None] * 3, seen, level, acting=acting, acts=acts)
     assert {place.joint for place in places} == {"joint_2"}
     assert places[0].regime in {"accelerating", "braking", "reversal"}
     assert all(place.q > 0.05 for place in places)
@@ -142,22 +142,21 @@ def test_one_run_is_cut_in_time():
 
 
 def test_places_without_a_known_floor_stand_out_of_their_joint():
-    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()), DEFAULT)
+    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()), DEFAULT.data.slow)
     places = locate(
         "torque",
         JOINTS,
         ["acceleration"] * 3,
         seen,
-        level_of(None, seen, None, DEFAULT.places.fewest_samples),
-        limits=DEFAULT.places,
+        level_of(None, seen, None),
     )
     assert places[0].joint == "joint_2"
     assert places[0].regime in ("accelerating", "braking", "loaded")
 
 
 def test_a_map_has_every_joint_and_regime():
-    (seen,) = joint_maps([traces()], labels(traces()), DEFAULT)
-    drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None, DEFAULT.places.fewest_samples))
+    (seen,) = joint_maps([traces()], labels(traces()), DEFAULT.data.slow)
+    drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None))
     assert drawn.regimes == JOINT_REGIMES
     assert np.array(drawn.excess).shape == (3, len(JOINT_REGIMES))
     assert np.all(np.isfinite(drawn.excess))
@@ -168,14 +167,13 @@ def test_power_that_is_given_back_is_located():
     for trace in traces():
         given = np.minimum((trace.torque * trace.motion.dq).sum(axis=1), 0.0)
         observed.append(replace(trace, residual=(trace.residual[:, 0] - given)[:, None]))
-    (seen,) = robot_maps([observed], labels(observed), DEFAULT)
+    (seen,) = robot_maps([observed], labels(observed), DEFAULT.data.slow)
     first = locate(
         "power",
         (None,),
         ("mechanical_power",),
         seen,
-        level_of(np.array([0.5]), seen, None, DEFAULT.places.fewest_samples),
-        limits=DEFAULT.places,
+        level_of(np.array([0.5]), seen, None),
     )[0]
     assert (first.joint, first.regime) == (None, "regenerating")
 
@@ -207,8 +205,8 @@ def test_a_coupling_acts_on_both_joints_of_its_pair():
     variant = Variant(effect, (0,), effect.terms(ROBOT)[:1])
     found = Cause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, log_odds=9.0, probability=1.0)
     assert found.touched(ROBOT) == JOINTS[1:]
-    empty = dict.fromkeys(("after", "seen", "explained", "acts", "reference", "level"))
+    empty = dict.fromkeys(("refitted", "after", "seen", "acts", "reference", "level", "least"))
     finding = SimpleNamespace(places=JOINTS)
-    left = ChannelResidual(finding, [], added=[], touched=[JOINTS[1:]], limits=DEFAULT.places, **empty)
+    left = ChannelResidual(finding, [], added=[], touched=[JOINTS[1:]], **empty)
     assert left.acting.tolist() == [False, True, True]
     assert replace(left, touched=[()]).acting.all() and not replace(left, touched=[]).acting.any()

@@ -61,9 +61,7 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
         values = np.array([term.expected for _, term in stack.torque_terms])
         return stack.real_torque(motion, values)
 
-    grouping = Grouping(
-        {m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.admission.fewest_groups
-    )
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.data.fewest_motions)
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     found = tuple(hypotheses(system.columns, system.base, MISSING))
     noise = np.full(2, NOISE)
@@ -146,7 +144,7 @@ def test_a_programme_lasts_minutes_and_has_no_million_samples(motions, speed, ra
 def test_where_every_programme_would_last_too_long_it_is_said(motions):
     robot = replace(ROBOT, joints=tuple(replace(joint, velocity=1e-5) for joint in ROBOT.joints))
     silent = catalogue()["stribeck_friction"]
-    proposal = next_experiment(robot, [ground_of(motions, [silent.id])], [silent], motions, DEFAULT.experiment)
+    proposal = next_experiment(robot, [ground_of(motions, [silent.id])], [silent], motions, DEFAULT.matters.apart)
     assert proposal.programme is None or proposal.programme.seconds <= 600
 
 
@@ -177,7 +175,7 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
         "stribeck_friction",
         ["nonlinear_viscous_friction"],
     )
-    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
+    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.matters.apart)
     (weight,) = proposal.weights
     assert proposal.programme is not None and weight.reached
     planned = [replace(m, run=f"new_{k}") for k, m in enumerate(proposal.programme.motions)]
@@ -205,7 +203,7 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
 
 def test_of_two_names_for_one_thing_none_is_told(motions):
     channel = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"])
-    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
+    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.matters.apart)
     assert proposal.programme is None
     assert "cannot be told apart" in proposal.note
     assert proposal.experiment.expected_separation is None
@@ -213,21 +211,21 @@ def test_of_two_names_for_one_thing_none_is_told(motions):
 
 def test_rivals_of_a_cause_that_closes_nothing_are_not_asked_for(motions):
     channel = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"], part=0.001)
-    assert next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment) is None
+    assert next_experiment(ROBOT, [channel], [], motions, DEFAULT.matters.apart) is None
 
 
 def test_a_payload_in_every_run_asks_for_runs_without(motions):
     channel = ground_of(motions, ["payload"])
-    proposal = next_experiment(ROBOT, [channel], [catalogue()["payload"]], motions, DEFAULT.experiment)
+    proposal = next_experiment(ROBOT, [channel], [catalogue()["payload"]], motions, DEFAULT.matters.apart)
     assert proposal.programme.kind == "without_payload"
     (weight,) = proposal.weights
-    assert weight.now < 1 < DEFAULT.experiment.enough < weight.expected
+    assert weight.now < 1 < DEFAULT.matters.apart < weight.expected
 
 
 def test_temperature_that_nobody_logged_asks_for_a_warm_up(motions):
     channel = ground_of(motions, ["payload"])
     proposal = next_experiment(
-        ROBOT, [channel], [catalogue()["temperature_dependent_friction"]], motions, DEFAULT.experiment
+        ROBOT, [channel], [catalogue()["temperature_dependent_friction"]], motions, DEFAULT.matters.apart
     )
     assert proposal.programme.kind == "warm_up"
     assert proposal.experiment.programme.temperatures == (25.0, 45.0)
@@ -235,7 +233,7 @@ def test_temperature_that_nobody_logged_asks_for_a_warm_up(motions):
 
 def test_what_no_signal_shows_is_said_in_words(motions):
     channel = ground_of(motions, ["payload"])
-    said = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions, DEFAULT.experiment).experiment
+    said = next_experiment(ROBOT, [channel], [catalogue()["copper_loss"]], motions, DEFAULT.matters.apart).experiment
     assert said.programme is None
     assert "log power" in said.motions[0]
 
@@ -247,7 +245,7 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
         "stribeck_friction",
         ["nonlinear_viscous_friction"],
     )
-    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.experiment)
+    proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.matters.apart)
     said = proposal.experiment
     json.dumps(to_json(said), allow_nan=False)
     assert said.purpose == "tell stribeck_friction from nonlinear_viscous_friction"
@@ -258,4 +256,4 @@ def test_the_proposal_is_json_and_has_a_curve_to_draw(motions):
 
 
 def test_nothing_to_ask(motions):
-    assert next_experiment(ROBOT, [ground_of(motions, ["payload"])], [], motions, DEFAULT.experiment) is None
+    assert next_experiment(ROBOT, [ground_of(motions, ["payload"])], [], motions, DEFAULT.matters.apart) is None

@@ -30,7 +30,7 @@ def floor(*torques):
         for k, torque in enumerate(torques)
     ]
     motion = SimpleNamespace(time=TIME, rate=RATE, cutoff=CUTOFF)
-    return noise_floor(runs, {run.name: motion for run in runs}, DEFAULT.repeats)
+    return noise_floor(runs, {run.name: motion for run in runs}, DEFAULT.data)
 
 
 def white(seed=0):
@@ -73,6 +73,6 @@ def test_what_a_joint_holds_at_rest_is_no_noise_of_its_motion():
         return SimpleNamespace(name=name, role="observed", repeat_of=repeats, signals=signals), motion
 
     (first, one), (second, other) = run("a", None, 0, 0.0), run("b", "a", 1, 20.0)
-    found = noise_floor([first, second], {"a": one, "b": other}, DEFAULT.repeats)
+    found = noise_floor([first, second], {"a": one, "b": other}, DEFAULT.data)
     assert found.source == "repeats"
     assert found.torque == pytest.approx([NOISE], rel=0.1)

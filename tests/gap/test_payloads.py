@@ -29,7 +29,7 @@ def search(loaded, observed=range(8), tell=None):
         extra = Payload().contribution(ROBOT, motion, LOAD) if seed in loaded else 0.0
         motions.append(replace(shown, torque=shown.torque + extra))
     grouping = Grouping(
-        {m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed), DEFAULT.admission.fewest_groups
+        {m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed), DEFAULT.data.fewest_motions
     )
     system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
     return untold_payload(ROBOT, system, noise_before(system), tell)

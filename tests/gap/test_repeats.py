@@ -19,7 +19,6 @@ from irtwin.gap.repeats.series import Series
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(3)
-LIMITS = DEFAULT.not_repeating
 
 
 def repeated(change=None, **more):
@@ -159,7 +158,7 @@ def test_an_offset_that_both_runs_share_repeats():
 @pytest.mark.parametrize(("times", "count"), [(0.4, 0), (1.2, 1)])
 def test_an_offset_matters_from_half_of_the_noise_on(times, count):
     quiet = repeated()
-    noise = noise_floor(quiet.runs, quiet.motions, DEFAULT.repeats).sensor_torque[1]
+    noise = noise_floor(quiet.runs, quiet.motions, DEFAULT.data).sensor_torque[1]
     assert len(disturbances(repeated(lambda k, t: in_joint_2(times * noise * k + 0 * t)))) == count
 
 
@@ -167,7 +166,7 @@ def test_a_strong_line_does_not_hide_itself_by_what_it_leaks():
     time, rng = np.arange(1000) / 125, np.random.default_rng(0)
     slow = np.column_stack([np.ones(1000), time, np.tanh(np.sin(2.4 * time) / 0.02), np.sin(2.4 * time)])
     series = Series(time, 80 * np.sin(2 * np.pi * 0.8 * time) + rng.standard_normal(1000), slow)
-    found, _ = lines([series], 6, LIMITS)
+    found, _ = lines([series], 6)
     assert [round(one.frequency, 2) for one in found] == [0.8]
     assert found[0].p < 1e-12
 
@@ -197,7 +196,7 @@ def test_noise_that_remembers_has_no_lines(memory):
     time = np.arange(1000) / 125
     for _ in range(30):
         series = Series(time, wandering(1000, memory, rng), np.column_stack([np.ones(1000), time]))
-        false += bool(lines([series], 6, LIMITS)[0])
+        false += bool(lines([series], 6)[0])
     assert false <= 1
 
 
@@ -211,5 +210,5 @@ def test_the_correlation_of_what_remembers_is_found(memory):
 def test_a_line_is_no_sensors_noise():
     case = repeated(lambda k, t: in_joint_2(18.0 * np.sin(2 * np.pi * 30.0 * t + 2.0 * k)))
     quiet = repeated()
-    loud, still = (noise_floor(one.runs, one.motions, DEFAULT.repeats) for one in (case, quiet))
+    loud, still = (noise_floor(one.runs, one.motions, DEFAULT.data) for one in (case, quiet))
     assert loud.sensor_torque[1] < 2 * still.sensor_torque[1] < 0.3

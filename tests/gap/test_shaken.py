@@ -40,7 +40,7 @@ def equations(runs: list[Run], *, told: bool) -> System:
     alone: Any = stack, list(motions.values()), grouping
     below = with_load(ROBOT, LeftOut(stack, torque_system(*alone, (), None)).below)
     elastic = [catalogue()["joint_elasticity"]]
-    pairs = shaken(runs, motions, ROBOT, DEFAULT.repeats) if told else ()
+    pairs = shaken(runs, motions, ROBOT, DEFAULT.data) if told else ()
     return torque_system(*alone, elastic, below, shaken=pairs)
 
 
@@ -54,7 +54,7 @@ def test_shaking_adds_as_much_noise_as_there_is() -> None:
     run = logged(1)
     motion = condition_for_fit(run, ROBOT, CUTOFF)
     clean = condition_for_fit(logged(1, noise=0.0), ROBOT, CUTOFF)
-    ((same, again),) = shaken([run], {run.name: motion}, ROBOT, DEFAULT.repeats)
+    ((same, again),) = shaken([run], {run.name: motion}, ROBOT, DEFAULT.data)
     assert same is motion
     for name in ("q", "dq", "ddq"):
         added, there = (np.std(getattr(a, name) - getattr(motion, name), axis=0) for a in (again, clean))
@@ -64,7 +64,7 @@ def test_shaking_adds_as_much_noise_as_there_is() -> None:
 
 def test_only_observed_runs_are_shaken() -> None:
     run = replace(logged(1), role="reference")
-    assert not shaken([run], {run.name: condition_for_fit(run, ROBOT, CUTOFF)}, ROBOT, DEFAULT.repeats)
+    assert not shaken([run], {run.name: condition_for_fit(run, ROBOT, CUTOFF)}, ROBOT, DEFAULT.data)
 
 
 def test_noise_of_positions_is_no_elastic_joint() -> None:

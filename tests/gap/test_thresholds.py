@@ -37,12 +37,15 @@ def test_one_is_changed_and_the_others_stay():
 
 @pytest.mark.parametrize("name", ["criterion.least", "misfit", "criterion", "criterion.", ""])
 def test_an_unknown_name_is_refused(name):
-    with pytest.raises(
-        InputError, match=f'there is no threshold "{re.escape(name)}"; choose from admission.least_time'
-    ):
+    with pytest.raises(InputError, match=f'there is no threshold "{re.escape(name)}"; choose from data.shortest'):
         DEFAULT.changed(name, 1.0)
 
 
 def test_they_cannot_be_changed_in_place():
     with pytest.raises(dataclasses.FrozenInstanceError):
         DEFAULT.criterion.misfit = 1.0
+
+
+@pytest.mark.parametrize(("hypotheses", "least"), [(1, 0.0), (40, 0.06), (240, 0.10)])
+def test_the_more_hypotheses_the_more_an_effect_has_to_show(hypotheses, least):
+    assert DEFAULT.criterion.visible(hypotheses) == pytest.approx(least, abs=0.01)

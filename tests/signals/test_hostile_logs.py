@@ -231,10 +231,9 @@ def test_damaged_parquet_is_said_to_be(folder):
 
 def test_a_run_in_pieces_is_no_copy_of_itself(tmp_path):
     from irtwin.gap.data.admission import admit
-    from irtwin.gap.thresholds import DEFAULT
     from irtwin.signals.conditioning import condition
 
     whole = as_run(measure(ROBOT, swing(ROBOT, 1, 6.0)))
     whole.signals.time[300:] += 100.0
     data_set = read_data_set(write(tmp_path / "set", ROBOT, [whole]))
-    admit(data_set, {run.name: condition(run, ROBOT, 5.0) for run in data_set.runs}, DEFAULT.admission)
+    admit(data_set, {run.name: condition(run, ROBOT, 5.0) for run in data_set.runs}, 1.0)

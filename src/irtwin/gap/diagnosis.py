@@ -20,7 +20,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin, friction
-from irtwin.gap.data.baseline import baseline, said_of_twin
+from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
@@ -169,7 +169,7 @@ def diagnose(
     diagnosed.
     """
     tell = Told(progress or (lambda line: None))
-    expected = forecast(data_set, baseline(data_set, withhold, thresholds.given_twin, twin))
+    expected = forecast(data_set)
     if expected.long:
         tell(expected.line)
     tell(f"Filtering {len(data_set.runs)} runs")
@@ -187,7 +187,7 @@ def diagnose(
         stack = case.stack.with_effects(stack.effects)
         plain = _plain(case, stack, tell)
     tell.step("  the noise floor")
-    floor = noise_floor(case.runs, case.motions, thresholds.repeats)
+    floor = noise_floor(case.runs, case.motions, thresholds.data)
     if case.shows("torque") and plain is not None:
         _check_observed(plain)
     power_stack, predicted, below = _torque_source(case, stack, plain, tell)
@@ -233,7 +233,7 @@ def diagnose(
         if one.id not in blamed and not one.disturbance and not isinstance(one, screened)
     ]
     lacking = untestable(
-        silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.detectability
+        silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.criterion
     )
     left = [
         channel_residual(case, one, predicted if one.finding.name == "torque" else torque, tell) for one in explained
@@ -249,13 +249,13 @@ def diagnose(
     located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None, tell)
     tell("Designing the next experiment")
     planned = planned_equations(case, (stack, power_stack), findings, below, torque)
-    measures = {channel.finding.name: flexible_regression(channel, case.seen, seed, tell) for channel in planned}
+    measures = {one.finding.name: flexible_regression(one, seed, tell) for one in left}
     proposal = next_experiment(
         case.robot,
         planned,
         [catalogue()[one.effect] for one in lacking],
         case.seen,
-        thresholds.experiment,
+        thresholds.matters.apart,
         lambda: excitation(lambda: tell.step("  waiting for the exciting motion")),
         tell,
     )
@@ -309,7 +309,7 @@ def _torque_source(case: Case, stack: Stack, plain: System | None, tell: Progres
         through_power = ThroughPower(stack, case.with_power)
         return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
     if case.shows("torque"):
-        check_same_robot(case.runs, stack, plain, case.thresholds.same_robot)
+        check_same_robot(case.runs, stack, plain, case.thresholds.data)
     left_out = LeftOut(stack, plain, tell)
     return stack, left_out.torque, left_out.below
 

@@ -85,7 +85,7 @@ def cause(
         scope=one.scope,
         confidence=one.probability,
         parameters=parameters(robot, finding, one, scale),
-        indistinguishable_from=one.not_told_from(limits.least_rival),
+        indistinguishable_from=one.not_told_from(limits.unknown),
         evidence=_evidence(finding, one),
     )
 

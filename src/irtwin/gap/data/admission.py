@@ -7,20 +7,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from irtwin.errors import InputError
-from irtwin.gap.thresholds import Admission
 from irtwin.signals.channels import CHANNELS
+from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 
 _TORQUE, _CURRENT = CHANNELS["torque"], CHANNELS["current"]
 
 
-def admit(data_set: DataSet, motions: Mapping[str, Motion], limits: Admission) -> None:
+def admit(data_set: DataSet, motions: Mapping[str, Motion], shortest: float) -> None:
     """Raise InputError, naming the file and what to do, where no diagnosis is possible; `motions` by name of the run.
 
-    There have to be observed runs, a second long together, with torque or power that changes with the motion, in which
-    some joint moves; references that share a signal with them; and no run twice, which would judge a fit on what it was
-    fitted to.
+    There have to be observed runs, together no shorter than `shortest`, s, with torque or power that changes with the
+    motion, in which some joint moves; references that share a signal with them; and no run twice, which would judge a
+    fit on what it was fitted to.
     """
     file = data_set.folder / "dataset.toml"
     observed = [run for run in data_set.runs if run.role == "observed"]
@@ -30,12 +30,12 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion], limits: Admission) -
     if not any(motion.torque is not None or motion.power is not None for motion in seen):
         raise InputError(f"{file}: {_nothing_measured(seen)}")
     seconds = sum(float(motion.time[-1] - motion.time[0]) for motion in seen)
-    if seconds < limits.least_time:
+    if seconds < shortest:
         raise InputError(
             f"{file}: the observed runs last {seconds:.2g} s together, too short to tell a gap from none; log at least "
-            f"{limits.least_time:g} s in motion"
+            f"{shortest:g} s in motion"
         )
-    moving = {run.name: _moving(motions[run.name], limits) for run in observed}
+    moving = {run.name: _moving(motions[run.name]) for run in observed}
     if not any(each.any() for each in moving.values()):
         raise InputError(f"{file}: no joint moves in any observed run; log runs in motion")
     _check_dead([run for run in observed if moving[run.name].any()], data_set.robot.joint_names, moving)
@@ -57,11 +57,9 @@ def _nothing_measured(motions: Sequence[Motion]) -> str:
     return "neither torque nor power was measured in any observed run; log tau_, i_ or power"
 
 
-def _moving(motion: Motion, limits: Admission) -> np.ndarray:
-    """Return (n,) which joints move."""
-    return np.asarray(
-        (np.abs(motion.dq).max(axis=0) > limits.moving_speed) & (np.ptp(motion.q, axis=0) > limits.moving_range)
-    )
+def _moving(motion: Motion) -> np.ndarray:
+    """Return (n,) which joints move: faster, and in all farther, than a joint that stands does in a second."""
+    return np.asarray((np.abs(motion.dq).max(axis=0) > STANDSTILL) & (np.ptp(motion.q, axis=0) > STANDSTILL))
 
 
 def _check_dead(runs: Sequence[Run], joints: Sequence[str], moving: Mapping[str, np.ndarray]) -> None:

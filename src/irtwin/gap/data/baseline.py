@@ -12,7 +12,6 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.gap.thresholds import GivenTwin
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.log import DataSet
 from irtwin.twin.twin import Twin
@@ -27,7 +26,7 @@ class Baseline:
     prior: Prior | None = None
 
 
-def baseline(data_set: DataSet, withhold: Sequence[str], limits: GivenTwin, twin: Twin | None = None) -> Baseline:
+def baseline(data_set: DataSet, withhold: Sequence[str], moved: float, twin: Twin | None = None) -> Baseline:
     """Return what the data set's twin models, or a `twin` that is given, less the effects withheld.
 
     Of a twin: its effects in their shapes, and its numbers as the prior, as far as they can have moved since. Effects
@@ -39,21 +38,21 @@ def baseline(data_set: DataSet, withhold: Sequence[str], limits: GivenTwin, twin
         begun = Baseline(data_set.robot, data_set.effects or BASELINE)
     else:
         robot = _same_robot(data_set, twin)
-        begun = Baseline(robot, (*twin.standing, *twin.unidentified), _prior(twin, limits))
+        begun = Baseline(robot, (*twin.standing, *twin.unidentified), _prior(twin, moved))
     ids = Stack(begun.robot, begun.effects).ids
     _check_withheld(withhold, ids)
     return replace(begun, effects=tuple(one for one in begun.effects if _id(one) not in withhold))
 
 
-def _prior(twin: Twin, limits: GivenTwin) -> Prior:
+def _prior(twin: Twin, moved: float) -> Prior:
     """Return a twin's numbers as prior, each of which may have moved."""
     prior = twin.prior
     spread = {
         (effect.id, term.joint, term.link, term.name): term.spread
         for effect, term in (*twin.stack.torque_terms, *twin.stack.power_terms)
     }
-    least = limits.moved_at_least * np.array([spread[key] for key in prior.keys])
-    return prior.loosened(np.hypot(limits.moved * prior.values, least))
+    half = np.array([spread[key] for key in prior.keys]) / 2
+    return prior.loosened(moved * np.hypot(prior.values, half))
 
 
 def said_of_twin(data_set: DataSet, twin: Twin) -> list[str]:

@@ -74,7 +74,7 @@ class Case:
     @property
     def grouping(self) -> Grouping:
         """Which runs are left out together: those of one programmed motion."""
-        return Grouping(_labels(self.runs), self.observed, self.thresholds.admission.fewest_groups)
+        return Grouping(_labels(self.runs), self.observed, self.thresholds.data.fewest_motions)
 
     @property
     def seen(self) -> list[Motion]:
@@ -96,7 +96,7 @@ class Case:
     def alike(self) -> bool:
         """Whether the runs that observed ones are held against are reference runs, all logged at nearly one rate."""
         steps = [float(np.median(np.diff(run.signals.time))) for run in self.runs]
-        return self.against == "reference" and max(steps) <= (1 + self.thresholds.verdict.rates) * min(steps)
+        return self.against == "reference" and round(max(steps) / min(steps)) == 1
 
     @property
     def with_torque(self) -> list[Motion]:
@@ -116,7 +116,7 @@ class Case:
     @cached_property
     def shaken(self) -> tuple[tuple[Motion, Motion], ...]:
         """Some observed motions, each with the same once more to which its noise of positions was added again."""
-        return shaken(self.runs, self.motions, self.robot, self.thresholds.repeats)
+        return shaken(self.runs, self.motions, self.robot, self.thresholds.data)
 
     @property
     def long(self) -> bool:
@@ -162,11 +162,11 @@ def case_of(
 
     `tell` is told how far that has come, where it takes long. Raises InputError where `baseline` and `admit` do.
     """
-    begun = baseline(data_set, withhold, thresholds.given_twin, twin)
+    begun = baseline(data_set, withhold, thresholds.data.moved, twin)
     cutoff = cutoff_for(begun.robot, data_set.runs, data_set.cutoff, tell)
     given = {run.name: condition_for_fit(run, begun.robot, cutoff.hz) for run in data_set.runs}
     robot, motions = _torque_from_current(begun.robot, given)
-    admit(data_set, motions, thresholds.admission)
+    admit(data_set, motions, thresholds.data.shortest)
     case = Case(
         robot,
         begun.effects,

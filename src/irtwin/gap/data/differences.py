@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
+from scipy.signal import correlate
 
 from irtwin.effects.friction import CoulombFriction
-from irtwin.gap.thresholds import Repeats
+from irtwin.gap.thresholds import Data
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
@@ -48,7 +49,7 @@ class Pair:
         return np.asarray(one[self.inside] - make_interp_spline(self.second.time + self.shift, two, k=1)(self.time))
 
 
-def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repeats) -> list[Pair]:
+def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Data) -> list[Pair]:
     """Return each measured run that repeats another of its role, beside that one; a simulator repeats itself.
 
     `motions`: each run's, by name, filtered alike.
@@ -62,33 +63,33 @@ def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repeats
     return [pair for pair in found if pair is not None]
 
 
-def _laid(first: Motion, second: Motion, limits: Repeats) -> Pair | None:
+def _laid(first: Motion, second: Motion, limits: Data) -> Pair | None:
     """Return the pair; None where they have too little in common."""
-    shift = _shift(first, second, limits.largest_shift)
+    shift = _shift(first, second)
     start = max(first.time[0], second.time[0] + shift) + 1e-9
     stop = min(first.time[-1], second.time[-1] + shift) - 1e-9
     inside = (first.time >= start) & (first.time <= stop)
     if inside.sum() < _FEWEST:
         return None
     q = make_interp_spline(second.time + shift, second.q)(first.time[inside])
-    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.largest_difference * max(float(first.q.std()), 1e-3):
+    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.repeated * max(float(first.q.std()), 1e-3):
         return None
     return Pair(first, second, shift, inside)
 
 
-def _shift(first: Motion, second: Motion, largest: float) -> float:
-    """Return by how much later (s) the second motion has to be moved to lie on the first."""
+def _shift(first: Motion, second: Motion) -> float:
+    """Return by how much later (s) the second motion has to be moved to lie on the first: where speeds agree most."""
     spline = make_interp_spline(second.time, second.q)
-    low, high = second.time[0], second.time[-1]
+    even = np.arange(second.time[0], second.time[-1], 1 / first.rate)
+    both = zip(first.dq.T, spline.derivative()(even).T, strict=True)
+    agree = np.sum([correlate(one, other, method="fft") for one, other in both], axis=0)
+    lag = int(np.argmax(agree)) - (len(even) - 1)
     every = slice(None, None, max(1, len(first.time) // 500))
     time, q = first.time[every], first.q[every]
 
     def distance(shift: float) -> float:
-        inside = (time - shift >= low) & (time - shift <= high)
+        inside = (time - shift >= second.time[0]) & (time - shift <= second.time[-1])
         return float(np.mean((spline(time[inside] - shift) - q[inside]) ** 2)) if inside.any() else np.inf
 
-    offset = first.time[0] - second.time[0]
-    grid = offset + np.linspace(-largest, largest, 81)
-    best = grid[int(np.argmin([distance(shift) for shift in grid]))]
-    step = grid[1] - grid[0]
+    best, step = first.time[0] - second.time[0] + lag / first.rate, 2 / first.rate
     return float(minimize_scalar(distance, bounds=(best - step, best + step), method="bounded").x)

@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import welch
 
 from irtwin.gap.data.differences import Pair, pairs_of
-from irtwin.gap.thresholds import Repeats
+from irtwin.gap.thresholds import Data
 from irtwin.signals.filter import kernel, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -36,7 +36,7 @@ class Floor:
     sensor_power: float | None = None
 
 
-def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repeats) -> Floor:
+def noise_floor(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Data) -> Floor:
     """Return the floor: from repeats of one motion where there are any, else from above the band.
 
     A simulator's runs say nothing of it: they have no noise, and repeat themselves.
@@ -62,7 +62,7 @@ def _one(level: np.ndarray | None) -> float | None:
 
 
 def sensor_noise(
-    runs: Sequence[Run], motions: Mapping[str, Motion], limits: Repeats
+    runs: Sequence[Run], motions: Mapping[str, Motion], limits: Data
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Return the RMS in the band of what the sensors' noise has above it, taken as white: torque (n,), power (1,)."""
     torque = _pooled([_above(run.signals.time, run.signals.torque, motions[run.name], limits) for run in runs])
@@ -99,19 +99,19 @@ def _without_jumps(squares: np.ndarray) -> np.ndarray:
     return np.asarray(np.minimum(squares, np.quantile(squares, 0.99, axis=0)))
 
 
-def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Repeats) -> np.ndarray | None:
+def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Data) -> np.ndarray | None:
     """Return the variance in the band of white noise that has what the filter takes away above it; NaN if smoothed."""
     variance = white_noise(time, signal, motion, limits)
-    return None if variance is None else variance * _share(motion, limits)
+    return None if variance is None else variance * _share(motion)
 
 
-def white_noise(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Repeats) -> np.ndarray | None:
+def white_noise(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Data) -> np.ndarray | None:
     """Return the variance of white noise that has above the band what the filter takes away; NaN if smoothed.
 
     The lesser of two medians: that over time, which no jump of friction moves, and that over frequency, which no line
     of the spectrum does. None where nothing is known of it.
     """
-    share = _share(motion, limits)
+    share = _share(motion)
     if signal is None or motion.cutoff is None or share > _MOST_BAND:
         return None
     even = np.asarray(make_interp_spline(time, signal, k=1)(motion.time))
@@ -124,14 +124,14 @@ def white_noise(time: np.ndarray, signal: np.ndarray | None, motion: Motion, lim
     return np.atleast_1d(np.where(_smoothed(even, motion.rate, share * motion.rate / 2, limits), np.nan, variance))
 
 
-def _share(motion: Motion, limits: Repeats) -> float:
+def _share(motion: Motion) -> float:
     """Return the part of all frequencies that is in the filter's band."""
     if motion.cutoff is None or len(kernel(motion.rate, motion.cutoff)) == 1:
         return 1.0
-    return min(1.0, limits.stop_band * motion.cutoff / (motion.rate / 2))
+    return min(1.0, motion.cutoff / (motion.rate / 2))
 
 
-def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Repeats) -> np.ndarray:
+def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Data) -> np.ndarray:
     """Return whether the spectrum of a signal, from `stop` (Hz) on, falls up to its very end: white noise would not."""
     frequency, density = welch(signal, rate, nperseg=min(_WELCH, len(signal)), axis=0)
     low, high = max(stop, rate / 8), rate / 2
@@ -140,4 +140,4 @@ def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Repeats) -> 
     if not (lower.any() and upper.any()):
         return np.zeros(signal.shape[1:], dtype=bool)
     first, last = np.median(density[lower], axis=0), np.median(density[upper], axis=0)
-    return np.asarray(first > last * np.sqrt(high / low) ** limits.steepest_fall)
+    return np.asarray(first > last * np.sqrt(high / low) ** limits.smoothed)

@@ -5,27 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.optimize import lsq_linear
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.gap.regression.cholesky import factored
+from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System, noise_before
-from irtwin.gap.thresholds import SameRobot
+from irtwin.gap.thresholds import Data
 from irtwin.robot.description import Robot
 from irtwin.signals.log import Run
 
-_REACH = (1.0, 0.4, 0.4, 0.4, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)  # m, m^2: its first moments and inertia, per kg
+_OF_BODY = 10  # parameters: mass, first moments, inertia
 
 
-def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: SameRobot) -> None:
+def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: Data) -> None:
     """Raise InputError where the torque of the other runs (reference, simulated) is nothing like the observed.
 
     `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or its bodies explain it no
-    better than those of the reference runs; another robot's bodies are wrong in several.
+    better than those of the reference runs; another robot's bodies are wrong in several, or friction drives half of its
+    joints.
     """
     if not system.both:
         return
@@ -35,9 +34,9 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
     other = system.solution((), summed([m for m, own in zip(moments, seen, strict=True) if not own]))
     total = summed([m for m, own in zip(moments, seen, strict=True) if own])
     own = system.solution((), total)
-    foreign = _foreign_share(stack.robot, system, total, own, other, limits) > limits.foreign[others[0].role]
-    opposed = _opposed(stack.robot, system, own, other, limits.opposed)
-    if foreign.sum() >= limits.foreign_joints or opposed.mean() >= limits.opposed_joints:
+    foreign = _foreign_share(system, total, own, other) > limits.foreign[others[0].role]
+    opposed = _opposed(stack.robot, system, own, other)
+    if foreign.sum() > 1 or opposed.mean() >= 0.5:
         named = [name for k, name in enumerate(stack.robot.joint_names) if foreign[k] or opposed[k]]
         raise InputError(
             f"{others[0].file}: the torque of the {others[0].role} runs is nothing like that of the observed runs (on "
@@ -45,15 +44,13 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
         )
 
 
-def _foreign_share(
-    robot: Robot, system: System, total: Moments, own: np.ndarray, other: np.ndarray, limits: SameRobot
-) -> np.ndarray:
+def _foreign_share(system: System, total: Moments, own: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return how much of each observed joint's mean square (n,) the bodies of the other runs leave.
 
-    Friction, offsets and rotors are refitted, and a load of a likely size may have come or gone; what the observed
-    runs' own bodies leave too is not counted. `own`, `other`: coefficients (D,) of either kind of run.
+    Friction, offsets and rotors are refitted, and a load may have come or gone; what the observed runs' own bodies
+    leave too is not counted. `own`, `other`: coefficients (D,) of either kind of run.
     """
-    borrowed = other + _refitted(system, total, other, _allowed(robot, system, limits.heaviest_load))
+    borrowed = _refitted(system, total, other)
     nothing = np.zeros(len(other))
     nothing[: system.base] = -system.expected / system.scale[: system.base]
 
@@ -64,7 +61,7 @@ def _foreign_share(
     return np.asarray((squares(borrowed) - squares(own)) / np.maximum(squares(nothing), np.finfo(float).tiny))
 
 
-def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray, least: float) -> np.ndarray:
+def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return on which joints (n,) all friction of the other runs drives where that of the observed runs brakes."""
     opposed = []
     for joint in robot.joint_names:
@@ -75,27 +72,16 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray, l
         ]
         seen = own[places] + system.expected[places] / system.scale[places]
         elsewhere = other[places] + system.expected[places] / system.scale[places]
-        opposed.append(bool(places) and bool(np.all(elsewhere * np.sign(seen) < -least * np.abs(seen))))
+        opposed.append(bool(places) and bool(np.all(elsewhere * seen < 0)))
     return np.array(opposed)
 
 
-def _allowed(robot: Robot, system: System, heaviest: float) -> np.ndarray:
-    """Return how far each of the twin's terms (K,) may move, in units of its prior: bodies not, a load on the last."""
-    bodies = np.array([effect.bodies for effect, _ in system.terms], dtype=bool)
-    weight = max(heaviest, sum(inertia.mass for inertia in robot.model.inertias) / 2)
-    allowed = np.where(bodies, 0.0, np.inf)
-    last = np.flatnonzero(bodies)[-len(_REACH) :]
-    allowed[last] = weight * np.array(_REACH)[: len(last)] / system.scale[last]
-    return allowed
-
-
-def _refitted(system: System, total: Moments, start: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """Return what is added to coefficients `start` (D,) so that they fit best, each no farther than allowed (K,)."""
-    free = np.flatnonzero(allowed > 0)
+def _refitted(system: System, total: Moments, start: np.ndarray) -> np.ndarray:
+    """Return coefficients (D,) that fit best near `start`, where all bodies stay but the last, which a load joins."""
+    bodies = np.flatnonzero([effect.bodies for effect, _ in system.terms])
+    free = np.setdiff1d(np.arange(system.base), bodies[:-_OF_BODY])
     products = total.of(free)
-    factor = np.triu(factored(products[:, free], system.prior()[np.ix_(free, free)]))
     right = products[:, -1] - products[:, : len(start)] @ start
-    found = lsq_linear(factor, solve_triangular(factor.T, right, lower=True), (-allowed[free], allowed[free]))
-    added = np.zeros(len(start))
-    added[free] = found.x
-    return added
+    found = start.copy()
+    found[free] += solved(factored(products[:, free], system.prior()[np.ix_(free, free)]), right)
+    return found

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from irtwin.gap.data.noise_floor import white_noise
-from irtwin.gap.thresholds import Repeats
+from irtwin.gap.thresholds import Data
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import Run
@@ -18,7 +18,7 @@ _ENOUGH = 20_000  # samples: its products are then known within some percent
 
 
 def shaken(
-    runs: Sequence[Run], motions: Mapping[str, Motion], robot: Robot, limits: Repeats
+    runs: Sequence[Run], motions: Mapping[str, Motion], robot: Robot, limits: Data
 ) -> tuple[tuple[Motion, Motion], ...]:
     """Return observed runs' motions, each with the same of positions and speeds to which their noise was added again.
 
@@ -37,7 +37,7 @@ def shaken(
     return tuple(found)
 
 
-def _shaken(run: Run, motion: Motion, robot: Robot, limits: Repeats, random: np.random.Generator) -> Motion | None:
+def _shaken(run: Run, motion: Motion, robot: Robot, limits: Data, random: np.random.Generator) -> Motion | None:
     noisy = {}
     for name in ("q", "dq", "ddq"):
         signal = getattr(run.signals, name)

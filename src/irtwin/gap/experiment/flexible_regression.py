@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,21 +10,20 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
 from irtwin.document.document import Closeable
-from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.effects.friction import sharp_sign
+from irtwin.gap.localisation.channel_residuals import ChannelResidual
+from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.progress import Tell, paced
-from irtwin.signals.filter import decimation, low_pass
+from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
-_SAMPLES = 24_000  # whose residual is computed
 _ROWS = 5_000  # that the regression sees
-_STRETCHES = 4  # of a run, where it has more samples than its share
 _FOLDS = 8
 _TENTS = 7  # over each variable
 _WAVES = 60  # random features
 _DIMENSIONS = 3  # at most, that one random feature depends on
 _SCALES = (0.25, 0.5, 1.0)  # waves over the range of a variable
 _RIDGES = (1e-3, 1e-2, 1e-1)  # of the mean square of a feature
-_STANDSTILL = 1e-3  # rad/s
 _MEMORY = (0.1, 0.5)  # s
 
 
@@ -73,112 +71,76 @@ class FlexibleRegression:
         )
 
 
-def flexible_regression(
-    channel: PlannedEquations, motions: Sequence[Motion], seed: int, tell: Tell | None = None
-) -> FlexibleRegression | None:
-    """Regress what the twin leaves on what the motion is, groups of runs left out in turn.
+def flexible_regression(left: ChannelResidual, seed: int, tell: Tell | None = None) -> FlexibleRegression | None:
+    """Regress what the twin leaves on what the motion is, groups of observed runs left out in turn.
 
-    motions: the observed ones. A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed,
-    acceleration, load, temperature, time and what went before, of the joint and of its neighbours, each also times the
-    direction, as friction jumps with it. None where there are fewer than two groups or too few samples.
+    A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed, acceleration, load,
+    temperature, time and what went before, of the joint and of its neighbours, each also times the direction, as
+    friction jumps with it. None where there are fewer than two groups or too few samples.
     `tell` is told how far that has come, where it takes long.
     """
-    told = paced(tell)
-    parts = list(_parts(channel, motions, told))
-    if not parts:
-        return None
-    group = np.concatenate([part.group for part in parts])
+    told, finding = paced(tell), left.finding
+    torque, motions = finding.name == "torque", [trace.motion for trace in left.refitted]
+    warm = all(motion.temperature is not None for motion in motions)
+    thinned = max(1, sum(len(motion.time) for motion in motions) // _ROWS)
+    parts = []
+    for plain, closed in zip(left.refitted, left.after or left.refitted, strict=True):
+        motion = plain.motion
+        told(f"  how much of {finding.name} could be closed, {motion.run}")
+        group = _groups(finding.system, motion)
+        kept = np.arange(len(group)) % max(thinned, decimation(motion.rate, motion.cutoff) if motion.cutoff else 1) == 0
+        kept &= group >= 0
+        signs = sharp_sign(motion.dq) if torque else np.zeros((len(group), 1))
+        variables = (_of_joints if torque else _of_power)(motion, plain.torque, warm)
+        parts.append([each[kept] for each in (group, plain.residual, closed.residual, signs, variables)])
+    group, before, after, signs, variables = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(np.unique(group)) < 2 or len(group) < 10 * _FOLDS:
         return None
-    plain, closed = (np.concatenate([getattr(part, name) for part in parts]) for name in ("plain", "closed"))
     generator = np.random.default_rng(seed)
     sums = []
-    for equation in range(plain.shape[1]):
-        told(f"  how much of {channel.finding.name} could be closed, {equation + 1} of {plain.shape[1]}")
-        variables = np.concatenate([part.variables[equation] for part in parts])
-        signs = np.concatenate([part.signs[:, equation] for part in parts])
-        features = _features(variables, signs, generator)
-        residuals = np.column_stack([plain[:, equation], closed[:, equation]])
-        sums.append(_regressed(features, residuals, group))
-    plain_squares, plain_left, closed_squares, closed_left = np.array(sums).T
-    least = channel.thresholds.experiment.least_gap
-    return FlexibleRegression(plain_squares, plain_left, closed_squares, closed_left, channel.finding.floor, least)
+    for equation in range(before.shape[1]):
+        told(f"  how much of {finding.name} could be closed, {equation + 1} of {before.shape[1]}")
+        features = _features(variables[:, equation], signs[:, equation], generator)
+        sums.append(_regressed(features, np.column_stack([before[:, equation], after[:, equation]]), group))
+    squares = np.array(sums).T
+    return FlexibleRegression(squares[0], squares[1], squares[2], squares[3], finding.floor, left.least)
 
 
-@dataclass(frozen=True)
-class _Part:
-    plain: np.ndarray
-    closed: np.ndarray
-    signs: np.ndarray
-    variables: list[np.ndarray]
-    group: np.ndarray
-
-
-def _parts(channel: PlannedEquations, motions: Sequence[Motion], told: Tell) -> Iterator[_Part]:
-    """Yield stretches of the runs, thinned, with what the twin leaves of them.
-
-    Temperature is a variable where all runs have it.
-    """
-    own = [m for m in motions if (m.torque if channel.finding.name == "torque" else m.power) is not None]
-    warm = all(motion.temperature is not None for motion in own)
-    share = max(1, _SAMPLES // max(len(own), 1))
-    total = min(share * len(own), sum(len(motion.time) for motion in own))
-    for motion in own:
-        told(f"  how much of {channel.finding.name} could be closed, {motion.run}")
-        length = min(share, len(motion.time))
-        count = _STRETCHES if length < len(motion.time) else 1
-        starts = np.linspace(0, len(motion.time) - length // count, count).astype(int)
-        for start in starts:
-            part = motion.part(int(start), int(start) + length // count)
-            yield from _part(channel, part, max(1, total // _ROWS), warm)
-
-
-def _part(channel: PlannedEquations, part: Motion, thinned: int, warm: bool) -> Iterator[_Part]:
-    plain, closed, undecided = channel.residuals(part)
-    if part.cutoff:
-        undecided = np.abs(low_pass(undecided.astype(float), part.rate, part.cutoff)) > 0.1
-    step = max(thinned, decimation(part.rate, part.cutoff) if part.cutoff else 1)
-    group = channel.groups(part.run, part.time)
-    kept = np.zeros(len(group), dtype=bool)
-    kept[::step] = True
-    kept &= (group >= 0) & np.isfinite(plain).all(axis=1)
-    if not kept.any():
-        return
-    torque = channel.finding.name == "torque"
-    variables = _of_joints(channel, part, warm) if torque else [_of_power(channel, part, warm)]
-    speeds = part.dq if torque else np.zeros((len(part.time), 1))
-    signs = np.where(np.abs(speeds) < _STANDSTILL, 0.0, np.sign(speeds))
-    decided = np.where(undecided, np.nan, 1.0)[kept]
-    yield _Part(
-        plain[kept] * decided, closed[kept] * decided, signs[kept], [one[kept] for one in variables], group[kept]
-    )
-
-
-def _of_joints(channel: PlannedEquations, part: Motion, warm: bool) -> list[np.ndarray]:
-    """Return each joint's variables, (N, v)."""
-    signs = np.where(np.abs(part.dq) < _STANDSTILL, 0.0, np.sign(part.dq))
-    before = [_remembered(signs, part.rate, seconds) for seconds in _MEMORY]
-    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
-    found = []
-    for joint in range(part.dq.shape[1]):
-        near = [k for k in (joint - 1, joint + 1) if 0 <= k < part.dq.shape[1]]
-        heat = [part.temperature[:, [joint]]] if warm and part.temperature is not None else []
-        others = [values[:, [joint]] for values in (part.dq, part.ddq, load, *before)]
-        beside = [values[:, near] for values in (part.q, part.dq, part.ddq)]
-        speed = np.abs(part.dq[:, [joint]])
-        found.append(np.concatenate([part.q[:, [joint]], speed, *others, *beside, time, *heat], axis=1))
+def _groups(system: System, motion: Motion) -> np.ndarray:
+    """Return (N,) the group in which samples of a run are left out; -1 for none."""
+    found = np.full(len(motion.time), -1)
+    for block, group in zip(system.blocks, system.group, strict=True):
+        if block.run == motion.run:
+            found[(motion.time >= block.start) & (motion.time <= block.stop)] = group
     return found
 
 
-def _of_power(channel: PlannedEquations, part: Motion, warm: bool) -> np.ndarray:
-    """Return the variables of power, (N, v)."""
-    load, time = channel.load(part), (part.time - (part.whole or part).time[0])[:, None]
-    work = load * part.dq
+def _of_joints(motion: Motion, load: np.ndarray, warm: bool) -> np.ndarray:
+    """Return each joint's variables, (N, n, v); a neighbour that is not there is still."""
+    dq = motion.dq
+    before = [_remembered(sharp_sign(dq), motion.rate, seconds) for seconds in _MEMORY]
+    own = [motion.q, np.abs(dq), dq, motion.ddq, load, *before, np.repeat(_since(motion), dq.shape[1], axis=1)]
+    for values in (motion.q, dq, motion.ddq):
+        wide = np.pad(values, ((0, 0), (1, 1)))
+        own += [wide[:, :-2], wide[:, 2:]]
+    heat = [motion.temperature] if warm and motion.temperature is not None else []
+    return np.asarray(np.stack([*own, *heat], axis=2))
+
+
+def _of_power(motion: Motion, load: np.ndarray, warm: bool) -> np.ndarray:
+    """Return the variables of power, (N, 1, v)."""
+    dq, work = motion.dq, load * motion.dq
     total = work.sum(axis=1, keepdims=True)
-    slow = [_remembered(total, part.rate, seconds) for seconds in _MEMORY]
-    sums = [total, np.abs(work).sum(axis=1, keepdims=True), *slow, time]
-    heat = [part.temperature] if warm and part.temperature is not None else []
-    return np.concatenate([work, load**2, np.abs(load), np.abs(part.dq), part.dq**2, *sums, *heat], axis=1)
+    sums = [total, np.abs(work).sum(axis=1, keepdims=True), _since(motion)]
+    slow = [_remembered(total, motion.rate, seconds) for seconds in _MEMORY]
+    heat = [motion.temperature] if warm and motion.temperature is not None else []
+    columns = np.hstack([work, load**2, np.abs(load), np.abs(dq), dq**2, *sums, *slow, *heat])
+    return np.asarray(columns[:, None])
+
+
+def _since(motion: Motion) -> np.ndarray:
+    """Return the time since the run began, (N, 1) s."""
+    return np.asarray((motion.time - motion.time[0])[:, None])
 
 
 def _remembered(values: np.ndarray, rate: float, seconds: float) -> np.ndarray:

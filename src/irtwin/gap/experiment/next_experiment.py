@@ -17,7 +17,6 @@ from irtwin.gap.experiment.separation import fitted, unimitated
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
-from irtwin.gap.thresholds import NextExperiment, Thresholds
 from irtwin.identification.excitation import Excitation
 from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Robot
@@ -37,6 +36,7 @@ class Weight:
 
     `share_now`, `share`: of two rivals, the part of one that the other cannot imitate, in the data and in the
     programme; of an effect that cannot be tested, its mean square in units of the noise's, in the data and with both.
+    `enough`, `least`: the separation and the share that answer the question.
     """
 
     effects: tuple[str, ...]
@@ -44,7 +44,8 @@ class Weight:
     expected: float
     share_now: float
     share: float
-    thresholds: Thresholds
+    enough: float
+    least: float
 
     @property
     def added(self) -> float:
@@ -54,22 +55,13 @@ class Weight:
     @property
     def known(self) -> bool:
         """Whether the data show an effect already."""
-        return len(self.effects) == 1 and self.now >= self._enough and self.share_now >= self._visible
+        return len(self.effects) == 1 and self.now >= self.enough and self.share_now >= self.least
 
     @property
     def reached(self) -> bool:
         """Whether the programme would answer the question; of rivals by itself, as the data there are do not."""
-        if len(self.effects) == 1:
-            return self.expected >= self._enough and self.share >= self._visible
-        return self.added >= self._enough and self.share >= self.thresholds.experiment.least_unimitated
-
-    @property
-    def _enough(self) -> float:
-        return self.thresholds.experiment.enough
-
-    @property
-    def _visible(self) -> float:
-        return self.thresholds.detectability.least_visible
+        told = self.expected if len(self.effects) == 1 else self.added
+        return told >= self.enough and self.share >= self.least
 
     @property
     def question(self) -> Question:
@@ -171,9 +163,9 @@ class _Question:
         """Return how far two rivals lie apart, the worse of both ways round."""
         ways = [self._distance(left, placed[a], placed[b]) for a, b in ((one, other), (other, one))]
         now, expected, share_now, share = (float(min(values)) for values in zip(*ways, strict=True))
-        return Weight(
-            (self.effects[one], self.effects[other]), now, expected, share_now, share, self.channel.thresholds
-        )
+        limits = self.channel.thresholds
+        both = self.effects[one], self.effects[other]
+        return Weight(both, now, expected, share_now, share, limits.matters.apart, limits.criterion.misfit)
 
     def _distance(self, left: Left, true: Sequence[Sequence[list[int]]], taken: Sequence[Sequence[list[int]]]) -> Four:
         """Return separation and share, now and then, where the first is true and the second taken for it."""
@@ -191,7 +183,9 @@ class _Question:
         now, then = (float(np.sqrt(max(square, 0.0) / self.channel.dispersion)) for square in squares)
         rows = self.channel.rows, self.channel.rows + seconds * self.channel.per_second
         share_now, share = (max(square, 0.0) / count for square, count in zip(squares, rows, strict=True))
-        return Weight(self.effects, now, max(now, then), share_now, share, self.channel.thresholds)
+        limits = self.channel.thresholds
+        least = limits.criterion.visible(len(self.channel.finding.attribution.hypotheses))
+        return Weight(self.effects, now, max(now, then), share_now, share, limits.matters.apart, least)
 
 
 def _imitating(
@@ -213,7 +207,7 @@ def next_experiment(
     channels: Sequence[PlannedEquations],
     lacking: Sequence[Effect],
     seen: Sequence[Motion],
-    limits: NextExperiment,
+    enough: float,
     excitation: Callable[[], Excitation | None] | None = None,
     tell: Tell | None = None,
 ) -> Proposal | None:
@@ -221,7 +215,7 @@ def next_experiment(
 
     `channels`: planned equations of each; `seen`: the motions that were judged; `excitation` as for `programmes`;
     `tell` is told which programme is weighed, where that takes long. Of the programmes that reach a separation of
-    `limits.enough` in every question the one that takes the least time is chosen, else the one that answers the most.
+    `enough` in every question the one that takes the least time is chosen, else the one that answers the most.
     None where there is nothing to ask.
     """
     questions = [q for channel in channels for cause in _mattering(channel) if (q := _rivals(channel, cause))]
@@ -248,10 +242,10 @@ def next_experiment(
     asked = {name for q in questions for name in q.effects}
     by_hand = _manual_tests([effect for effect in effects if effect.id not in asked])
     chosen, weights = _choose(weighed) if weighed else (None, [])
-    if not any(weight.reached or weight.expected > limits.helps * weight.now for weight in weights):
+    if not any(weight.reached or weight.added >= 1 for weight in weights):
         chosen, by_hand = None, by_hand or _manual_tests(effects)
     considered = tuple((one, min(weight.expected for weight in of_one)) for one, of_one in weighed)
-    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note, limits.enough)
+    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note, enough)
 
 
 def _weigh(programme: Programme, questions: Sequence[_Question], tell: Tell) -> list[Weight]:
@@ -279,12 +273,11 @@ def _note(weighed: Sequence[Sequence[Weight]]) -> str | None:
     said = []
     for chances in zip(*weighed, strict=True):
         best = max(chances, key=lambda weight: weight.share)
-        limits = best.thresholds.experiment
         if best.known:
             said.append(f"{best.effects[0]} shows in these data once the causes are in the twin: adopt it, ask again")
-        elif len(best.effects) > 1 and best.share < limits.identical:
-            said.append(f"{' and '.join(best.effects)} cannot be told apart: in every motion one is the other")
-        elif len(best.effects) == 1 and best.share < limits.identical * best.thresholds.detectability.least_visible:
+        elif len(best.effects) > 1 and best.share < best.least:
+            said.append(f"{' and '.join(best.effects)} cannot be told apart: in every motion one imitates the other")
+        elif len(best.effects) == 1 and best.share < best.least:
             said.append(f"{best.effects[0]} cannot be shown: in every motion the rest of the twin imitates it")
         elif not any(weight.reached for weight in chances):
             said.append(f"no programme that was weighed is enough for {' and '.join(best.effects)}")
@@ -305,8 +298,8 @@ def _rivals(channel: PlannedEquations, cause: Cause) -> _Question | None:
     effects = [cause.effect]
     places: list[tuple[tuple[Shape, ...], ...]] = [tuple((variant.columns,) for variant in cause.variants)]
     others = tuple(k for k in channel.finding.chosen if k not in cause.columns)
-    rivals = cause.not_told_from(channel.thresholds.criterion.least_rival)
-    for rival in rivals[: channel.thresholds.experiment.most_rivals - 1]:
+    rivals = cause.not_told_from(channel.thresholds.criterion.unknown)
+    for rival in rivals:
         of_rival = known.get((rival, cause.scope)) or known.get((rival, _other(cause.scope))) or {}
         found = tuple(of_rival[joint] for joint in cause.joints if joint in of_rival)
         if not found or len(found) < len(cause.joints):

@@ -20,14 +20,11 @@ from irtwin.gap.regression.cross_fitted import PowerOf, TwinPower
 from irtwin.gap.regression.hypotheses import Column
 from irtwin.gap.regression.moments import Moments, summed
 from irtwin.gap.regression.normal_equations import System, least_noise
-from irtwin.gap.regression.residuals import as_filtered
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.accumulate import Rows, accumulate_any
 from irtwin.identification.progress import Tell, with_progress
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
-
-_PIECE = 256  # samples whose columns are held at once
 
 
 @dataclass(frozen=True)
@@ -101,49 +98,6 @@ class PlannedEquations:
         at = {column: base + place for place, column in enumerate(tried)}
         return Products(existing, existing + self._planned(programme, tried, tell), at, system)
 
-    def residuals(self, part: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what the twin leaves of a measured part of a run, what it leaves with its causes, (N, g) each.
-
-        Both are fitted to all runs, and filtered as the measurement was. The third, (N, g): where it is undecided.
-        """
-        finding, system = self.finding, self.finding.system
-        columns = [system.columns[self._plain(k) - system.base] for k in finding.chosen]
-        base = system.base
-        plain = system.expected + system.solution((), self._total)[:base] * system.scale[:base]
-        measured = part.torque if finding.name == "torque" else part.power
-        assert measured is not None
-        said = []
-        for piece in part.pieces(_PIECE):
-            rows = self._equations(piece, columns, ())
-            every, none = np.asarray(rows.columns), np.zeros(rows.known.shape, dtype=bool)
-            known = self._known(piece, every[..., :base])
-            undecided = none if rows.undecided is None else rows.undecided
-            said.append((every[..., :base] @ plain + known, every @ finding.estimate.values + known, undecided))
-        twin, with_causes, undecided = map(np.concatenate, zip(*said, strict=True))
-        measured = measured.reshape(len(part.time), -1)
-        return measured - as_filtered(part, twin), measured - as_filtered(part, with_causes), undecided
-
-    def load(self, part: Motion) -> np.ndarray:
-        """Return the joint torque that the twin predicts for a part of a run, (N, n) N m."""
-        return self._below(part.whole or part).torque[part.start : part.start + len(part.time)]
-
-    def groups(self, run: str, time: np.ndarray) -> np.ndarray:
-        """Return (N,) the group in which samples of a run are left out; -1 for none."""
-        system = self.finding.system
-        found = np.full(len(time), -1)
-        for block, group in zip(system.blocks, system.group, strict=True):
-            if block.run == run:
-                found[(time >= block.start) & (time <= block.stop)] = group
-        return found
-
-    def _known(self, part: Motion, own: np.ndarray) -> np.ndarray:
-        """Return what is known to be added, (N, g); `own`: the twin's columns (N, g, K)."""
-        stack = self._stack
-        if self.finding.name == "torque":
-            return np.asarray(own @ stack.shift(part))
-        values = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
-        return np.asarray(stack.power_columns(part, self.load(part))[:, stack.fixed] @ values)[:, None]
-
     def _planned(self, programme: Programme, tried: Sequence[int | Column], tell: Tell | None) -> np.ndarray:
         system, base = self.finding.system, self.finding.system.base
         columns = [system.columns[self._plain(k) - base] if isinstance(k, int) else k for k in tried]
@@ -185,6 +139,10 @@ class PlannedEquations:
         ]
         return Rows(both, np.zeros(part.dq.shape), np.zeros(part.dq.shape), stack.undecided(part))
 
+    def _load(self, part: Motion) -> np.ndarray:
+        """Return the joint torque that the twin predicts for a part of a run, (N, n) N m."""
+        return self._below(part.whole or part).torque[part.start : part.start + len(part.time)]
+
     def _tried(self, part: Motion, columns: Sequence[Column], without: Sequence[str]) -> list[np.ndarray]:
         """Return the columns tried over a part, (N, n) or (N,) each; zero for effects that are taken off."""
         below, held = self._below(part.whole or part), dict[int, np.ndarray]()
@@ -200,7 +158,7 @@ class PlannedEquations:
         if self.finding.name == "torque":
             own, undecided = stack.torque_columns(part), stack.undecided(part)
         else:
-            own, undecided = stack.power_columns(part, self.load(part))[:, None, ~stack.fixed], None
+            own, undecided = stack.power_columns(part, self._load(part))[:, None, ~stack.fixed], None
             made = [values[:, None] for values in made]
         joined = np.concatenate([own, *(values[..., None] for values in made)], axis=2)
         return Rows(joined, np.zeros(joined.shape[:2]), np.zeros(joined.shape[:2]), undecided)

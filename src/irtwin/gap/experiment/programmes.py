@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -186,18 +187,18 @@ class _Yard:
         every = max(1, len(q) // _CHECKED)
         return self._walls is None or float(self._walls.clearance(q[::every]).min(initial=1.0)) > 0
 
-    def motion(self, stops: Sequence[np.ndarray], speeds: Sequence[np.ndarray], hold: float = 0.1) -> Motion:
-        """Move from stop to stop (n,) at most at `speeds` (n,) each, with a rest of `hold` s between them."""
-        return self.shaken(stops, speeds, [self.acceleration] * len(speeds), hold)
-
-    def shaken(
+    def motion(
         self,
         stops: Sequence[np.ndarray],
         speeds: Sequence[np.ndarray],
-        accelerations: Sequence[np.ndarray],
-        hold: float,
+        accelerations: Sequence[np.ndarray] | None = None,
+        hold: float = 0.1,
     ) -> Motion:
-        """Do as `motion` does, with the acceleration of each move. Raises _TooLong."""
+        """Move from stop to stop (n,), each move at most at its speed and acceleration (n,); rest `hold` s at each.
+
+        Raises _TooLong.
+        """
+        accelerations = accelerations or [self.acceleration] * len(speeds)
         moves = list(zip(stops, stops[1:], speeds, accelerations, strict=False))
         whole = hold * len(stops) + sum(1 / fast + fast / sharp for fast, sharp in (_pace(*move) for move in moves))
         if not self.within(whole):
@@ -208,6 +209,12 @@ class _Yard:
             parts += [_move(start, stop, speed, acceleration, self.rate), (stop + rest, rest, rest)]
         q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
         return Motion(np.arange(len(q)) / self.rate, q, dq, ddq, run="planned", cutoff=self.cutoff)
+
+    def programme(self, kind: str, text: str, motion: Motion, **settings: Any) -> Programme:
+        """Return the programme of one motion about the pose."""
+        pose = {name: round(float(value), 4) for name, value in zip(self.robot.joint_names, self.pose, strict=True)}
+        named = "all joints" if self.moved.all() else ", ".join(self.joints)
+        return Programme(kind, f"{named}: {text}", self.joints, (motion,), settings=Settings(pose=pose, **settings))
 
     def by_joint(self, values: np.ndarray) -> dict[str, tuple[float, ...]]:
         """Return (M, n) values of the joints that move, by name, to four digits."""
@@ -221,11 +228,6 @@ class _Yard:
         """The unit of the joints that move, in words."""
         units = {joint.unit for joint in self.robot.joints if joint.name in self.joints}
         return " or ".join(sorted(units, reverse=True))
-
-    @property
-    def named(self) -> str:
-        """Which joints move, in words."""
-        return "all joints" if self.moved.all() else ", ".join(self.joints)
 
 
 class _TooLong(Exception):
@@ -282,29 +284,25 @@ def _ladder(yard: _Yard) -> Programme:
     for speed, way in zip(speeds, half, strict=True):
         stops += [yard.pose - way, yard.pose + way, yard.pose - way]
         rates += [speed] * 3
-    return Programme(
+    return yard.programme(
         "speed_ladder",
-        f"{yard.named}: a ladder of {_LEVELS} constant speeds, each both ways, from "
-        f"{speeds[0][yard.moved].min():.2g} to {speeds[-1][yard.moved].max():.2g} {yard.unit}/s",
-        yard.joints,
-        (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
-        settings=Settings(pose=_pose(yard), speeds=yard.by_joint(speeds), amplitudes=yard.by_joint(half)),
+        f"a ladder of {_LEVELS} constant speeds, each both ways, from {speeds[0][yard.moved].min():.2g} to "
+        f"{speeds[-1][yard.moved].max():.2g} {yard.unit}/s",
+        yard.motion([*stops, yard.pose], [*rates, yard.speed]),
+        speeds=yard.by_joint(speeds),
+        amplitudes=yard.by_joint(half),
     )
 
 
 def _sweep(yard: _Yard) -> Programme:
     speed = 2 * np.maximum(yard.reach, 1e-6) / _SWEEP
-    ends = yard.pose - yard.reach, yard.pose + yard.reach
-    return Programme(
+    low, high = yard.pose - yard.reach, yard.pose + yard.reach
+    return yard.programme(
         "slow_sweep",
-        f"{yard.named}: one slow, constant speed both ways over {2 * yard.reach.max():.2g} {yard.unit}",
-        yard.joints,
-        (
-            yard.motion(
-                [yard.pose, ends[0], ends[1], ends[0], yard.pose], [yard.speed / 2, speed, speed, yard.speed / 2]
-            ),
-        ),
-        settings=Settings(pose=_pose(yard), speeds=yard.by_joint(speed), amplitudes=yard.by_joint(yard.reach)),
+        f"one slow, constant speed both ways over {2 * yard.reach.max():.2g} {yard.unit}",
+        yard.motion([yard.pose, low, high, low, yard.pose], [yard.speed / 2, speed, speed, yard.speed / 2]),
+        speeds=yard.by_joint(speed),
+        amplitudes=yard.by_joint(yard.reach),
     )
 
 
@@ -314,13 +312,11 @@ def _reversals(yard: _Yard) -> Programme:
         way = np.minimum(size, yard.reach) * yard.moved
         stops += [yard.pose + way, yard.pose - way] * 3
         rates += [np.maximum(2 * way, 1e-6)] * 6
-    return Programme(
+    return yard.programme(
         "small_reversals",
-        f"{yard.named}: slow reversals of {_SMALL[0]:g} to {_SMALL[-1]:g} {yard.unit} about one pose, "
-        "a second each way",
-        yard.joints,
-        (yard.motion([*stops, yard.pose], [*rates, yard.speed]),),
-        settings=Settings(pose=_pose(yard), amplitudes=dict.fromkeys(yard.joints, _SMALL)),
+        f"slow reversals of {_SMALL[0]:g} to {_SMALL[-1]:g} {yard.unit} about one pose, a second each way",
+        yard.motion([*stops, yard.pose], [*rates, yard.speed]),
+        amplitudes=dict.fromkeys(yard.joints, _SMALL),
     )
 
 
@@ -330,30 +326,25 @@ def _steps(yard: _Yard) -> Programme:
     for share in _STEPS:
         stops += [yard.pose + way, yard.pose - way] * 4
         sharp += [share * yard.acceleration] * 8
-    return Programme(
+    shares = ", ".join(f"{100 * share:g}" for share in _STEPS)
+    return yard.programme(
         "acceleration_steps",
-        f"{yard.named}: short moves forth and back with {', '.join(f'{100 * s:g}' for s in _STEPS)} % of the largest "
-        "acceleration",
-        yard.joints,
-        (yard.shaken([*stops, yard.pose], [yard.speed] * 25, [*sharp, yard.acceleration], 0.1),),
-        settings=Settings(
-            pose=_pose(yard),
-            amplitudes=yard.by_joint(way),
-            accelerations=yard.by_joint(np.outer(_STEPS, yard.acceleration)),
-        ),
+        f"short moves forth and back with {shares} % of the largest acceleration",
+        yard.motion([*stops, yard.pose], [yard.speed] * 25, [*sharp, yard.acceleration]),
+        amplitudes=yard.by_joint(way),
+        accelerations=yard.by_joint(np.outer(_STEPS, yard.acceleration)),
     )
 
 
 def _poses(yard: _Yard) -> Programme:
     spread = np.random.default_rng(0).uniform(-1, 1, (_POSES, len(yard.pose)))
     stops = [yard.pose, *(yard.pose + spread * yard.reach)]
-    return Programme(
+    made = yard.programme(
         "holding_poses",
-        f"{yard.named}: holding {_POSES} poses for {_HOLD:g} s each",
-        yard.joints,
-        (yard.motion(stops, [yard.speed / 2] * _POSES, _HOLD),),
-        settings=Settings(poses=yard.by_joint(np.array(stops)), hold_seconds=_HOLD),
+        f"holding {_POSES} poses for {_HOLD:g} s each",
+        yard.motion(stops, [yard.speed / 2] * _POSES, hold=_HOLD),
     )
+    return replace(made, settings=Settings(poses=yard.by_joint(np.array(stops)), hold_seconds=_HOLD))
 
 
 def _exciting(robot: Robot, yard: _Yard, found: Excitation) -> Programme:
@@ -400,7 +391,3 @@ def _payload(robot: Robot) -> float:
     """Return a load that the arm surely carries, kg to one digit; a payload that it must not exceed is its maker's."""
     arm = float(sum(link.mass for link in robot.links[1:]))
     return float(f"{_PAYLOAD_SHARE * arm:.1g}")
-
-
-def _pose(yard: _Yard) -> dict[str, float]:
-    return {name: round(float(value), 4) for name, value in zip(yard.robot.joint_names, yard.pose, strict=True)}

@@ -36,8 +36,8 @@ class Closing:
 
         `likely`: the cause is there, more likely than not; then how much it closes need not be sure.
         """
-        more_than_noise = self.floors is None or self.floors >= limits.least_floors
-        return self.share >= limits.least_share and more_than_noise and (likely or self.interval[0] > 0)
+        more_than_noise = self.floors is None or self.floors >= limits.floors
+        return self.share >= limits.share and more_than_noise and (likely or self.interval[0] > 0)
 
 
 def closing(

@@ -9,7 +9,7 @@ import numpy as np
 from irtwin.document.document import Untestable
 from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.structure_search import Attribution
-from irtwin.gap.thresholds import Detectability
+from irtwin.gap.thresholds import Criterion
 from irtwin.signals.motion import Motion
 
 
@@ -24,13 +24,14 @@ def untestable(
     inside: Sequence[str],
     channels: Sequence[tuple[str, Attribution]],
     motions: Iterable[Motion],
-    limits: Detectability,
+    limits: Criterion,
 ) -> tuple[Untestable, ...]:
     """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
     measured = {name for name, _ in channels}
     motions = tuple(motions)
     visible: dict[str, float] = {}
     share: dict[str, float] = {}
+    least = {name: limits.visible(len(found.hypotheses)) for name, found in channels}
     for _, found in channels:
         for k, hypothesis in enumerate(found.hypotheses):
             name = hypothesis.effect
@@ -47,7 +48,7 @@ def untestable(
             whys[effect.id] = f"no {' and no '.join(sorted(effect.requires))} was measured"
         elif effect.id not in visible or visible[effect.id] == 0:
             whys[effect.id] = "nothing in these runs brings it about"
-        elif visible[effect.id] < limits.least_visible:
+        elif visible[effect.id] < least[channel]:
             imitated = 100 * (1 - share[effect.id])
             whys[effect.id] = f"the rest of the twin imitates {imitated:.0f} % of it on these runs"
     return tuple(Untestable(effect=effect, why=why) for effect, why in whys.items())

@@ -36,9 +36,7 @@ def floor_left(case: Case, floor: Floor, explained: ExplainedTorque, power_of: P
         taken = power_of(motion, whole)[0] - power_of(motion, whole - real)[0]
         return replace(motion, torque=torque, power=motion.power - as_filtered(motion, taken))
 
-    left = noise_floor(
-        case.runs, {run: without(motion) for run, motion in case.motions.items()}, case.thresholds.repeats
-    )
+    left = noise_floor(case.runs, {run: without(motion) for run, motion in case.motions.items()}, case.thresholds.data)
     before = _together(floor)
     found = replace(floor, torque=_least(floor.torque, left.torque), power=_least(floor.power, left.power))
     return found if (_together(found) < _LOWER * before).any() else floor

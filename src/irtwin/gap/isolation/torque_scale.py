@@ -78,7 +78,7 @@ def _stated(data_set: DataSet, by_power: bool, limits: ScaleOfTorque) -> TorqueS
 
 def _narrowed(known: TorqueScale, slope: float, half: float, limits: ScaleOfTorque) -> TorqueScale:
     """Join what is known of true torque over logged, 1 give or take the uncertainty, with the slope of power."""
-    half = float(np.hypot(half, limits.meter * abs(slope)))
+    half = float(np.hypot(half, limits.sensor * abs(slope)))
     if half >= known.uncertainty:
         return known
     said = f"power over torque times speed is {slope:.3f} (give or take {half:.3f})"

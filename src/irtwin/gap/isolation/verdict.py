@@ -46,7 +46,7 @@ def left_open(
     nameless = bool(located) and located[0] is differing[0] and not named
     excesses = (_largest(finding, explained, located) for finding in findings)
     before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
-    much = max(limits.criterion.excess, (1 - limits.verdict.closed) * before)
+    much = max(limits.criterion.excess, (1 - limits.matters.closed) * before)
     if alike and not named:
         much = min(much, _spread(findings, much))
     if after > much and not (nameless and beside <= much):

@@ -13,14 +13,13 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.explained import Explained
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.localisation.excess_map import Map, joint_maps, level_of, robot_maps
-from irtwin.gap.localisation.locations import Location, locate, standing_out
+from irtwin.gap.localisation.locations import Location, locate
 from irtwin.gap.localisation.operating_variable import curve, followed
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
-from irtwin.gap.thresholds import Places
 from irtwin.identification.progress import Tell, paced
 from irtwin.signals.motion import Motion
 
@@ -29,24 +28,24 @@ from irtwin.signals.motion import Motion
 class ChannelResidual:
     """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
-    `before`, `after`: traces without and with the causes, `after` None where there is none, and `seen`, `explained` the
-    maps of them; `touched`: the joints that each cause acts on, none for the whole robot; `added`: what it adds to each
-    trace, (N, g), and `acts` the map of all of it. `reference`: the
-    map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean square beyond which a gap
-    lies.
+    `before`, `after`: traces without and with the causes, and `seen` the map of the first; `refitted`: those without
+    them by a fit to all runs; `touched`: the joints that
+    each cause acts on, none for the whole robot; `added`: what it adds to each trace, (N, g), and `acts` the map of all
+    of it. `reference`: the map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean
+    square beyond which a gap lies; `least`: the share of it beyond which a run, or a gap, is worth a word.
     """
 
     finding: Finding
     before: list[Trace]
-    after: list[Trace] | None
+    refitted: list[Trace]
+    after: list[Trace]
     touched: list[tuple[str, ...]]
     added: list[list[np.ndarray]]
     seen: Map
-    explained: Map | None
     acts: Map | None
     reference: Map | None
     level: np.ndarray
-    limits: Places
+    least: float
 
     @property
     def acting(self) -> np.ndarray:
@@ -62,8 +61,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque, tell: Tel
     """
     finding = explained.finding
     power = finding.name == "power"
-    reference, limits = against_reference(finding), case.thresholds.places
-
+    reference = against_reference(finding)
     told = paced(tell)
 
     def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
@@ -75,28 +73,27 @@ def channel_residual(case: Case, explained: Explained, torque: Torque, tell: Tel
 
     before = traces(case.seen, fitted_values(finding, reference=reference))
     others = traces(case.others, fitted_values(finding, reference=True)) if reference else []
-    after, acting, added = None, [], [_added(explained, k, before) for k in range(len(finding.causes))]
+    added = [_added(explained, k, before) for k in range(len(finding.causes))]
+    after, acting = [], []
     if added:
         acting = [_of(trace, sum(parts)) for trace, *parts in zip(before, *added, strict=True)]
         plain = traces(case.seen, lambda run: explained.values)
         after = [replace(t, residual=t.residual - sum(parts)) for t, *parts in zip(plain, *added, strict=True)]
-    maps = (robot_maps if power else joint_maps)(
-        (before, after or [], acting, others), case.grouping.label, case.thresholds
-    )
-    seen, closed, acts, known = maps
+    slow = case.thresholds.data.slow
+    seen, acts, known = (robot_maps if power else joint_maps)((before, acting, others), case.grouping, slow)
     assert seen is not None
     return ChannelResidual(
         finding,
         before,
+        traces(case.seen, fitted_values(finding, reference=False)) if reference else before,
         after,
         [cause.touched(case.robot) for cause in finding.causes],
         added,
         seen,
-        closed,
         acts,
         known,
-        level_of(finding.floor, seen, known, limits.fewest_samples),
-        limits,
+        level_of(finding.floor, seen, known),
+        case.thresholds.matters.floors**2,
     )
 
 
@@ -133,7 +130,6 @@ def cause_curves(left: Sequence[ChannelResidual]) -> list[Followed]:
     lines = []
     for one in left:
         for cause, joints, added in zip(one.finding.causes, one.touched, one.added, strict=True):
-            assert one.after is not None
             alone = [_of(trace, part) for trace, part in zip(one.after, added, strict=True)]
             partial = [
                 replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
@@ -184,19 +180,20 @@ def _places(left: ChannelResidual, seed: int, leaving: int | None, told: Tell) -
         left.seen,
         left.level,
         reference=left.reference,
-        explained=left.explained,
         acting=left.acting,
         acts=left.acts,
         leaving=leaving,
-        limits=left.limits,
         seed=seed,
     )
-    return [replace(place, runs=_standing_out(left, place)) for place in located]
+    return [replace(place, runs=_standing_out(left, names.index(place.joint))) for place in located]
 
 
-def _standing_out(left: ChannelResidual, place: Location) -> tuple[str, ...]:
-    k = left.finding.places.index(place.joint)
-    return standing_out(left.before, k, float(left.level[k].min()), left.limits)
+def _standing_out(left: ChannelResidual, place: int) -> tuple[str, ...]:
+    """Return the runs whose mean square stands out over the level, the worst first."""
+    squares = {trace.motion.run: trace.residual[:, place] ** 2 for trace in left.before}
+    means = {run: float(np.nanmean(own)) for run, own in squares.items() if np.isfinite(own).any()}
+    above = [run for run, mean in means.items() if mean > (1 + left.least) * left.level[place].min()]
+    return tuple(sorted(above, key=lambda run: -means[run]))
 
 
 def fitted_values(finding: Finding, *, reference: bool) -> Values:

@@ -1,4 +1,9 @@
-"""Regimes: ways of moving in which a gap can lie, told sample by sample."""
+"""Regimes: ways of moving in which a gap can lie, told sample by sample.
+
+A joint stands where its friction is undecided. It is slow, and its speed steady, below one share `slow` of the largest
+speed and acceleration; it turns round while it is slow about a change of direction; it is loaded beyond half of its
+largest torque. The robot's speed is steady, and power given back, by the same share.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from irtwin.gap.thresholds import Regimes
+from irtwin.effects.friction import CoulombFriction
 from irtwin.signals.motion import Motion
 
 STANDSTILL, LOW_SPEED, STEADY_SPEED = "standstill", "low_speed", "steady_speed"
 ACCELERATING, BRAKING, REVERSAL = "accelerating", "braking", "reversal"
 LOADED, REGENERATING, AFTER_MOTION = "loaded", "regenerating", "after_motion"
 
-JOINT_REGIMES = (STANDSTILL, LOW_SPEED, STEADY_SPEED, ACCELERATING, BRAKING, REVERSAL, LOADED)
+JOINT_REGIMES = (STANDSTILL, REVERSAL, LOW_SPEED, STEADY_SPEED, ACCELERATING, BRAKING, LOADED)
 ROBOT_REGIMES = (STANDSTILL, STEADY_SPEED, ACCELERATING, BRAKING, REGENERATING, LOADED, AFTER_MOTION)
 JOINT_PARTS, ROBOT_PARTS = 6, 4  # the first of them, which part the samples; the others overlap with these
 
@@ -21,7 +26,7 @@ _LARGE = 0.99  # quantile that counts as a signal's largest value: a filter's en
 
 
 def joint_regimes(
-    motions: Sequence[Motion], torques: Sequence[np.ndarray], joint: int, limits: Regimes
+    motions: Sequence[Motion], torques: Sequence[np.ndarray], joint: int, slow: float
 ) -> list[np.ndarray]:
     """Return for each motion which of `JOINT_REGIMES` a joint is in, (N, 7); torques: (N, n) as predicted, N m."""
     fastest = _largest([motion.dq[:, joint] for motion in motions])
@@ -30,20 +35,18 @@ def joint_regimes(
     found = []
     for motion, torque in zip(motions, torques, strict=True):
         speed, acceleration = motion.dq[:, joint], motion.ddq[:, joint]
-        standing = _standing(motion, limits.standing)[:, joint]
-        turning = _around_reversals(speed, standing, max(1, round(limits.reversal * motion.rate)))
-        slow = np.asarray(np.abs(speed) < limits.slow * fastest)
-        steady = np.asarray(np.abs(acceleration) < limits.steady * sharpest)
+        standing = _standing(motion)[:, joint]
+        near = standing | (np.abs(speed) < slow * fastest)
+        steady = np.abs(acceleration) < slow * sharpest
         gaining = speed * acceleration > 0
-        taken = _first_true([turning, standing, slow, steady, gaining, ~gaining])
-        parts = [taken[:, place] for place in (1, 2, 3, 4, 5, 0)]
-        found.append(np.stack([*parts, np.abs(torque[:, joint]) > limits.loaded * heaviest], axis=1))
+        parts = _first_true([standing, _turning(speed, standing, near), near, steady, gaining, ~gaining])
+        found.append(np.column_stack([parts, np.abs(torque[:, joint]) > heaviest / 2]))
     return found
 
 
-def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], limits: Regimes) -> list[np.ndarray]:
+def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], slow: float) -> list[np.ndarray]:
     """Return for each motion which of `ROBOT_REGIMES` the robot is in, (N, 7); torques: (N, n) as predicted, N m."""
-    joints = range(motions[0].dq.shape[1]) if motions else range(0)
+    joints = range(motions[0].dq.shape[1])
     fastest = np.array([_largest([motion.dq[:, j] for motion in motions]) for j in joints])
     sharpest = np.array([_largest([motion.ddq[:, j] for motion in motions]) for j in joints])
     heaviest = np.array([_largest([torque[:, j] for torque in torques]) for j in joints])
@@ -53,38 +56,28 @@ def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], limi
     most_gain, most_power, most_load = _largest(gains), _largest(powers), _largest(loads)
     found = []
     for motion, gain, power, load in zip(motions, gains, powers, loads, strict=True):
-        standing = np.asarray(_standing(motion, limits.standing).all(axis=1))
-        even = np.asarray(np.abs(gain) < limits.even * most_gain)
-        parts = _first_true([standing, even, np.asarray(gain > 0), np.asarray(gain <= 0)])
-        since = motion.time - np.maximum.accumulate(np.where(standing, -np.inf, motion.time))
-        overlapping = [
-            power < -limits.regenerating * most_power,
-            load > limits.loaded * most_load,
-            standing & (since <= limits.after_motion),
-        ]
-        found.append(np.column_stack([parts, *overlapping]))
+        standing = np.asarray(_standing(motion).all(axis=1))
+        parts = _first_true([standing, np.abs(gain) < slow * most_gain, gain > 0, gain <= 0])
+        moved = standing & np.logical_or.accumulate(~standing)
+        found.append(np.column_stack([parts, power < -slow * most_power, load > most_load / 2, moved]))
     return found
 
 
 def _largest(signals: Sequence[np.ndarray]) -> float:
-    values = np.abs(np.concatenate([np.zeros(1), *signals]))
-    return max(float(np.quantile(values, _LARGE)), np.finfo(float).tiny)
+    return max(float(np.quantile(np.abs(np.concatenate(signals)), _LARGE)), np.finfo(float).tiny)
 
 
-def _standing(motion: Motion, least: float) -> np.ndarray:
-    slow = np.abs(motion.dq) < least
-    return np.asarray(slow if motion.standing is None else motion.standing | slow)
+def _standing(motion: Motion) -> np.ndarray:
+    return CoulombFriction().undecided(motion)
 
 
-def _around_reversals(speed: np.ndarray, standing: np.ndarray, reach: int) -> np.ndarray:
-    """Return the samples within `reach` of one where a joint turns round."""
+def _turning(speed: np.ndarray, standing: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Return the samples of the stretches of slow motion, `near`, in which a joint turns round."""
     moving = np.where(standing, 0.0, np.sign(speed))
     last = np.maximum.accumulate(np.where(moving != 0, np.arange(len(speed)), 0))
-    turns = np.flatnonzero(moving * moving[np.concatenate([[0], last[:-1]])] < 0)
-    around = np.zeros(len(speed) + 1)
-    np.add.at(around, np.maximum(turns - reach, 0), 1)
-    np.add.at(around, np.minimum(turns + reach, len(speed)), -1)
-    return np.asarray(np.cumsum(around)[:-1] > 0)
+    turns = moving * moving[np.concatenate([[0], last[:-1]])] < 0
+    stretch = np.cumsum(np.diff(near, prepend=False))
+    return np.asarray(near & np.isin(stretch, stretch[turns]))
 
 
 def _first_true(masks: Sequence[np.ndarray]) -> np.ndarray:

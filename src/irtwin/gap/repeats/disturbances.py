@@ -8,25 +8,22 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.stats import norm
 
-from irtwin.effects.effect import Quantity
+from irtwin.effects.effect import Quantity, force_unit, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.data.noise_floor import sensor_noise
 from irtwin.gap.repeats.creep import creep
 from irtwin.gap.repeats.lines import Line, lines
-from irtwin.gap.repeats.series import Series
-from irtwin.gap.repeats.slow import slow
+from irtwin.gap.repeats.series import Series, following
+from irtwin.gap.repeats.slow import from_start, slow
 from irtwin.gap.repeats.switching import Switching, Watched, switching
-from irtwin.gap.thresholds import NotRepeating
+from irtwin.gap.thresholds import Matters
 from irtwin.signals.filter import low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
 LINE, BAND, SWITCHING, OFFSET, DRIFT = "line", "band", "switching", "offset", "drift"
-_SLOW_SPEED = 0.02  # rad/s, across which friction changes its sign
-_NORMAL = 1.96
 
 Located = tuple[str, tuple[Quantity, ...], float, float, Any]
 """Kind, quantities, size, p and shape of a disturbance."""
@@ -52,26 +49,80 @@ class Disturbance:
 
 def disturbances(case: Case) -> list[Disturbance]:
     """Return what differs between repeats beyond noise and beyond what follows the motion, the largest share first."""
-    limits, runs = case.thresholds.not_repeating, {run.name: run for run in case.runs}
-    pairs = pairs_of(case.runs, case.motions, case.thresholds.repeats)
+    runs = {run.name: run for run in case.runs}
+    pairs = pairs_of(case.runs, case.motions, case.thresholds.data)
     measured = [run for run in case.runs if run.role != "simulated"]
-    torque_noise, power_noise = sensor_noise(measured, case.motions, case.thresholds.repeats)
-    found: list[Disturbance] = []
+    torque_noise, power_noise = sensor_noise(measured, case.motions, case.thresholds.data)
     by_torque = [pair for pair in pairs if pair.difference("torque") is not None]
     by_power = [pair for pair in pairs if pair.difference("power") is not None]
-    tests = (len(case.robot.joints) if by_torque else 0) + (1 if by_power else 0)
+    channels: list[_Channel] = []
     if by_torque:
         raw = {name: _torque(case, runs[name], case.motions[name]) for pair in by_torque for name in _names(pair)}
-        for joint, name in enumerate(case.robot.joint_names):
-            series = [_of_joint(pair, raw, joint) for pair in by_torque]
-            noise = 0.0 if torque_noise is None else float(torque_noise[joint])
-            unit = "N" if case.robot.joints[joint].kind == "prismatic" else "N m"
-            found += _of("torque", name, unit, series, by_torque, noise, tests, limits, None)
+        noise = np.zeros(len(case.robot.joints)) if torque_noise is None else torque_noise
+        for k, joint in enumerate(case.robot.joints):
+            series = [_of_joint(pair, raw, k) for pair in by_torque]
+            channels.append(_Channel("torque", joint.name, force_unit(joint), series, by_torque, float(noise[k])))
     if by_power:
-        series, load = _of_power(case, by_power, runs)
-        noise = 0.0 if power_noise is None else float(power_noise[0])
-        found += _of("power", None, "W", series, by_power, noise, tests, limits, load)
+        series, load = _of_power(by_power, runs)
+        meter = 0.0 if power_noise is None else float(power_noise[0])
+        channels.append(_Channel("power", None, "W", series, by_power, meter, load))
+    found = [one for each in channels for one in each.disturbances(len(channels), case.thresholds.matters)]
     return sorted(found, key=lambda one: -one.share)
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """One channel's differences, `series` of `pairs` of runs; `noise`: its sensor's, in the band."""
+
+    name: str
+    joint: str | None
+    unit: str
+    series: Sequence[Series]
+    pairs: Sequence[Pair]
+    noise: float
+    load: Switching | None = None
+
+    def disturbances(self, tests: int, limits: Matters) -> list[Disturbance]:
+        """Return what matters beside what else differs, and the noise; the channel is one of `tests`."""
+        found, left = lines(self.series, tests)
+        parts = [_in_band(one.left(), pair) for one, pair in zip(left, self.pairs, strict=True)]
+        rest = float(np.mean(parts)) / 2
+        located: list[Located] = []
+        if (load := self.load) is not None:
+            located.append((SWITCHING, _load(load), load.level**2 * load.duty * (1 - load.duty), 0.0, load))
+        for line in found:
+            kind = LINE if line.purity > 0.5 else BAND
+            located.append((kind, self._wave(line), line.size, line.p, line))
+        located += self._slow(left, tests)
+        spread = float(np.mean([np.var(one.values) for one in self.series])) / 2
+        whole = max(spread, rest + sum(one[2] for one in located))
+        return [
+            Disturbance(self.name, self.joint, kind, quantities, size, float(min(size / whole, 1.0)), p, shape)
+            for kind, quantities, size, p, shape in located
+            if size >= max(limits.floors**2 * max(rest, self.noise**2), limits.share * whole)
+        ]
+
+    def _wave(self, line: Line) -> tuple[Quantity, ...]:
+        return (
+            quantity("f", self.joint, line.frequency, "Hz", line.error),
+            Quantity("A", self.joint, line.amplitude, self.unit, *line.interval),
+        )
+
+    def _slow(self, series: Sequence[Series], tests: int) -> list[Located]:
+        """Return the drift and the offset between runs; what drifts is held against the offset that it began with."""
+        found = self._most(DRIFT, f"{self.unit}/s", [slow(one)[1] for one in series], tests)
+        flat = [from_start(one) for one in series] if found else series
+        return found + self._most(OFFSET, self.unit, [slow(one)[0] for one in flat], tests)
+
+    def _most(self, kind: str, unit: str, each: Sequence[np.ndarray], tests: int) -> list[Located]:
+        """Return the largest of some values that say more than they cost, one for either kind, channel and pair."""
+        cost = 2 * tests * sum(len(one.values) for one in self.series)
+        sure = [one for one in each if one[2] * cost <= 1]
+        if not sure:
+            return []
+        value, deviation, p, _ = max(sure, key=lambda one: one[3]).tolist()
+        size = float(sum(one[3] for one in sure)) / len(each)
+        return [(kind, (quantity(kind, self.joint, value, unit, deviation),), size, p, None)]
 
 
 def _names(pair: Pair) -> tuple[str, str]:
@@ -89,24 +140,18 @@ def _torque(case: Case, run: Run, motion: Motion) -> np.ndarray:
 
 
 def _of_joint(pair: Pair, raw: Mapping[str, np.ndarray], joint: int) -> Series:
-    """Return what two runs differ by in a joint's torque, beside what follows its motion: friction, inertia.
-
-    The torque itself is not among the columns: it holds the disturbance.
-    """
-    motion, inside, time = pair.first, pair.inside, pair.time
-    dq, ddq = motion.dq[inside, joint], motion.ddq[inside, joint]
-    beside = [np.ones_like(time), time - time.mean(), dq, np.tanh(dq / _SLOW_SPEED), ddq]
+    """Return what two runs differ by in a joint's torque, beside what follows its motion."""
     values = pair.of(*(raw[name][:, joint] for name in _names(pair)))
-    return Series(time, values, np.column_stack(beside)).tamed()
+    return Series(pair.time, values, following(pair.first, joint)[pair.inside]).tamed()
 
 
-def _of_power(case: Case, pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Series], Switching | None]:
+def _of_power(pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Series], Switching | None]:
     """Return what two runs differ by in power, beside what the motion may and a drift, and the load that switches."""
     motions = {motion.run: motion for pair in pairs for motion in (pair.first, pair.second)}
     by_torque = all(motion.torque is not None for motion in motions.values())  # the same columns in all of them
     own = {name: _of_run(runs[name], motion, by_torque) for name, motion in motions.items()}
     watched = [_watched(pair, own) for pair in pairs]
-    load = switching(watched, own, case.thresholds.not_repeating)
+    load = switching(watched, own)
     found = [one.difference for one in watched]
     if load is not None:
         apart = [pair.of(*(load.states[name] for name in _names(pair))) for pair in pairs]
@@ -141,38 +186,6 @@ def _of_run(run: Run, motion: Motion, by_torque: bool) -> Series:
     return Series(motion.time, values, np.column_stack(beside))
 
 
-def _of(
-    channel: str,
-    joint: str | None,
-    unit: str,
-    series: Sequence[Series],
-    pairs: Sequence[Pair],
-    noise: float,
-    tests: int,
-    limits: NotRepeating,
-    load: Switching | None,
-) -> list[Disturbance]:
-    """Return the disturbances of one channel; noise: its sensor's, in the band."""
-    found, left = lines(series, tests, limits)
-    rest = [one.left() for one in left]
-    rest_size = float(np.mean([_in_band(one, pair) for one, pair in zip(rest, pairs, strict=True)])) / 2
-    spread = [float(np.mean((one.values - one.values.mean()) ** 2)) / 2 for one in series]
-    least = max(rest_size, noise**2 * limits.least_noise**2 / limits.least_size)
-    located: list[Located] = []
-    if load is not None and load.level**2 * load.duty * (1 - load.duty) >= limits.least_size * least:
-        located.append((SWITCHING, _load(load), load.level**2 * load.duty * (1 - load.duty), 0.0, load))
-    for line in found:
-        if line.size >= limits.least_size * least:
-            kind = LINE if line.purity >= limits.pure else BAND
-            located.append((kind, _wave(line, joint, unit), line.size, line.p, line))
-    located += _slow(left, joint, unit, (rest_size, noise**2), tests, limits)
-    whole = max(float(np.mean(spread)), rest_size + sum(each[2] for each in located))
-    return [
-        Disturbance(channel, joint, kind, quantities, size, float(min(size / whole, 1.0)), p, shape)
-        for kind, quantities, size, p, shape in located
-    ]
-
-
 def _in_band(left: np.ndarray, pair: Pair) -> float:
     """Return the mean square of what is left of a difference, in the band of the motion's filter."""
     motion = pair.first
@@ -181,57 +194,9 @@ def _in_band(left: np.ndarray, pair: Pair) -> float:
 
 def _load(load: Switching) -> tuple[Quantity, ...]:
     """Return what a load that switches takes, the share of time that it is on, and how long a period is."""
-    half, periods = _NORMAL * load.deviation, load.periods
-    level = Quantity("P", None, load.level, "W", load.level - half, load.level + half)
+    periods, level = load.periods, quantity("P", None, load.level, "W", load.deviation)
     duty = Quantity("duty", None, load.duty, "1")
     if not periods:
         return level, duty
     ends = (min(periods), max(periods)) if len(periods) > 1 else (None, None)
     return level, duty, Quantity("period", None, float(np.median(periods)), "s", *ends)
-
-
-def _wave(line: Line, joint: str | None, unit: str) -> tuple[Quantity, ...]:
-    half = _NORMAL * line.error
-    return (
-        Quantity("f", joint, line.frequency, "Hz", line.frequency - half, line.frequency + half),
-        Quantity("A", joint, line.amplitude, unit, *line.interval),
-    )
-
-
-def _slow(
-    series: Sequence[Series],
-    joint: str | None,
-    unit: str,
-    sizes: tuple[float, float],
-    tests: int,
-    limits: NotRepeating,
-) -> list[Located]:
-    """Return the drift and the offset between runs: those of the pair of runs that shows most of either.
-
-    What drifts is held against the offset that it began with. `sizes`: the mean squares of what else differs, and of
-    the sensor's noise.
-    """
-    each, least, alpha = [slow(one) for one in series], limits.least_slow * max(sizes), limits.alpha / (2 * tests)
-    drifts = [(one.drift, one.drift_deviation, one.p[1], one.sizes[1]) for one in each]
-    found = _most(DRIFT, drifts, joint, f"{unit}/s", least, alpha)
-    offsets = [(one.offset, one.offset_deviation, one.p[0], one.sizes[0]) for one in each]
-    if found:
-        began = [one.from_start() for one in each]
-        offsets = [(value, by, 2 * float(norm.sf(abs(value) / max(by, 1e-300))), value**2 / 2) for value, by in began]
-    return found + _most(OFFSET, offsets, joint, unit, least, alpha)
-
-
-def _most(
-    kind: str, each: Sequence[tuple[float, ...]], joint: str | None, unit: str, least: float, alpha: float
-) -> list[Located]:
-    """Return the largest of the values, deviations, p and sizes that are sure, where they matter together.
-
-    alpha: the largest p, for all of them.
-    """
-    sure = [one for one in each if one[2] <= alpha / len(each)]
-    together = sum(one[3] for one in sure) / len(each)
-    if not sure or together < least:
-        return []
-    value, deviation, p, _ = max(sure, key=lambda one: one[3])
-    half = _NORMAL * deviation
-    return [(kind, (Quantity(kind, joint, value, unit, value - half, value + half),), together, p, None)]

@@ -1,9 +1,8 @@
 """Line spectrum: frequencies that stand out of the spectrum of what two runs of one motion differ by.
 
-At each frequency a wave is fitted beside the columns of a series (the least-squares periodogram of Lomb and Scargle,
-with nuisance columns). What it explains is held against the median of the frequencies around, on the side where these
-are louder, so that coloured noise is no line. The frequencies around are those of what the wave leaves: a strong line
-leaks into them, and would hide itself.
+What the columns of a series leave of it is windowed, so that a strong line leaks into no other frequency, and held
+against the median of the frequencies around, on the side where these are louder: coloured noise is no line. Where a
+frequency stands out, a wave is fitted beside the columns, and the next is looked for in what all leave.
 """
 
 from __future__ import annotations
@@ -17,17 +16,16 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import czt
 from scipy.stats import gamma
 
-from irtwin.gap.repeats.series import Series, waves
-from irtwin.gap.thresholds import NotRepeating
+from irtwin.gap.repeats.series import NORMAL, Series, waves
 
+_PERIODS = 3  # of a line in a run at least: the window blurs what is slower
+_HIGHEST = 0.95  # of half the sampling rate
 _FINE = 2  # points of the spectrum for each that is independent
 _NEAR = 2  # independent points on either side that belong to a line,
 _AROUND = 12  # and beyond them those that it is held against
 _MEDIAN = float(np.log(np.log(2)))  # of the logarithm of what is exponential, with mean one
-_FREE = 0.1  # of a wave must be left by the columns beside it, for it to be looked for
-_FREE_STILL = 0.01  # or to be placed: its best frequency may lie closer to theirs
+_FREE = 0.1  # of a wave must be left by the columns beside it
 _MOST = 8  # lines of one channel
-_NORMAL = 1.96
 
 
 @dataclass(frozen=True)
@@ -52,84 +50,64 @@ class Line:
         return self.amplitude**2 / 2
 
 
-def lines(series: Sequence[Series], tests: int, limits: NotRepeating) -> tuple[list[Line], list[Series]]:
+def lines(series: Sequence[Series], tests: int) -> tuple[list[Line], list[Series]]:
     """Return the lines that all series show together, the strongest first, and the series with these beside them.
 
-    Each series is the difference of two runs. `tests`: how many channels are searched, for which p is adjusted.
+    Each series is the difference of two runs. `tests`: how many channels are searched, for which p is adjusted. A line
+    is told where it says more of the samples than its two coefficients cost (Schwarz): p is below one over them.
     """
     series = list(series)
     found: list[Line] = []
-    grid = _grid(series, limits)
+    grid = _grid(series)
     while len(grid) > 4 * _AROUND and len(found) < _MOST:
-        explained = np.array([_explained(one, grid) for one in series])
-        noise = np.array([_noise(each, grid) for each in explained])
-        likely = {int(np.argmax((explained / noise).sum(axis=0))), int(np.argmax(explained.sum(axis=0)))}
-        around = {best: _around(series, grid, best) for best in likely}
-        stands = {best: float(np.sum(explained[:, best] / around[best])) for best in likely}
-        best = max(likely, key=lambda place: stands[place])
+        power = np.array([_power(one, grid) for one in series])
+        noise = np.array([_noise(each, grid) for each in power])
+        stands = (power / noise).sum(axis=0)
+        best = int(np.argmax(stands))
         p = float(min(1.0, gamma.sf(stands[best], len(series)) * len(grid) / _FINE * tests))
-        if not p <= limits.alpha:
+        if not p * sum(len(one.values) for one in series) <= len(series):
             break
-        line, series = _line(series, grid, best, around[best], p)
-        found.append(line)
+        near = np.abs(np.arange(len(grid)) - best) <= _FINE * _NEAR
+        line, series = _line(series, grid, best, noise[:, best])
+        rest = sum(float(_power(one, grid)[near].sum()) for one in series)
+        purity = 1 - min(rest / float(power[:, near].sum()), 1.0)
+        found.append(Line(*line, purity, p))
     return found, series
 
 
-def _around(series: Sequence[Series], grid: np.ndarray, best: int) -> np.ndarray:
-    """Return what noise explains at a frequency of each series, (S,), told from what a wave of it leaves."""
-    near = np.abs(np.arange(len(grid)) - best) <= _FINE * _NEAR
-    found = []
-    for one in series:
-        left = _explained(one.with_columns(*waves(one.time, grid[best])), grid)
-        left[near] = np.interp(grid[near], grid[~near], left[~near])
-        found.append(_noise(left, grid)[best])
-    return np.array(found)
-
-
-def _grid(series: Sequence[Series], limits: NotRepeating) -> np.ndarray:
+def _grid(series: Sequence[Series]) -> np.ndarray:
     """Return the frequencies to try, (F,) Hz: even, so that those of a run cut short are told apart too."""
     seconds = [one.seconds for one in series]
     step = 1 / (_FINE * max(seconds))
-    highest = limits.highest * min(one.rate for one in series) / 2
-    return np.asarray(step * np.arange(np.ceil(limits.periods / min(seconds) / step), np.floor(highest / step) + 1))
+    highest = _HIGHEST * min(one.rate for one in series) / 2
+    return np.asarray(step * np.arange(np.ceil(_PERIODS / min(seconds) / step), np.floor(highest / step) + 1))
 
 
-def _transform(values: np.ndarray, one: Series, grid: np.ndarray) -> np.ndarray:
-    """Return the Fourier sums of columns (N, m) at even frequencies, (F, m)."""
+def _power(one: Series, grid: np.ndarray) -> np.ndarray:
+    """Return the power that what is left of a series has at even frequencies, (F,): of white noise its mean square.
+
+    Nothing, where the columns beside it leave less than `_FREE` of a wave.
+    """
+    window = np.hanning(len(one.values) + 2)[1:-1]
     turn = 2j * np.pi / one.rate
     ratio, start = np.exp(-turn * (grid[1] - grid[0])), np.exp(turn * grid[0])
-    return np.asarray(czt(values, len(grid), ratio, start, axis=0))
+
+    def transform(columns: np.ndarray) -> np.ndarray:
+        sums = czt(columns, len(grid), ratio, start, axis=0)
+        return np.asarray(np.abs(sums) ** 2)
+
+    taken = transform(one.basis()).sum(axis=1) / len(window)
+    found = transform(window[:, None] * one.left()[:, None])[:, 0] / float(window @ window)
+    return np.where(taken < 1 - _FREE, found, 0.0)
 
 
-def _explained(one: Series, grid: np.ndarray, free: float = _FREE) -> np.ndarray:
-    """Return the squares that a wave of each frequency explains beside the columns, (F,), halved: of mean S², white.
-
-    Nothing, where the columns leave less than `free` of it.
-    """
-    basis, count = one.basis(), len(one.values)
-    left = one.left()
-    sums = _transform(np.column_stack([left, basis]), one, grid)
-    twice = _transform(np.ones((count, 1)), one, 2 * grid)[:, 0]
-    own, beside = sums[:, 0], sums[:, 1:]
-    cosine, sine = beside.real, -beside.imag
-    both = np.empty((len(grid), 2, 2))
-    both[:, 0, 0] = (count + twice.real) / 2 - (cosine**2).sum(axis=1)
-    both[:, 1, 1] = (count - twice.real) / 2 - (sine**2).sum(axis=1)
-    both[:, 0, 1] = both[:, 1, 0] = -twice.imag / 2 - (cosine * sine).sum(axis=1)
-    imitated = np.linalg.eigvalsh(both)[:, 0] < free * count / 2
-    both[imitated] = np.eye(2)
-    right = np.stack([own.real, -own.imag], axis=1)
-    found = np.einsum("fi,fi->f", right, np.linalg.solve(both, right[..., None])[..., 0]) / 2
-    return np.asarray(np.where(imitated, 0.0, found))
-
-
-def _noise(explained: np.ndarray, grid: np.ndarray) -> np.ndarray:
-    """Return what noise explains at each frequency, (F,): the median of the louder side, as what wanders falls off.
+def _noise(power: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Return the noise's power at each frequency, (F,): the median of the louder side, as what wanders falls off.
 
     Below there is little to hold the lowest frequencies against, so they are from those above, by the square of their
     ratio: that of a random walk.
     """
-    logs = np.log(np.maximum(explained, 1e-12 * max(float(explained.max(initial=0.0)), 1e-300)))
+    logs = np.log(np.maximum(power, 1e-12 * max(float(power.max(initial=0.0)), 1e-300)))
     width, apart = _FINE * _AROUND, _FINE * (_NEAR + _AROUND // 2)
     padded = np.pad(median_filter(logs, size=width, mode="reflect"), apart, mode="reflect")
     below, above = padded[: len(logs)], padded[2 * apart :]
@@ -138,37 +116,31 @@ def _noise(explained: np.ndarray, grid: np.ndarray) -> np.ndarray:
 
 
 def _line(
-    series: Sequence[Series], grid: np.ndarray, best: int, noise: np.ndarray, p: float
-) -> tuple[Line, list[Series]]:
-    """Place a line between the points of the grid; return it, and the series with it beside them."""
-    step = grid[1] - grid[0]
+    series: Sequence[Series], grid: np.ndarray, best: int, noise: np.ndarray
+) -> tuple[tuple[float, float, float, tuple[float, float]], list[Series]]:
+    """Place a line between the points of the grid; return its frequency and amplitude, and the series beside it."""
+
+    def beside(frequency: float) -> list[Series]:
+        return [one.with_columns(*waves(one.time, frequency)) for one in series]
 
     def missed(frequency: float) -> float:
-        return -float(np.sum(at(frequency) / noise))
+        return float(sum(np.sum(one.left() ** 2) / level for one, level in zip(beside(frequency), noise, strict=True)))
 
-    def at(frequency: float) -> np.ndarray:
-        near = np.array([frequency, frequency + step])
-        return np.array([_explained(one, near, _FREE_STILL)[0] for one in series])
-
-    placed = minimize_scalar(missed, bounds=(grid[best] - step, grid[best] + step), method="bounded")
-    frequency = float(placed.x)
-    more = [one.with_columns(*waves(one.time, frequency)) for one in series]
-    near = grid[max(0, best - _FINE * _NEAR) : best + _FINE * _NEAR + 1]
-    rest = np.sum([_explained(one, near) for one in more], axis=0).max(initial=0.0)
-    samples = np.array([len(one.values) for one in series])
-    whole = at(frequency)
+    step = grid[1] - grid[0]
+    ends = (grid[best] - step, grid[best] + step)
+    frequency = float(minimize_scalar(missed, bounds=ends, method="bounded", options={"xatol": 1e-3 * step}).x)
+    more = beside(frequency)
     heights = np.array([float(np.linalg.norm(one.coefficients()[-2:])) for one in more])
     amplitude = float(np.sqrt(np.mean(heights**2) / 2))  # of one run: a difference has two, of any phases
-    interval = _ends(heights, np.sqrt(4 * noise / samples))
-    seconds = float(np.mean([one.seconds for one in series]))
-    signal = float(np.sum(whole / noise))
-    error = float(np.sqrt(1.5 / max(signal, 1.0)) / (np.pi * seconds))
-    return Line(frequency, error, amplitude, interval, float(whole.sum() / (whole.sum() + rest)), p), more
+    samples, seconds = np.array([(len(one.values), one.seconds) for one in series]).T
+    signal = max(float(np.sum(heights**2 * samples / 4 / noise)), 1.0)
+    error = float(np.sqrt(1.5 / signal) / (np.pi * seconds.mean()))
+    return (frequency, error, amplitude, _ends(heights, np.sqrt(4 * noise / samples))), more
 
 
 def _ends(heights: np.ndarray, deviations: np.ndarray) -> tuple[float, float]:
     """Return the ends of a run's amplitude, by the highest of the differences (P,), whose phases may be any."""
     best = int(np.argmax(heights))
     sines = [float(np.sin(np.pi / 2 * share ** (1 / len(heights)))) for share in (0.975, 0.025)]
-    lower, upper = (float(heights[best] + side * _NORMAL * deviations[best]) for side in (-1, 1))
+    lower, upper = (float(heights[best] + side * NORMAL * deviations[best]) for side in (-1, 1))
     return max(lower / 2, 0.0) / sines[0], upper / 2 / sines[1]

@@ -1,6 +1,6 @@
 """Disturbances taken out: what an effect of the catalogue explains of what does not repeat, run by run.
 
-No run tells another when it acts, so it is fitted in each run, and judged on stretches of time left out.
+No run tells another when it acts, so it is fitted in each run.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Effect, Quantity
+from irtwin.effects.effect import Effect, Quantity, quantity
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.correlation import correlation_samples
@@ -19,19 +19,17 @@ from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
 from irtwin.gap.regression.residuals import as_filtered, torque_residual
 from irtwin.gap.repeats.disturbances import LINE, SWITCHING, Disturbance
-from irtwin.gap.repeats.series import waves
+from irtwin.gap.repeats.series import following, waves
 from irtwin.signals.motion import Motion
 
-_STRETCHES = 8  # of a run, each left out in turn
-_SLOW_SPEED = 0.02  # rad/s, across which friction changes its sign
-_NORMAL = 1.96
+_NO_MORE = 0.005  # mean square of a wave of one: the filter has taken nine tenths of it
 
 
 @dataclass(frozen=True)
 class Removed:
     """A disturbance that an `effect` explains: `parts`, what each run shows of it, (N,) N m or W, as filtered.
 
-    `gain`: its part of the mean square of what the twin leaves, on stretches left out; `t` of it between these.
+    `gain`: its part of the mean square of what differs, or of what the twin leaves.
     """
 
     disturbance: Disturbance
@@ -39,7 +37,6 @@ class Removed:
     quantities: tuple[Quantity, ...]
     parts: Mapping[str, np.ndarray]
     gain: float
-    t: float
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -71,24 +68,16 @@ def removed(case: Case, stack: Stack, plain: System | None, found: Sequence[Dist
 def _waves(case: Case, effect: Effect, found: Sequence[Disturbance], left: Mapping[str, np.ndarray]) -> list[Removed]:
     """Return the waves of one joint's lines, fitted to what the twin leaves of each run."""
     joint = case.robot.index(str(found[0].joint))
-    fits = {m.run: _Fit.of(m, left[m.run][:, joint], joint, [one.shape.frequency for one in found])
+    fits = {m.run: _Fit(m, left[m.run][:, joint], joint, [one.shape.frequency for one in found])
             for m in case.with_torque}  # fmt: skip
     seen = [fit for run, fit in fits.items() if run in case.observed]
     taken = []
     for k, one in enumerate(found):
-        judged = [fit.judged(k) for fit in seen]
-        before = np.concatenate([before for before, _ in judged])
-        after = np.concatenate([after for _, after in judged])
-        taken.append(
-            Removed(
-                one,
-                replace(effect, f=one.shape.frequency, joints=(str(one.joint),)),  # type: ignore[call-arg]
-                _amplitude(one, [fit.amplitude(k) for fit in seen]),
-                {run: fit.wave(k) for run, fit in fits.items()},
-                float(np.clip(1 - after.sum() / max(before.sum(), 1e-300), 0.0, 1.0)),
-                _t(before - after),
-            )
-        )
+        fitted = replace(effect, f=one.shape.frequency, joints=(str(one.joint),))  # type: ignore[call-arg]
+        amplitude = _amplitude(one, [fit.amplitude(k) for fit in seen])
+        explained, before = np.sum([fit.squares(k) for fit in seen], axis=0)
+        gain = min(float(explained) / max(float(before), 1e-300), 1.0)
+        taken.append(Removed(one, fitted, amplitude, {run: fit.wave(k) for run, fit in fits.items()}, gain))
     return taken
 
 
@@ -99,65 +88,40 @@ def _amplitude(one: Disturbance, each: Sequence[tuple[float, float]]) -> tuple[Q
         return one.quantities
     frequency, known = one.quantities
     value = float(np.sqrt(np.mean(amplitudes**2)))
-    half = _NORMAL * float(np.sqrt(np.sum(deviations**2))) / len(each)
-    return frequency, Quantity(known.name, known.joint, value, known.unit, max(value - half, 0.0), value + half)
+    deviation = float(np.sqrt(np.sum(deviations**2))) / len(each)
+    return frequency, quantity(known.name, known.joint, value, known.unit, deviation, lambda end: max(end, 0.0))
 
 
-@dataclass(frozen=True)
 class _Fit:
     """Waves in what the twin left of one joint in one run, beside what may follow the motion."""
 
-    columns: np.ndarray  # (N, m), cosine and sine of each wave last
-    left: np.ndarray  # (N,), NaN where undecided
-    passed: np.ndarray  # (L,) whether the filter lets a wave through
-
-    @classmethod
-    def of(cls, motion: Motion, left: np.ndarray, joint: int, frequencies: Sequence[float]) -> _Fit:
-        dq, ddq = motion.dq[:, joint], motion.ddq[:, joint]
-        beside = [np.ones_like(dq), motion.time - motion.time.mean(), dq, np.tanh(dq / _SLOW_SPEED), ddq]
+    def __init__(self, motion: Motion, left: np.ndarray, joint: int, frequencies: Sequence[float]):
+        """Fit waves of some frequencies, Hz, to what was left (N,), NaN where undecided."""
         seen = [as_filtered(motion, np.column_stack(waves(motion.time, one))) for one in frequencies]
-        passed = np.array([float(np.mean(one**2)) > _NO_MORE for one in seen])
-        return cls(np.column_stack([*beside, *(one * ok for one, ok in zip(seen, passed, strict=True))]), left, passed)
-
-    def _values(self, kept: np.ndarray) -> np.ndarray:
-        found: np.ndarray = np.linalg.lstsq(self.columns[kept], self.left[kept], rcond=1e-8)[0]
-        return found
-
-    def _own(self, k: int) -> slice:
-        first = self.columns.shape[1] - 2 * len(self.passed) + 2 * k
-        return slice(first, first + 2)
+        self._passed = [float(np.mean(one**2)) > _NO_MORE for one in seen]  # else the filter takes the wave away
+        self._waves = [one * passed for one, passed in zip(seen, self._passed, strict=True)]
+        known = np.isfinite(left)
+        columns = np.column_stack([following(motion, joint), *self._waves])[known]
+        values = np.linalg.lstsq(columns, left[known], rcond=1e-8)[0]
+        self._values = values[-2 * len(seen) :].reshape(-1, 2)
+        rest = left[known] - columns @ values
+        self._known, self._before = known, float(np.sum(left[known] ** 2))
+        self._variance = float(np.mean(rest**2)) * correlation_samples(rest) / len(rest)
 
     def wave(self, k: int) -> np.ndarray:
         """Return the k-th wave as the filter leaves it, (N,)."""
-        return np.asarray(self.columns[:, self._own(k)] @ self._values(np.isfinite(self.left))[self._own(k)])
+        return np.asarray(self._waves[k] @ self._values[k])
 
     def amplitude(self, k: int) -> tuple[float, float]:
         """Return the k-th wave's amplitude and its deviation; NaN where the filter takes it away."""
-        if not self.passed[k]:
+        if not self._passed[k]:
             return np.nan, np.nan
-        kept = np.isfinite(self.left)
-        values = self._values(kept)
-        rest = self.left[kept] - self.columns[kept] @ values
-        memory = correlation_samples(rest)
-        gain = 2 * float(np.mean(self.columns[kept][:, self._own(k)] ** 2))
-        deviation = float(np.sqrt(2 * np.mean(rest**2) * memory / len(rest) / gain))
-        return float(np.linalg.norm(values[self._own(k)])), deviation
+        power = float(np.mean(self._waves[k][self._known] ** 2))
+        return float(np.linalg.norm(self._values[k])), float(np.sqrt(self._variance / power))
 
-    def judged(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the squares in stretches without the k-th wave, and with it as fitted to the others, (S,) each."""
-        known = np.isfinite(self.left)
-        stretch = np.arange(len(known)) * _STRETCHES // len(known)
-        before, after = np.zeros((2, _STRETCHES))
-        for one in range(_STRETCHES):
-            test = known & (stretch == one)
-            values = self._values(known & (stretch != one))
-            rest = self.left[test] - self.columns[test] @ values
-            wave = self.columns[test][:, self._own(k)] @ values[self._own(k)]
-            before[one], after[one] = float(np.sum((rest + wave) ** 2)), float(np.sum(rest**2))
-        return before, after
-
-
-_NO_MORE = 0.005  # mean square of a wave of one: the filter has taken nine tenths of it
+    def squares(self, k: int) -> tuple[float, float]:
+        """Return the squares of the k-th wave, and those of what the twin left."""
+        return float(np.sum(self.wave(k)[self._known] ** 2)), self._before
 
 
 def _load(case: Case, effect: Effect, one: Disturbance) -> Removed:
@@ -168,7 +132,7 @@ def _load(case: Case, effect: Effect, one: Disturbance) -> Removed:
         for motion in case.with_power
         if motion.run in load.states
     }
-    return Removed(one, effect, one.quantities, parts, float(load.explained), load.level / max(load.deviation, 1e-12))
+    return Removed(one, effect, one.quantities, parts, float(load.explained))
 
 
 def _without(case: Case, taken: Sequence[Removed]) -> Case:
@@ -190,8 +154,3 @@ def _less(case: Case, motion: Motion, taken: Sequence[Removed]) -> Motion:
             torque = torque.copy()
             torque[:, case.robot.index(one.disturbance.joint)] -= part
     return replace(motion, torque=torque, power=power)
-
-
-def _t(gains: np.ndarray) -> float:
-    root = np.sign(gains) * np.sqrt(np.abs(gains))
-    return float(root.mean() / max(root.std(ddof=1) / np.sqrt(len(root)), 1e-12))

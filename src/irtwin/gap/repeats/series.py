@@ -6,7 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.signals.motion import Motion
+
+_SLOW_SPEED = 0.02  # rad/s, across which friction changes its sign
 _WILD = 6.0  # spreads: what lies beyond is a joint that turned back at another instant, and is cut there
+NORMAL = 1.96  # standard deviations in half a 95 % interval
 SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
 
 
@@ -60,3 +64,12 @@ def waves(time: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray]:
     """Return cosine and sine of a frequency, Hz, at some times, (N,) each."""
     angle = 2 * np.pi * frequency * time
     return np.cos(angle), np.sin(angle)
+
+
+def following(motion: Motion, joint: int) -> np.ndarray:
+    """Return what may follow a joint's motion in its torque, (N, 5), a constant and a drift first: friction, inertia.
+
+    The torque itself is not among the columns: it holds the disturbance.
+    """
+    dq, since = motion.dq[:, joint], motion.time - motion.time.mean()
+    return np.column_stack([np.ones_like(dq), since, dq, np.tanh(dq / _SLOW_SPEED), motion.ddq[:, joint]])

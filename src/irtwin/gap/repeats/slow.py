@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import t as student_t
@@ -13,29 +13,11 @@ from irtwin.gap.repeats.series import Series
 _SLOW = 2  # columns of a series: a constant, and how it drifts, stand first beside it
 
 
-@dataclass(frozen=True)
-class Slow:
-    """The `offset` of a difference at mid-time, and its `drift` a second, each with its deviation and p.
+def slow(series: Series) -> np.ndarray:
+    """Return of the offset of a difference, and of its drift a second: value, deviation, p, mean square in one run.
 
-    `sizes`: the mean squares of both in one run; `start`, s: what the drift is multiplied by where it begins.
+    (2, 4); what is left remembers, so its samples count for fewer.
     """
-
-    offset: float
-    offset_deviation: float
-    drift: float
-    drift_deviation: float
-    p: tuple[float, float]
-    sizes: tuple[float, float]
-    start: float
-
-    def from_start(self) -> tuple[float, float]:
-        """Return the offset where the difference begins, before anything has drifted, with its deviation."""
-        by = float(np.hypot(self.offset_deviation, self.start * self.drift_deviation))
-        return self.offset + self.start * self.drift, by
-
-
-def slow(series: Series) -> Slow:
-    """Return the offset and the drift of a difference; what is left remembers, so its samples count for fewer."""
     beside = series.beside
     scale = np.maximum(np.linalg.norm(beside, axis=0), 1e-300)
     inverse = np.linalg.pinv(beside / scale, rcond=1e-8)
@@ -45,9 +27,13 @@ def slow(series: Series) -> Slow:
     free = max(len(left) / memory - beside.shape[1], 1.0)
     variance = float(left @ left) / len(left) * memory * (1 + beside.shape[1] / free)
     deviations = np.sqrt(np.sum(inverse[:_SLOW] ** 2, axis=1) * variance) / scale[:_SLOW]
-    p = 2 * student_t.sf(np.abs(values[:_SLOW]) / np.maximum(deviations, 1e-300), free)
-    sizes = values[0] ** 2 / 2, values[1] ** 2 / 2 * float(np.var(beside[:, 1]))
-    return Slow(
-        float(values[0]), float(deviations[0]), float(values[1]), float(deviations[1]),
-        (float(p[0]), float(p[1])), (float(sizes[0]), float(sizes[1])), float(beside[0, 1]),
-    )  # fmt: skip
+    values = values[:_SLOW]
+    p = 2 * student_t.sf(np.abs(values) / np.maximum(deviations, 1e-300), free)
+    return np.column_stack([values, deviations, p, values**2 / 2 * [1.0, np.var(beside[:, 1])]])
+
+
+def from_start(series: Series) -> Series:
+    """Return a series whose offset is that where it begins, before anything has drifted."""
+    beside = series.beside.copy()
+    beside[:, 1] -= beside[0, 1]
+    return replace(series, beside=beside)

@@ -12,7 +12,6 @@ from irtwin.gap.repeats.creep import creep
 from irtwin.gap.repeats.description_length import saved
 from irtwin.gap.repeats.series import SPREAD, Series
 from irtwin.gap.repeats.telegraph import two_levels
-from irtwin.gap.thresholds import NotRepeating
 
 _TRUST = (1.0, 0.1)  # in all of the power beside its changes: motion may hardly change, or the load may be large
 _ROUNDS = 10  # of fitting what the motion takes and what is on, in turn
@@ -71,15 +70,15 @@ class Switching:
         return [float(value) for times in on for value in np.diff(times)]
 
 
-def switching(pairs: Sequence[Watched], runs: Mapping[str, Series], limits: NotRepeating) -> Switching | None:
-    """Return the load that switches; None where none explains enough of what differs, or a drift says as much.
+def switching(pairs: Sequence[Watched], runs: Mapping[str, Series]) -> Switching | None:
+    """Return the load that switches; None where none explains most of what differs, or a drift says as much.
 
     `runs`: each run's power by name, with columns beside it that the motion may take.
     """
     names = dict.fromkeys(name for pair in pairs for name in pair.names)
     watched = {name: runs[name] for name in names}
     followed = (_followed(pairs, watched, two_levels(watched, trust)) for trust in _TRUST)
-    found = [one for one in followed if one is not None and one.explained >= limits.switching]
+    found = [one for one in followed if one is not None and one.explained > 0.5]
     worth = [_worth(one, pairs, watched) for one in found]
     return found[int(np.argmax(worth))] if max(worth, default=0.0) > 0 else None
 
@@ -215,17 +214,13 @@ def _on_first_clock(
 
 def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> float:
     """Return the part of what differs, beyond white noise and what follows the motion, that the states explain."""
-    before, after = 0.0, 0.0
+    left = np.zeros(2)
     for pair in pairs:
-        white = len(pair.difference.time) * _white(pair.difference) ** 2
-        before += float(np.sum(pair.difference.left() ** 2)) - white
-        after += float(np.sum(pair.difference.with_columns(_apart(pair, states, runs)).left() ** 2)) - white
-    return 1 - max(after, 0.0) / before if before > 0 else 0.0
-
-
-def _white(series: Series) -> float:
-    """Return the RMS of the white noise: of the second differences, it is six times the mean square."""
-    return SPREAD * float(np.median(np.abs(np.diff(series.values, 2)))) / float(np.sqrt(6))
+        second = np.diff(pair.difference.values, 2)  # of white noise, of six times its mean square
+        white = len(pair.difference.time) * (SPREAD * float(np.median(np.abs(second)))) ** 2 / 6
+        loaded = pair.difference.with_columns(_apart(pair, states, runs))
+        left += [float(np.sum(one.left() ** 2)) - white for one in (pair.difference, loaded)]
+    return float(1 - max(left[1], 0.0) / left[0]) if left[0] > 0 else 0.0
 
 
 def _level(

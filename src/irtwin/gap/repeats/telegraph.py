@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from irtwin.gap.repeats.series import SPREAD, Series
 
@@ -23,38 +24,27 @@ def two_levels(runs: Mapping[str, Series], trust: float) -> dict[str, np.ndarray
 
     `trust`: how much all of the power counts beside its changes.
     """
-    taken = _of_motion([_even(one) for one in runs.values()], trust)
-    left = {name: _smooth((one.values - one.beside @ taken)[:, None], one)[:, 0] for name, one in runs.items()}
+    even = {name: _smooth(np.column_stack([one.beside, one.values]), one) for name, one in runs.items()}
+    changes = [
+        each[_samples(one) :] - each[: -_samples(one)] for one, each in zip(runs.values(), even.values(), strict=True)
+    ]
+    taken = _of_motion(np.vstack(list(even.values())), np.vstack(changes), trust)
+    left = {name: each @ np.append(-taken, 1.0) for name, each in even.items()}
     middle = _middle(np.concatenate(list(left.values())))
-    return {name: (_padded(values, len(runs[name].time)) > middle).astype(float) for name, values in left.items()}
+    return {name: (values > middle).astype(float) for name, values in left.items()}
 
 
 def _smooth(columns: np.ndarray, one: Series) -> np.ndarray:
-    """Return the moving means of columns (N, m) over a moment, (N - M + 1, m)."""
-    size = _samples(one)
-    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
-    return np.asarray((sums[size:] - sums[:-size]) / size)
+    """Return the moving means of columns (N, m) over a moment."""
+    return np.asarray(uniform_filter1d(columns, _samples(one), axis=0, mode="nearest"))
 
 
 def _samples(one: Series) -> int:
     return min(max(1, round(_MOMENT * one.rate)), len(one.time) // 3)
 
 
-def _padded(values: np.ndarray, count: int) -> np.ndarray:
-    before = (count - len(values)) // 2
-    return np.pad(values, (before, count - len(values) - before), mode="edge")
-
-
-def _even(one: Series) -> tuple[np.ndarray, np.ndarray]:
-    """Return columns and power as the last, (M, m + 1), averaged over a moment, and how these change in one."""
-    size = _samples(one)
-    means = _smooth(np.column_stack([one.beside, one.values]), one)
-    return means, means[size:] - means[:-size]
-
-
-def _of_motion(runs: list[tuple[np.ndarray, np.ndarray]], trust: float) -> np.ndarray:
-    """Return the coefficients (m,) of the columns: those of a robust fit to changes, held by all of the power."""
-    whole, change = (np.vstack(parts) for parts in zip(*runs, strict=True))
+def _of_motion(whole: np.ndarray, change: np.ndarray, trust: float) -> np.ndarray:
+    """Return the coefficients (m,) of columns, power the last, (M, m + 1): by a robust fit to changes, held by all."""
     scale = np.maximum(np.linalg.norm(whole[:, :-1], axis=0), 1e-300)
     whole, values = whole[:, :-1] / scale, whole[:, -1]
     change, changes = change[:, :-1] / scale, change[:, -1]
