@@ -54,13 +54,13 @@ def read_input(path: Path, most: int) -> bytes:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name an existing file") from error
 
 
-def read_text(path: Path, most: int) -> str:
+def read_text(path: Path, most: int, remedy: str = "save it as UTF-8") -> str:
     """Return the content of a text file, without a byte order mark. Raises InputError as `read_input` and `as_text`."""
-    return as_text(path, read_input(path, most))
+    return as_text(path, read_input(path, most), remedy)
 
 
-def as_text(path: Path, content: bytes) -> str:
-    """Return what a file holds as text, without a byte order mark.
+def as_text(path: Path, content: bytes, remedy: str = "save it as UTF-8") -> str:
+    """Return what a file holds as text, without a byte order mark; `remedy` is what to do where it holds none.
 
     Raises InputError where it is not UTF-8: from which byte of which line on, both counted from 1.
     """
@@ -68,9 +68,7 @@ def as_text(path: Path, content: bytes) -> str:
         return content.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         *before, last = content[: error.start].split(b"\n")
-        raise InputError(
-            f"{path}, line {len(before) + 1}: not UTF-8 text (byte {len(last) + 1}); save it as UTF-8"
-        ) from error
+        raise InputError(f"{path}, line {len(before) + 1}: not UTF-8 text (byte {len(last) + 1}); {remedy}") from error
 
 
 def checksum(path: Path) -> str:

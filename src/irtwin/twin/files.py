@@ -56,7 +56,7 @@ _BASE_PARAMETER: _Columns = {
 
 def load(path: Path) -> Twin:
     """Read a twin. Raises InputError, naming file and key, where the file is none."""
-    return from_json(read_text(path, _LARGEST), path)
+    return from_json(read_text(path, _LARGEST, "name a twin that irtwin saved"), path)
 
 
 def to_json(twin: Twin) -> str:
