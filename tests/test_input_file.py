@@ -69,7 +69,8 @@ def test_text_that_is_not_utf8_is_said_with_line_and_byte(name: str, put: Callab
     file = put(name, LATIN)
     with pytest.raises(InputError) as refused:
         READERS[name](file)
-    assert str(refused.value) == f"{file}, line 2: not UTF-8 text (byte 9); save it as UTF-8"
+    remedy = "name a twin that irtwin saved" if name == "twin.json" else "save it as UTF-8"
+    assert str(refused.value) == f"{file}, line 2: not UTF-8 text (byte 9); {remedy}"
 
 
 def test_a_module_of_the_ontology_is_said_by_its_parser(put: Callable[[str, bytes], Path]) -> None:
