@@ -126,6 +126,7 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
                     of.add_column(sa.Column(column, sa.Float(), nullable=nullable))
         if of_0_1:
             connection.execute(text("DROP TABLE robot_note"))
+            connection.execute(text("DROP TABLE twin_choice"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
