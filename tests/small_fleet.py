@@ -275,6 +275,15 @@ def _twins() -> Iterator[Base]:
                 yield schema.ActivityUse(activity_id=made, entity=f"run/{robot}.{name}", relation="wasInformedBy")
             if of == robot:
                 yield schema.TwinRun(twin_id=twin, run_id=f"{robot}.{name}", part=part, activity_id=made)
+    yield schema.TwinChoice(
+        choice_id="Arm_A.t1.copper_loss.chosen", twin_id="Arm_A.t1", effect="copper_loss", joints="j1", chosen=True,
+        probability=0.75, rivals="inverter_loss", rmse_unit="W", rmse_without=6.0, rmse_with=3.0,
+        energy_error_without_percent=2.0, energy_error_with_percent=1.0, activity_id="identification.Arm_A",
+    )  # fmt: skip
+    yield schema.TwinChoice(
+        choice_id="Arm_A.t1.iron_loss.open", twin_id="Arm_A.t1", effect="iron_loss", chosen=False, probability=0.4,
+        activity_id="identification.Arm_A",
+    )  # fmt: skip
     for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
         yield schema.Parameter(
             parameter_id=f"{robot}.t1.{effect}.{joint or 'robot'}.{name}", twin_id=f"{robot}.t1", robot_id=robot,

@@ -12,10 +12,10 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from irtwin.check.check import Checked, check, checked
-from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap import predict as predicted
+from irtwin.gap.choice import identified
 from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.cutoff import cutoff_for
@@ -40,9 +40,9 @@ from irtwin.twin.twin import Twin
 def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | None = None) -> Twin:
     """Fit a twin to the runs of a data set, all filtered alike.
 
-    effects: ids of the catalogue, or effects of a shape; None takes those of `dataset.toml`, else the baseline. A
-    simulator's runs stay apart where the robot's own are there. Weighted least squares on the base regressor, with
-    bounds (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).
+    effects: ids of the catalogue, or effects of a shape; None takes those of `dataset.toml`, else those that the runs
+    show: the twin's `choices`. A simulator's runs stay apart where the robot's own are there. Weighted least squares on
+    the base regressor, with bounds (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).
     Raises InputError on bad input, or where there is nothing to fit.
 
     >>> import irtwin
@@ -57,7 +57,12 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
     own = own_runs(given.runs)
     cutoff = cutoff_for(given.robot, own, given.cutoff)
     motions = [condition(run, given.robot, cutoff.hz) for run in own]
-    twin = fit(given.robot, motions, effects if effects is not None else given.effects or BASELINE)
+    named = given.effects if effects is None else effects
+    twin = (
+        identified(replace(given, runs=tuple(own), cutoff=cutoff.hz), motions)
+        if named is None
+        else fit(given.robot, motions, named)
+    )
     return replace(twin, torque_scale=torque_scale_of(twin, given, motions, ScaleOfTorque()))
 
 

@@ -69,12 +69,13 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
     if cause:
         own = next(h for h in found if (h.effect, h.joint) == (cause, "joint_2"))
         causes = (Cause(cause, MISSING, ("joint_2",), own.variants[-1:], 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
-    attribution = Attribution(causes, noise, found, np.zeros((len(found), 2)), ())
+    attribution = Attribution(causes, noise, found, np.zeros((len(found), 2)), (), np.zeros(0))
     nothing = Estimate.__new__(Estimate)
     observed = frozenset(m.run for m in motions)
     judged = held_out(system, noise, noise, ())
     closed = np.array([part * judged.before for _ in causes])
-    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, judged, None, nothing, closed)
+    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, judged, None, nothing)
+    vars(finding)["closed_squares"] = closed
     return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
 
 

@@ -41,6 +41,7 @@ from irtwin.storage.revisions.versions import (
     r0010_log_odds,
     r0011_cutoff,
     r0012_one_criterion,
+    r0013_choices,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -126,6 +127,7 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
                     of.add_column(sa.Column(column, sa.Float(), nullable=nullable))
         if of_0_1:
             connection.execute(text("DROP TABLE robot_note"))
+            connection.execute(text("DROP TABLE twin_choice"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
@@ -159,6 +161,7 @@ def test_each_revision_follows_another() -> None:
     assert r0009_no_consumption.down_revision == r0008_times_of_runs.revision
     assert r0010_log_odds.down_revision == r0009_no_consumption.revision
     assert r0011_cutoff.down_revision == r0010_log_odds.revision
+    assert r0013_choices.down_revision == r0012_one_criterion.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:

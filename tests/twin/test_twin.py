@@ -11,6 +11,7 @@ from tests.synthetic import arm, measure, swing, with_constants
 from irtwin.effects.catalogue import BASELINE
 from irtwin.twin import twin as room
 from irtwin.twin.identify import identify
+from irtwin.twin.twin import Parameter
 
 ALL = (*BASELINE, "copper_loss")
 ROBOT = with_constants(arm(3))
@@ -33,6 +34,16 @@ def test_ledger_names_who_took_what():
         assert all(entries[effect, joint] > 0 for joint in ROBOT.joint_names)
     # what measurement adds takes no energy, and mechanical power is entered under what takes it
     assert {effect for effect, _ in entries}.isdisjoint({"torque_offset", "mechanical_power"})
+
+
+def test_what_a_meter_adds_is_no_entry_of_the_ledger():
+    motion = swing(ROBOT, 3, seconds=5)
+    gain = Parameter("meter_gain", None, None, "g - 1", 0.1, "1")
+    shown = replace(TWIN, effects=(*TWIN.effects, "meter_gain"), parameters=(*TWIN.parameters, gain), covariance=None)
+    before, entries = TWIN.ledger(motion), shown.ledger(motion)
+    assert [entry.effect for entry in entries] == [entry.effect for entry in before]
+    assert [one.energy for one in entries] == pytest.approx([1.1 * one.energy for one in before])
+    assert sum(entry.energy for entry in entries) == pytest.approx(shown.energy(motion), rel=1e-10)
 
 
 @settings(max_examples=10)

@@ -10,6 +10,7 @@ from tests.synthetic import arm, measure, swing
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
+from irtwin.twin.choice import Choice
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.torque_scale import TorqueScale
@@ -45,6 +46,18 @@ def test_a_saved_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path):
     document["torque_scale"]["low"] = "small"
     (tmp_path / "twin.json").write_text(json.dumps(document))
     with pytest.raises(InputError, match='in "torque_scale": "low" is no float'):
+        load(tmp_path / "twin.json")
+
+
+def test_a_saved_twin_says_which_effects_were_chosen(tmp_path):
+    shown = Choice("copper_loss", ("joint_1",), True, 0.9, ("inverter_loss",), "W", 6.0, 3.0, 2.0, 1.0)
+    left_open = Choice("iron_loss", (), False, 0.4)
+    (tmp_path / "twin.json").write_text(to_json(replace(TWIN, choices=(shown, left_open))))
+    assert load(tmp_path / "twin.json").choices == (shown, left_open)
+    document = json.loads((tmp_path / "twin.json").read_text())
+    document["choices"][1]["chosen"] = "no"
+    (tmp_path / "twin.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match='in "choices", entry 2: "chosen" is neither true nor false'):
         load(tmp_path / "twin.json")
 
 

@@ -65,7 +65,7 @@ def data_set_text(
     lines += [
         "",
         "# [twin]",
-        _line("effects", list(BASELINE), "what the twin models; without it, these", False),
+        _line("effects", list(BASELINE), "what the twin models; without it, these and what the runs show", False),
         _line("cutoff", 10.0, "Hz, of the low-pass filter that all runs pass; without it, found", False),
         "",
         "# [topics]  # for runs that are ROS bags in which several topics would do",

@@ -70,6 +70,10 @@ class CopperLoss(JointEffect):
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
 
+    def stated(self, robot: Robot) -> bool:
+        """Return whether some winding's resistance is known: what has a resistance heats."""
+        return any(joint.winding_resistance for joint in robot.joints)
+
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return R, expected as the data sheet says."""
         known = joint.winding_resistance

@@ -198,6 +198,7 @@ class MeterGain(Effect):
 
     id: ClassVar[str] = "meter_gain"
     family: ClassVar[str] = "sensing"
+    scales_power: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "standing still with a load of known power on the same meter"
     channel: ClassVar[str] = "measurement"
     signal: ClassVar[str] = "power"

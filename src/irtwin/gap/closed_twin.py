@@ -18,10 +18,20 @@ from irtwin.twin.twin import Twin
 def closed_twin(case: Case, causes: Sequence[Cause], tell: Tell | None = None) -> Twin:
     """Return the twin with the causes added; where some effect changed, fitted to the observed runs alone.
 
-    A changed effect that the twin has needs no second one; a load at the flange is one with the last body. `tell` is
-    told how far that has come, where it takes long.
+    `tell` is told how far that has come, where it takes long.
     """
-    added: list[Effect] = []
+    changed = any(cause.scope == CHANGED for cause in causes)
+    robot, motions = case.given
+    used = [motion for run, motion in motions.items() if run in case.observed or not changed]
+    return identify(robot, used, [*case.effects, *added(case, causes)], case.prior, tell)
+
+
+def added(case: Case, causes: Sequence[Cause]) -> list[Effect]:
+    """Return the effects that causes add to the twin.
+
+    A changed effect that the twin has needs no second one; a load at the flange is one with the last body.
+    """
+    found: list[Effect] = []
     for cause in causes:
         if cause.scope == CHANGED and cause.variants[0].effect.within_bodies:
             continue
@@ -31,12 +41,9 @@ def closed_twin(case: Case, causes: Sequence[Cause], tell: Tell | None = None) -
             named = [joint for joint in lacking if joint is not None]
             whole = not cause.joints and len(lacking) == len(joints)
             effect = variant.effect.standing() if whole else variant.effect.standing().on(*named)
-            if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in added):
-                added.append(effect)
-    changed = any(cause.scope == CHANGED for cause in causes)
-    robot, motions = case.given
-    used = [motion for run, motion in motions.items() if run in case.observed or not changed]
-    return identify(robot, used, [*case.effects, *added], case.prior, tell)
+            if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in found):
+                found.append(effect)
+    return found
 
 
 def friction(case: Case, causes: Sequence[Cause], closed: Twin, tell: Tell | None = None) -> tuple[FrictionCurve, ...]:

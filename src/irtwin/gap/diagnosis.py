@@ -7,36 +7,29 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from typing import Any
 
-import numpy as np
-
 from irtwin.document.cause_ids import cause_ids
 from irtwin.document.curves import Curves
 from irtwin.document.document import Closeable, Cutoff, Document, Untestable
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.local import LocalEffect
 from irtwin.effects.stack import Stack
-from irtwin.errors import InputError
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
-from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
 from irtwin.gap.experiment.next_experiment import next_experiment
 from irtwin.gap.experiment.planned_equations import planned_equations
 from irtwin.gap.experiment.programmes import excitation_of
 from irtwin.gap.forecast import forecast
-from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.detectability import can_show, untestable
-from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
-from irtwin.gap.isolation.finding import Finding, Without, find
-from irtwin.gap.isolation.floor_left import floor_left
-from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
+from irtwin.gap.isolation.detectability import untestable
+from irtwin.gap.isolation.explained import Explained, ExplainedTorque
+from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
 from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, places
@@ -44,13 +37,13 @@ from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.not_repeating import NotRepeating, with_removed
 from irtwin.gap.regression.candidate_columns import Below
-from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system, with_load
-from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
+from irtwin.gap.regression.channel_equations import Torque, with_load
+from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.torque_from_power import ThroughPower
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
+from irtwin.gap.search import check_observed, power_causes, torque_causes, torque_source, twin_equations, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
@@ -179,18 +172,18 @@ def diagnose(
     excitation = begun(lambda: excitation_of(case.robot, tell), worth=case.long)  # the next experiment's
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
-    plain = _plain(case, stack, tell)
+    plain = twin_equations(case, stack, tell)
     differ = disturbances(case)
     case, taken = removed(case, stack, plain, differ)
     if taken:
         case = case.with_friction_near_zero(tell)
         stack = case.stack.with_effects(stack.effects)
-        plain = _plain(case, stack, tell)
+        plain = twin_equations(case, stack, tell)
     tell.step("  the noise floor")
     floor = noise_floor(case.runs, case.motions, thresholds.data)
     if case.shows("torque") and plain is not None:
-        _check_observed(plain)
-    power_stack, predicted, below = _torque_source(case, stack, plain, tell)
+        check_observed(plain)
+    power_stack, predicted, below = torque_source(case, stack, plain, tell)
     loaded = with_load(case.robot, below)
 
     @cache
@@ -215,7 +208,8 @@ def diagnose(
     if case.shows("power"):
         tell("Trying every effect on power")
         of_twin = None if torque is predicted else before
-        of_power, wrong = _power(case, power_stack, floor, of_twin, torque, frozenset(unknown), seed, tell)
+        tried = variants(case, "power")
+        of_power, wrong = power_causes(case, power_stack, floor, of_twin, torque, tried, frozenset(unknown), seed, tell)
         explained.append(of_power)
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
@@ -290,30 +284,6 @@ def diagnose(
     )
 
 
-def _plain(case: Case, stack: Stack, tell: Progress) -> System | None:
-    return torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
-
-
-def _check_observed(system: System) -> None:
-    if not system.observed.any():
-        raise InputError("in no observed run does a joint move for longer than the filter; log longer runs")
-
-
-def _torque_source(case: Case, stack: Stack, plain: System | None, tell: Progress) -> tuple[Stack, Torque, Below]:
-    """Return the effects that explain power, the joint torque that they are given, and what those of torque stand on.
-
-    It is that of a fit to torque (`plain`: the twin's equations) without the run's group; where no run shows torque,
-    that of a fit to power.
-    """
-    if plain is None:
-        through_power = ThroughPower(stack, case.with_power)
-        return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
-    if case.shows("torque"):
-        check_same_robot(case.runs, stack, plain, case.thresholds.data)
-    left_out = LeftOut(stack, plain, tell)
-    return stack, left_out.torque, left_out.below
-
-
 def _torque(
     case: Case,
     stack: Stack,
@@ -326,82 +296,12 @@ def _torque(
     seed: int,
     tell: Progress,
 ) -> tuple[Finding, Floor, Refusals]:
-    """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both.
-
-    `before` gives the power that the twin takes by the joint torque `predicted`.
-    """
+    """Find the causes of torque as `torque_causes` does, those that a screening proposes among them."""
     found = screen(case, stack, plain, tell)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
             below(motion)
         if case.shows("power"):
             before()
-    tried = found.shapes(_variants(case, "torque"))
-    if case.shows("power"):
-        both = (tried, _variants(case, "power"))
-
-        def beside_power(without: Set[Without]) -> tuple[Finding, Floor]:
-            return find_beside_power(
-                case,
-                stack,
-                both,
-                below,
-                predicted,
-                before(),
-                floor,
-                seed,
-                without=without,
-                tell=tell,
-            )
-
-        return find_possible(case, beside_power, unknown)
-    system = torque_system(stack, case.with_torque, case.grouping, tried, below, tell, case.shaken)
-
-    def alone(without: Set[Without]) -> tuple[Finding, Floor]:
-        first = find("torque", case, system, floor.torque, seed, without, tell=tell)
-        left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
-        return replace(first, floor=left.torque), left
-
-    return find_possible(case, alone, unknown)
-
-
-def _power(
-    case: Case,
-    stack: Stack,
-    floor: Floor,
-    before: Callable[[], TwinPower] | None,
-    torque: Torque,
-    unknown: Set[str],
-    seed: int,
-    tell: Progress,
-) -> tuple[Explained, Refusals]:
-    """Find the causes of power on the joint torque that is explained; `before`: power on that of the twin, if other."""
-    power_of = TwinPower(stack, case.with_power, case.grouping, torque)
-    tried = _variants(case, "power")
-    system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
-    _check_observed(system)
-    level = None if floor.power is None else np.array([floor.power])
-    plain = before().system if before else None
-
-    def search(without: Set[Without]) -> tuple[Finding, Floor]:
-        return find("power", case, system, level, seed, without, plain, tell), floor
-
-    finding, _, refusals = find_possible(case, search, unknown)
-    return explained_power(stack, finding, torque, power_of), refusals
-
-
-def _variants(case: Case, signal: str) -> list[Effect]:
-    """Return every effect that shows in a signal, in every shape that is to be tried.
-
-    A robot keeps its bodies; those of a simulator are as drawn, and may be off.
-    """
-    bodies = any(run.role == "simulated" for run in case.runs)
-    return [
-        shape
-        for effect in catalogue().values()
-        if effect.signal == signal
-        and not effect.disturbance
-        and (bodies or not effect.bodies)
-        and can_show(effect, case.seen)
-        for shape in (*effect.candidates(case.robot), *(effect.changes() if case.others else ()))
-    ]
+    tried = found.shapes(variants(case, "torque")), variants(case, "power")
+    return torque_causes(case, stack, plain, floor, below, predicted, before, tried, unknown, seed, tell)

@@ -36,14 +36,16 @@ class EnergyErrors:
         return Change(before=before, after=after, noise_floor=None, interval95_after=(float(low), float(high)))
 
 
-def energy_errors(finding: Finding, motions: Sequence[Motion]) -> EnergyErrors:
-    """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones."""
+def energy_errors(finding: Finding, motions: Sequence[Motion], rest: Sequence[int] | None = None) -> EnergyErrors:
+    """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones.
+
+    `rest`: the columns that there are before; None: the twin as it is.
+    """
     mean = {m.run: float(np.mean(m.power)) for m in motions if m.power is not None}
     errors = []
-    for system, columns, noise in (
-        (finding.before, (), finding.rmse),
-        (finding.system, finding.chosen, finding.attribution.noise),
-    ):
+    after = finding.system, finding.chosen, finding.attribution.noise
+    before = (finding.before, (), finding.rmse) if rest is None else (finding.system, rest, finding.attribution.noise)
+    for system, columns, noise in (before, after):
         ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
         moments = system.moments(noise)
         total = summed(moments)

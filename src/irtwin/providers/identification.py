@@ -9,20 +9,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
-from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
+from irtwin.gap.choice import identified
 from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.motions import RobotMotions, robot_motions
 from irtwin.providers.provider import Made
-from irtwin.providers.records import inputs, stored_data_set
+from irtwin.providers.records import inputs, load_run, stored_data_set
+from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
+from irtwin.twin.choice import Choice
 from irtwin.twin.files import to_json
-from irtwin.twin.identify import identify
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 from irtwin.twin.validate import validate
 
@@ -33,11 +34,23 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
     A simulator's runs stay apart where the robot's own are there: they say what the simulator does.
     """
     known = robot_motions(workspace, robot_id)
-    with workspace.reading() as session:
-        effects = session.get_one(schema.Robot, robot_id).twin_effects
     parts = split(known.own, known.repeats)
-    twin = identify(known.robot, parts.fit, BASELINE if effects is None else tuple(effects.split(",")))
+    twin = identified(fitted_data_set(workspace, robot_id, known, parts), parts.fit)
     return twin_made(workspace, robot_id, twin, known, parts)
+
+
+def fitted_data_set(workspace: Workspace, robot_id: str, known: RobotMotions, parts: Split) -> DataSet:
+    """Return what is fitted as a data set, so that nothing is chosen or diagnosed by what judges."""
+    cut = {motion.run: float(motion.time[0]) for motion in parts.held_out}
+    names = {motion.run for motion in parts.fit}
+    runs = [_fitted(load_run(workspace, known.robot, known.keys[name]), cut.get(name), names) for name in sorted(names)]
+    said = stored_data_set(workspace, robot_id, known.robot)
+    return replace(said, runs=tuple(runs), cutoff=known.cutoff.hz)
+
+
+def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
+    signals = run.signals if until is None else run.signals.rows(run.signals.time < until)
+    return replace(run, signals=signals, repeat_of=run.repeat_of if run.repeat_of in names else None)
 
 
 def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotions, parts: Split) -> Made:
@@ -68,12 +81,30 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
         rows=[
             row,
             *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effect_ids),
+            *(_choice(twin_id, choice) for choice in twin.choices),
             *_runs(twin_id, keys, parts),
             *_parameters(twin_id, robot_id, twin),
             *_base_parameters(twin_id, twin),
             *_torque_fits(twin_id, robot_id, keys, twin, parts),
         ],
         documents={row.file: document},
+    )
+
+
+def _choice(twin_id: str, one: Choice) -> schema.TwinChoice:
+    return schema.TwinChoice(
+        choice_id=f"{twin_id}.{one.effect}.{'chosen' if one.chosen else 'open'}",
+        twin_id=twin_id,
+        effect=one.effect,
+        joints=", ".join(one.joints) or None,
+        chosen=one.chosen,
+        probability=one.probability,
+        rivals=", ".join(one.rivals) or None,
+        rmse_unit=one.unit,
+        rmse_without=one.rmse_without,
+        rmse_with=one.rmse_with,
+        energy_error_without_percent=one.energy_error_without,
+        energy_error_with_percent=one.energy_error_with,
     )
 
 

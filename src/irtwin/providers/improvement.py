@@ -15,13 +15,13 @@ from sqlalchemy import func, select
 from irtwin.document.experiment import Experiment
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
+from irtwin.gap.choice import identified
 from irtwin.gap.diagnosis import diagnose
 from irtwin.identification.validation import FIT_SHARE, Split
-from irtwin.providers.identification import twin_made
+from irtwin.providers.identification import fitted_data_set, twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions
 from irtwin.providers.provider import Made, software
-from irtwin.providers.records import inputs, load_run, load_twin, robot_iri, stored_data_set, twin_iri
-from irtwin.signals.log import DataSet, Run
+from irtwin.providers.records import inputs, load_twin, robot_iri, twin_iri
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
@@ -30,7 +30,7 @@ from irtwin.twin.twin import Twin
 from irtwin.twin.validate import validate
 
 WITHIN, BETTER, NO_BETTER = "within the limit", "better", "no better"
-_SAME, _DIAGNOSED = "same effects", "effects of a diagnosis"
+_SAME, _CHOSEN, _DIAGNOSED = "same effects", "effects that the data show", "effects of a diagnosis"
 _ROUNDS = "improvement_round/"
 
 Announce = Callable[[str], None]
@@ -69,8 +69,9 @@ def improve(
 ) -> Improved:
     """Better a robot's twin by new logs that the workspace holds already, `names`; limit: energy error, %.
 
-    A round fits the effects of the twin again. Where that leaves it beyond the limit, another adds the effects that a
-    diagnosis of the fitted data finds. A twin that is no better than the one before is not kept. Each round is stored.
+    A round fits the effects of the twin again. Where that leaves it beyond the limit, another chooses them anew, if
+    nobody named them, and one adds the effects that a diagnosis of the fitted data finds. A twin that is no better than
+    the one before is not kept. Each round is stored.
     Raises InputError where nothing that is held out has measured power.
     """
     known = robot_motions(workspace, robot_id)
@@ -78,18 +79,26 @@ def improve(
     before = _parts_before(workspace, known, twin_id, names)
     loop = _Loop(workspace, robot_id, known, limit, announce, _Twin(twin_id, twin, before))
     parts = _parts_with(known, before, names)
-    loop.try_out(_SAME, twin.effects, parts)
+    fitted = fitted_data_set(workspace, robot_id, known, parts)
+
+    def fit(effects: Sequence[str | Effect]) -> Twin:
+        return identify(known.robot, parts.fit, effects)
+
+    loop.try_out(_SAME, lambda: replace(fit(twin.effects), choices=twin.choices), parts)
+    if not loop.within and fitted.effects is None:
+        loop.try_out(_CHOSEN, lambda: identified(fitted, parts.fit), parts)
     experiment = None
     if not loop.within:
         announce("  looking for effects that the twin lacks")
         try:
-            found = diagnose(_data_set(workspace, robot_id, known, twin, parts))
+            found = diagnose(replace(fitted, effects=loop.best.twin.effect_ids))
         except InputError as error:
             announce(f"  these runs do not say: {error}")
         else:
             experiment = found.experiment
-            if found.twin is not None and found.twin.effects != twin.effects:
-                loop.try_out(_DIAGNOSED, found.twin.effects, parts)
+            effects = None if found.twin is None else found.twin.effects
+            if effects is not None and effects != loop.best.twin.effects:
+                loop.try_out(_DIAGNOSED, lambda: fit(effects), parts)
     _keep_twin(workspace, robot_id, known, loop.best)
     return Improved(tuple(loop.rounds), loop.within, experiment)
 
@@ -111,11 +120,11 @@ class _Loop:
         """Whether the best twin is within the limit on every run that it is judged on."""
         return _worst(self.best.twin, _judged(self.best.parts)) <= self.limit
 
-    def try_out(self, tried: str, effects: Sequence[str | Effect], parts: Split) -> None:
-        """Fit effects, judge the twin beside the best so far, and store the round."""
+    def try_out(self, tried: str, fit: Callable[[], Twin], parts: Split) -> None:
+        """Fit a twin, judge it beside the best so far, and store the round."""
         started = datetime.now(UTC)
         self.announce(f"  fitting the {tried}")
-        twin = identify(self.known.robot, parts.fit, effects)
+        twin = fit()
         found = _Twin(_made(self.workspace, self.robot_id, self.known, twin, parts)[0], twin, parts)
         before, after = _worst(self.best.twin, parts.held_out), _worst(twin, parts.held_out)
         earlier = self.best.twin_id
@@ -193,20 +202,6 @@ def _worst(twin: Twin, motions: Sequence[Motion]) -> float:
     if not errors:
         raise InputError(f"{twin.robot.name}: no run outside the fit has measured power to judge by; log power")
     return max(errors)
-
-
-def _data_set(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> DataSet:
-    """Return what was fitted as a data set, so that a diagnosis sees nothing of what judges."""
-    cut = {motion.run: float(motion.time[0]) for motion in parts.held_out}
-    names = {motion.run for motion in parts.fit}
-    runs = [_fitted(load_run(workspace, known.robot, known.keys[name]), cut.get(name), names) for name in sorted(names)]
-    said = stored_data_set(workspace, robot_id, known.robot)
-    return replace(said, runs=tuple(runs), effects=twin.effect_ids)
-
-
-def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
-    signals = run.signals if until is None else run.signals.rows(run.signals.time < until)
-    return replace(run, signals=signals, repeat_of=run.repeat_of if run.repeat_of in names else None)
 
 
 def _made(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:

@@ -252,7 +252,7 @@ def twin_iri(twin_id: str) -> str:
 
 
 def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robot) -> log.DataSet:
-    """Return what the data set of a robot said, but for its runs and effects."""
+    """Return what the data set of a robot said, but for its runs."""
     with workspace.reading() as session:
         row = session.get_one(Robot, robot_id)
     notes = parse_json(row.notes)
@@ -260,7 +260,7 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
         folder=Path(robot_id),
         robot=robot,
         runs=(),
-        effects=None,
+        effects=None if row.twin_effects is None else tuple(row.twin_effects.split(",")),
         ambient_temperature=row.ambient_temperature_degc,
         power_at=row.power_measured_at,
         simulated=row.simulated,

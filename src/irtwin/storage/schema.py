@@ -286,7 +286,7 @@ class ImprovementRound(Base):
     round_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
     number: Mapped[int]
-    tried: Mapped[str]  # "same effects" or "effects of a diagnosis"
+    tried: Mapped[str]  # "same effects", "effects that the data show" or "effects of a diagnosis"
     effects: Mapped[str]  # comma separated
     earlier_twin_id: Mapped[str]
     tried_twin_id: Mapped[str]
@@ -304,6 +304,29 @@ class TwinEffect(Base):
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class TwinChoice(Base):
+    """An effect that was chosen by what the fitted runs show, or that they could not tell, and what it is worth.
+
+    Worth is on groups of runs left out of the fit in turn, without the effect and with it.
+    """
+
+    __tablename__ = "twin_choice"
+
+    choice_id: Mapped[str] = mapped_column(primary_key=True)  # `twin_id.effect.` and "chosen" or "open"
+    twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
+    effect: Mapped[str]
+    joints: Mapped[str | None]  # comma separated; none for an effect of the whole robot
+    chosen: Mapped[bool]
+    probability: Mapped[float]
+    rivals: Mapped[str | None]  # comma separated
+    rmse_unit: Mapped[str | None]  # "N m" or "N" of torque, "W" of power
+    rmse_without: Mapped[float | None]
+    rmse_with: Mapped[float | None]
+    energy_error_without_percent: Mapped[float | None]
+    energy_error_with_percent: Mapped[float | None]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

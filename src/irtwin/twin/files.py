@@ -18,6 +18,7 @@ from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
+from irtwin.twin.choice import Choice
 from irtwin.twin.torque_scale import TorqueScale
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
@@ -44,6 +45,15 @@ _TORQUE_SCALE: _Columns = {
     "low": (float,),
     "high": (float,),
     "why": (str,),
+}
+_CHOICE: _Columns = {
+    "effect": (str,),
+    "probability": (float,),
+    "unit": (str, None),
+    "rmse_without": (float, None),
+    "rmse_with": (float, None),
+    "energy_error_without": (float, None),
+    "energy_error_with": (float, None),
 }
 _BASE_PARAMETER: _Columns = {
     "name": (str,),
@@ -87,6 +97,8 @@ def to_json(twin: Twin) -> str:
         document["torque_scale"] = asdict(twin.torque_scale)
     if twin.quantities:
         document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
+    if twin.choices:
+        document["choices"] = [asdict(choice) for choice in twin.choices]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
@@ -114,6 +126,7 @@ def from_json(text: str | bytes, path: Path) -> Twin:
         if "quantities" in document
         else (),
         torque_scale=_torque_scale(reader) if "torque_scale" in document else None,
+        choices=tuple(map(_choice, reader.each("choices"))) if "choices" in document else (),
     )
     _check_complete(path, twin)
     return replace(twin, covariance=_covariance(reader)) if "covariance" in document else twin
@@ -146,6 +159,11 @@ class _Reader:
             raise self.fail(key, "is not a finite number")
         return value
 
+    def truth(self, key: str) -> bool:
+        if not isinstance(self.values.get(key), bool):
+            raise self.fail(key, "is neither true nor false")
+        return bool(self.values[key])
+
     def inner(self, key: str) -> _Reader:
         return _Reader(self.path, self.take(key, dict), f'in "{key}": ')
 
@@ -156,8 +174,10 @@ class _Reader:
         return list(values)
 
     def rows(self, key: str, columns: _Columns) -> list[dict[str, Any]]:
-        rows = [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
-        return [row.columns(columns) for row in rows]
+        return [row.columns(columns) for row in self.each(key)]
+
+    def each(self, key: str) -> list[_Reader]:
+        return [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
 
     def columns(self, columns: _Columns) -> dict[str, Any]:
         return {name: self.take(name, *kinds) for name, kinds in columns.items()}
@@ -165,6 +185,11 @@ class _Reader:
 
 def _torque_scale(reader: _Reader) -> TorqueScale:
     return TorqueScale(**reader.inner("torque_scale").columns(_TORQUE_SCALE))
+
+
+def _choice(reader: _Reader) -> Choice:
+    joints, rivals = (tuple(reader.texts(key)) for key in ("joints", "rivals"))
+    return Choice(**reader.columns(_CHOICE), joints=joints, rivals=rivals, chosen=reader.truth("chosen"))
 
 
 def _covariance(reader: _Reader) -> np.ndarray:

@@ -14,6 +14,7 @@ from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
+from irtwin.twin.choice import Choice
 from irtwin.twin.torque_scale import TorqueScale
 
 _PIECE = 8192  # samples whose regressor is held at once
@@ -62,7 +63,7 @@ class Twin:
     are the coefficients that predict; `quantities` what they say in the catalogue's terms, where that differs.
     `covariance` (p, p) is that of the p parameters, so that 1.96 deviations are half a 95 % interval; None: not known.
     Neither it nor the parameters' intervals hold how sure the scale of the fitted torque is: `torque_scale`; None: no
-    torque was fitted, or nobody asked.
+    torque was fitted, or nobody asked. `choices`: which effects were chosen by what data show, where nobody named them.
     """
 
     robot: Robot
@@ -76,6 +77,7 @@ class Twin:
     quantities: tuple[Parameter, ...] = ()
     covariance: np.ndarray | None = field(default=None, repr=False, compare=False)
     torque_scale: TorqueScale | None = None
+    choices: tuple[Choice, ...] = ()
 
     @property
     def knows_power(self) -> bool:
@@ -151,7 +153,8 @@ class Twin:
     def ledger(self, motion: Motion) -> tuple[LedgerEntry, ...]:
         """Return where the energy goes: per effect and joint, J; the entries sum to `energy`.
 
-        Mechanical power is entered under the effects of torque that take it.
+        Mechanical power is entered under the effects of torque that take it. What a meter adds is no entry: each holds
+        its part of that, in proportion.
         """
         entries: dict[tuple[str, str | None], float] = {}
 
@@ -175,7 +178,10 @@ class Twin:
                 for joint, index in zip(*np.nonzero(self.stack.pattern & self.stack.real), strict=True):
                     effect, _ = self.stack.torque_terms[index]
                     enter(effect.id, self.robot.joint_names[joint], float(work[joint, index]))
-        return tuple(LedgerEntry(effect, joint, value) for (effect, joint), value in entries.items())
+        shown = {effect.id for effect, _ in self.stack.power_terms if effect.channel == "measurement"}
+        real = {place: value for place, value in entries.items() if place[0] not in shown}
+        scale = sum(entries.values()) / total if (total := sum(real.values())) else 1.0
+        return tuple(LedgerEntry(effect, joint, scale * value) for (effect, joint), value in real.items())
 
     def value(self, effect: str, term: Term) -> float:
         """Return the identified value of an effect's coefficient."""

@@ -127,4 +127,5 @@ def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:
         tuple(replace(one, variants=tuple(map(equations.in_torque, one.variants))) for one in mine),
         both.visible[inside],
         tuple(equations.in_torque(both.shapes[k]) for k in inside),
+        both.log_odds[inside],
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,10 +32,10 @@ class Finding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
-    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `closed_squares`: what
-    each cause closes of the squares of each group left out and equation, (C, G, g); `part`: theirs of all that is
-    closed, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where `system`
-    stands on torque that causes explain; `beside`: power's, if both were fitted.
+    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is
+    closed theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where
+    `system` stands on torque that causes explain; `beside`: power's, if both were fitted. `seed` draws orders of many
+    causes; `tell` is told how far that has come.
     """
 
     name: str
@@ -46,10 +46,16 @@ class Finding:
     held_out: HeldOut
     floor: np.ndarray | None
     estimate: Estimate
-    closed_squares: np.ndarray
     part: float = 1.0
     plain: System | None = None
     beside: BesidePower | None = None
+    seed: int = 0
+    tell: Tell | None = field(default=None, repr=False, compare=False)
+
+    @cached_property
+    def closed_squares(self) -> np.ndarray:
+        """(C, G, g) what each cause closes of the squares of each group left out and equation."""
+        return closed_squares(self.system, self.attribution, self.seed, self.tell)
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -160,9 +166,10 @@ def finding_of(
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain, tell)
-    closed = closed_squares(system, found, seed, tell)
     fitted = estimate_of(system, chosen, tell) if beside is None else beside.estimate(chosen, tell)
-    return Finding(name, places, observed, system, found, judged, floor, fitted, closed, plain=plain, beside=beside)
+    return Finding(
+        name, places, observed, system, found, judged, floor, fitted, plain=plain, beside=beside, seed=seed, tell=tell
+    )
 
 
 def attributed(

@@ -27,7 +27,7 @@ Found = tuple[Hypothesis, Variant]
 class Attribution:
     """The causes found, ranked by gain; `noise` (g,) what they leave; `visible` (H, 2) of each hypothesis before any:
     what it adds beyond what the twin imitates, as a mean square in units of the noise, and as a part of all it adds;
-    `shapes` of each beside the causes.
+    `shapes` of each beside the causes, and `log_odds` (H,) that it is there beside them.
     """
 
     causes: tuple[Cause, ...]
@@ -35,6 +35,7 @@ class Attribution:
     hypotheses: tuple[Hypothesis, ...]
     visible: np.ndarray
     shapes: tuple[Variant, ...]
+    log_odds: np.ndarray
 
 
 def attribute(
@@ -65,7 +66,9 @@ def attribute(
     after = search.beside(found, noise)
     known |= {(one.effect, one.scope, one.joint): after.variant(k) for k, one in enumerate(after.hypotheses)}
     best = [known.get((one.effect, one.scope, one.joint), shape) for one, shape in zip(candidates, shapes, strict=True)]
-    return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, tuple(best))
+    odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
+    beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
+    return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, tuple(best), beside)
 
 
 @dataclass(frozen=True)
@@ -87,15 +90,19 @@ class _Search:
             self.tried[asked] = self._beside(found, noise)
         return self.tried[asked]
 
-    def _beside(self, found: Sequence[Found], noise: np.ndarray, like: Hypothesis | None = None) -> Posterior:
-        """Try all candidates, or those alone that are at the place of one and in its scope."""
+    def instead(self, one: Found, found: Sequence[Found], noise: np.ndarray) -> Posterior:
+        """Try what may stand in the place of one hypothesis of a structure, beside the others."""
+        rest = [each for each in found if each is not one]
+        return self._beside(rest, noise, [other for other in self.candidates if overlap(other, one[0])])
+
+    def _beside(self, found: Sequence[Found], noise: np.ndarray, some: Sequence[Hypothesis] | None = None) -> Posterior:
+        """Try all candidates, or some of them."""
         chosen = _columns(found)
         taken = set(chosen)
         left = [
             one
-            for one in self.candidates
-            if (like is None or _where(one) == _where(like))
-            and not any(set(variant.columns) & taken for variant in one.variants)
+            for one in (self.candidates if some is None else some)
+            if not any(set(variant.columns) & taken for variant in one.variants)
             and not any(_same_place(one, each) for each, _ in found)
         ]
         line = f"  {len(left)} hypotheses, beside {len(found)} that are found"
@@ -159,7 +166,7 @@ class _Search:
 
     def odds(self, one: Found, found: Sequence[Found], noise: np.ndarray) -> float:
         """Return the log odds of one hypothesis of a structure beside the others."""
-        posterior = self.beside([each for each in found if each is not one], noise)
+        posterior = self.instead(one, found, noise)
         return float(posterior.log_odds[_index(posterior, one[0])])
 
     def settled(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
@@ -199,10 +206,11 @@ class _Search:
         """
         pairs: list[list[Found]] = []
         explained, costs, scales = [], [], []
-        alone = self._beside(rest, noise, like)
+        there = [one for one in self.candidates if _where(one) == _where(like)]
+        alone = self._beside(rest, noise, there)
         for first, hypothesis in enumerate(alone.hypotheses):
             found = hypothesis, alone.variant(first)
-            beside = self._beside([*rest, found], noise, like)
+            beside = self._beside([*rest, found], noise, there)
             second = beside.first(-np.inf)
             if second is not None:
                 pairs.append([found, (beside.hypotheses[second], beside.variant(second))])
@@ -224,8 +232,7 @@ class _Search:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""
         parts: dict[tuple[str, str], list[Cause]] = {}
         for one in found:
-            rest = [each for each in found if each is not one]
-            parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.beside(rest, noise)))
+            parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.instead(one, found, noise)))
         return tuple(sorted(map(_joined, parts.values()), key=lambda cause: -cause.gain))
 
 

@@ -42,9 +42,9 @@ def held_out(
     before anything was added, if others. `tell` is told how far that has come, where it takes long.
     """
     judged = np.flatnonzero(system.group_observed)
-    before = _left_out(plain or system, (plain or system).moments(noise), (), judged, tell)
+    before = left_out(plain or system, (plain or system).moments(noise), (), judged, tell)
     anything = len(chosen) > 0 or plain is not None
-    after = _left_out(system, system.moments(noise_after), chosen, judged, tell) if anything else before
+    after = left_out(system, system.moments(noise_after), chosen, judged, tell) if anything else before
     return HeldOut(before, after, system.rows[judged])
 
 
@@ -90,9 +90,10 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
     return [float(value) for value in np.quantile(drawn, [0.025, 0.975])]
 
 
-def _left_out(
-    system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray, tell: Tell | None
+def left_out(
+    system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray, tell: Tell | None = None
 ) -> np.ndarray:
+    """Return the squares that a fit with the chosen columns leaves of each judged group without it, (G, g)."""
     total, told, found = summed(moments), paced(tell), []
     for group in judged:
         told(f"  how far the gap closes, group {group + 1} of {len(moments)} left out")

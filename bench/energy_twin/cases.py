@@ -1,0 +1,152 @@
+"""Robots whose energy is known part by part: logs in memory, and what was true of them.
+
+Two plants. `exact` has the catalogue's own laws on motions that are followed exactly; `plant` is the bench's own, under
+a controller in MuJoCo, whose laws of iron, inverter, friction and brakes are others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from blind.motions import exciting, work
+from irtwin.robot.description import Robot
+from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.channels import Signals
+from irtwin.signals.log import DataSet, Run
+from plant.arm import Payload
+from plant.effects import Effect
+from plant.fleet import Fleet, Traces
+from plant.logger import coloured
+from plant.logger import power as meter
+from plant.logger import torque as shown
+from plant.machine import Machine, build, read_drawings
+from plant.motion import Motion
+
+ROBOTS = {"kuka_kr6_r700": "KR6", "elbow6": "UR10-like", "slim7": "Panda-like"}
+LAYOUT = "xwxwxxwxwwxw"  # exciting motions, and work with pauses
+SECONDS, STEP, STRIDE = 9.6, 0.002, 4  # s; 1,200 samples a run
+BRAKES, STICKING, LOADED = 30.0, 0.4, 0.05  # W; of Coulomb friction; of the load
+SUPPLY = ("copper_loss", "iron_loss", "inverter_loss", "no_regeneration")
+MORE = ("holding_brakes", "stribeck_friction", "load_dependent_friction")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A data set and its truth: the `effects` beyond the baseline, `standby` W, energy of copper a run, J."""
+
+    name: str
+    data_set: DataSet
+    effects: tuple[str, ...]
+    standby: float
+    copper: dict[str, float]
+
+
+def cases(seeds: int, only: str = "") -> Iterator[Case]:
+    """Yield each robot of each plant, with and without what is more than losses of drives; `only` in their names."""
+    for exact, robot, more, seed in product((True, False), ROBOTS, (False, True), range(seeds)):
+        name = f"{'exact' if exact else 'plant'} {ROBOTS[robot]}{' more' if more else ''} {seed}"
+        if only in name:
+            yield _case(name, robot, seed, exact=exact, more=more)
+
+
+def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
+    drawings = replace(read_drawings(robot), step=STEP)
+    machine = build(drawings, 300 + seed)
+    rng = np.random.default_rng([7, seed, exact, more])
+    n = len(drawings.joints)
+    motions = [
+        exciting(drawings, SECONDS, 0.8, 0.6, rng) if kind == "x" else work(drawings, SECONDS, n, 0.6, rng)
+        for kind in LAYOUT
+    ]
+    effects = _effects(machine, len(motions), more)
+    traces = _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng)
+    copper = (machine.drive.resistance * (traces.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
+    drawn = _power(machine, traces, copper, more) if exact else meter(traces, machine, effects, STEP)
+    sensed = shown(traces, machine, (), STEP)[::STRIDE]
+    sensors, cut = drawings.sensors, slice(None, None, STRIDE)
+    noise = np.random.default_rng([9, seed])
+    sensed = sensed + sensors.torque_noise * coloured(noise, sensed.shape)
+    drawn = drawn[cut] + sensors.meter_noise * coloured(noise, drawn[cut].shape)
+    q = traces.q[cut] + 2e-6 * noise.standard_normal(traces.q[cut].shape)
+    time = STEP * STRIDE * np.arange(len(q))
+    runs = [
+        _run(f"run_{k + 1:02d}", Signals(time, q[:, k], torque=sensed[:, k], power=drawn[:, k]))
+        for k in range(len(motions))
+    ]
+    listed = (*SUPPLY, *(MORE if more else ()))
+    known = DataSet(Path(robot), _described(machine), tuple(runs), None, None, "dc_bus", True, {})
+    heat = {run.name: float(np.trapezoid(copper[:, k], dx=STEP)) for k, run in enumerate(runs)}
+    return Case(name, known, listed, drawings.supply.standby, heat)
+
+
+def _run(name: str, signals: Signals) -> Run:
+    return Run(name, Path(name), "", "observed", 0.0, (0.0, 0.0, 0.0), None, None, {}, signals)
+
+
+def _described(machine: Machine) -> Robot:
+    """Return the robot as its maker draws it, with the name plates of its drives."""
+    drawings, drive = machine.drawings, machine.drawings.drive
+    robot = parse_urdf(drawings.urdf)
+    plates = zip(robot.joints, drive.gear_ratio, drive.joint_torque_constant, drive.resistance, strict=True)
+    return replace(
+        robot,
+        joints=tuple(
+            replace(joint, gear_ratio=float(gear), torque_constant=float(constant), winding_resistance=float(ohm))
+            for joint, gear, constant, ohm in plates
+        ),
+    )
+
+
+def _effects(machine: Machine, runs: int, more: bool) -> tuple[Effect, ...]:
+    every, joints = np.ones(runs, dtype=bool), tuple(range(len(machine.drawings.joints)))
+    found = [Effect(name, joints, every, 1.0) for name in SUPPLY]
+    if more:
+        found.append(Effect("holding_brakes", joints, every, BRAKES))
+        found.append(Effect("load_dependent_friction", joints, every, LOADED))
+        for joint, level in enumerate(machine.friction.coulomb):
+            found.append(Effect("stribeck_friction", (joint,), every, STICKING * level, {"speed": 0.06}))
+    return tuple(found)
+
+
+def _simulated(
+    machine: Machine, motions: list[Motion], effects: tuple[Effect, ...], rng: np.random.Generator
+) -> Traces:
+    runs, n = len(motions), len(machine.drawings.joints)
+    jitter = 1 + machine.drawings.tolerance.friction_per_run * rng.standard_normal((runs, 2, n)).clip(-2, 2)
+    return Fleet(machine, motions, [Payload()] * runs, np.full((runs, n), 35.0), jitter, STEP).run(effects)
+
+
+def _followed(machine: Machine, motions: list[Motion], more: bool) -> Traces:
+    """Return the motions followed exactly, under the catalogue's laws of friction."""
+    arm, friction, rotor = machine.arm(Payload()), machine.friction, machine.drive.joint_inertia
+    arm.model.dof_armature[:] = 0.0
+    q, dq, ddq = (np.stack([getattr(one, name) for one in motions], axis=1) for name in ("q", "dq", "ddq"))
+    flat = (x.reshape(-1, x.shape[2]) for x in (q, dq, ddq))
+    load = np.array([arm.inverse_dynamics(*state) for state in zip(*flat, strict=True)])
+    load = load.reshape(q.shape) + rotor * ddq
+    sign = np.where(np.abs(dq) < 1e-6, 0.0, np.sign(dq))
+    dry = friction.coulomb * np.ones_like(q)
+    torque = load + dry * sign + friction.viscous * dq
+    if more:
+        torque = torque + STICKING * friction.coulomb * sign * np.exp(-np.abs(dq) / 0.05)
+        torque = torque + LOADED * np.abs(torque) * sign
+    return Traces(q, dq, ddq, torque, np.full_like(q, 35.0))
+
+
+def _power(machine: Machine, traces: Traces, copper: np.ndarray, more: bool) -> np.ndarray:
+    """Return the power (T, R) W of these: iron with speed and its square, inverters with current, a chopper."""
+    drive, speed = machine.drive, np.abs(traces.dq) * machine.drive.gear_ratio / 314.16
+    iron = drive.iron_loss * (0.5 * speed + 0.5 * speed**2)
+    inverter = 2.0 * np.abs(traces.torque) / drive.joint_torque_constant
+    axes = (traces.torque * traces.dq + iron + inverter).sum(axis=2) + copper
+    total = np.maximum(axes, 0.0) + machine.drawings.supply.standby
+    if not more:
+        return total
+    moving = (np.abs(traces.dq) > 0.01).any(axis=2)
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(moving))[:, None], -(10**9)), axis=0)
+    return total + BRAKES * ((np.arange(len(moving))[:, None] - last) * STEP <= 0.5)
