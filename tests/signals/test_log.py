@@ -312,6 +312,14 @@ def test_what_the_log_format_does_not_know_is_a_note(folder, old, new, said):
     assert read_data_set(folder).repairs == tuple(f"{file}: {line}" for line in said)
 
 
+def test_a_log_alone_is_no_data_set_and_import_makes_one(tmp_path: Path) -> None:
+    log = write_csv(tmp_path / "log.csv", columns())
+    with pytest.raises(
+        InputError, match=r"log\.csv: is a file; .*`irtwin import .*log\.csv --robot ROBOT --out FOLDER`"
+    ):
+        read_data_set(log)
+
+
 def test_a_folder_without_a_data_set(tmp_path):
     with pytest.raises(InputError, match=r"dataset\.toml: not found"):
         read_data_set(tmp_path)

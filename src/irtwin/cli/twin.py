@@ -178,7 +178,7 @@ def case_study(workspace: Path) -> None:
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option(
     "--cutoff",
-    type=Number(),
+    type=Number(min=0.0, min_open=True),
     metavar="HZ",
     help="Cutoff of the low-pass filter that all runs pass. Default: that of dataset.toml, else it is found.",
 )
