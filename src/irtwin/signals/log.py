@@ -210,8 +210,8 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
 def _document(file: Path) -> dict[str, Any]:
     if file.parent.is_file():
         raise InputError(
-            f"{file.parent}: is a file; a data set is a folder: `irtwin import {file.parent} --robot ROBOT --out FOLDER` "
-            "makes one of a log"
+            f"{file.parent}: is a file; a data set is a folder: "
+            f"`irtwin import {file.parent} --robot ROBOT --out FOLDER` makes one of a log"
         )
     real = real_path(file)
     if real is None or not real.exists():
