@@ -81,7 +81,7 @@ def test_what_is_wrong_is_said_before_anything_is_made(tmp_path: Path, workspace
         (["--workspace", tmp_path / "none"], "no workspace here"),
         (["--workspace", tmp_path / "none", "--follow"], "no workspace here"),
         (["--workspace", workspace, "--config", "a.toml"], "--config goes with --follow"),
-        (["--workspace", workspace, "--follow", "--config", "a.toml"], "a.toml: not found"),
+        (["--workspace", workspace, "--follow", "--config", "a.toml"], "a.toml: cannot be read"),
         (["--workspace", workspace, "--robot", "nobody"], "there is no robot 'nobody'"),
     ):
         told = in_this_process("alarms", *given)

@@ -129,7 +129,8 @@ class Effect(ABC):
     `drawn_at_rest` does not depend on the motion, and what `scales_power` multiplies all that a meter shows. A
     `disturbance` goes its own way, so that no run tells when it acts in another, and repeats of a motion show it; the
     word says as what, "line" or "switching". `manual_test` is what a person can do to show it where no motion does;
-    `taken_off` says how a run without it is made. What its parameters can be is `possible`.
+    `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call its coefficients, of those that
+    they have. What its parameters can be is `possible`.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -154,6 +155,7 @@ class Effect(ABC):
     disturbance: ClassVar[str | None] = None
     manual_test: ClassVar[str | None] = None
     taken_off: ClassVar[str | None] = None
+    in_mjcf: ClassVar[Mapping[str, str]] = {}
     of_change: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 

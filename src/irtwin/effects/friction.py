@@ -70,6 +70,7 @@ class CoulombFriction(JointEffect):
     id: ClassVar[str] = "coulomb_friction"
     family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
+    in_mjcf: ClassVar[Mapping[str, str]] = {"Fc": "frictionloss"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fc."""
@@ -92,6 +93,7 @@ class ViscousFriction(JointEffect):
     id: ClassVar[str] = "viscous_friction"
     family: ClassVar[str] = "friction"
     channel: ClassVar[str] = "torque"
+    in_mjcf: ClassVar[Mapping[str, str]] = {"Fv": "damping"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fv."""

@@ -6,13 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from irtwin.document.document import Cause, Document
+from irtwin.effects.catalogue import catalogue
 from irtwin.simulator.model import Model
-
-_NUMBERS = {
-    ("rotor_inertia", "Ia"): "armature",
-    ("viscous_friction", "Fv"): "damping",
-    ("coulomb_friction", "Fc"): "frictionloss",
-}
 
 
 @dataclass(frozen=True)
@@ -32,7 +27,7 @@ def differences(model: Model, document: Document) -> tuple[Difference, ...]:
     found = []
     for cause in _likely(document):
         for parameter in cause.parameters:
-            name = _NUMBERS.get((cause.effect, parameter.name))
+            name = catalogue()[cause.effect].in_mjcf.get(parameter.name)
             if name is not None and parameter.joint is not None:
                 before = model.numbers(parameter.joint)[name]
                 moved = (parameter.value, *(parameter.interval95 or ()))
@@ -44,7 +39,7 @@ def differences(model: Model, document: Document) -> tuple[Difference, ...]:
 
 def not_held(document: Document) -> tuple[Cause, ...]:
     """Return the likely causes that no number of a joint can hold."""
-    return tuple(cause for cause in _likely(document) if not any(effect == cause.effect for effect, _ in _NUMBERS))
+    return tuple(cause for cause in _likely(document) if not catalogue()[cause.effect].in_mjcf)
 
 
 def written(model: Model, found: Sequence[Difference]) -> bytes:
