@@ -52,3 +52,11 @@ def test_a_file_for_the_model_needs_a_model(tmp_path):
     said = irtwin("diagnose", tmp_path, "--save-simulator", tmp_path / "new.xml")
     assert said.status == 2
     assert "--save-simulator writes the model of --simulator: give that too" in said.err
+
+
+def test_the_model_itself_is_not_written_over(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_text("<mujoco/>")
+    said = irtwin("diagnose", tmp_path, "--simulator", file, "--save-simulator", file)
+    assert (said.status, file.read_text()) == (2, "<mujoco/>")
+    assert "--save-simulator names the model itself" in said.err

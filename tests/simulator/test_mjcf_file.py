@@ -71,6 +71,13 @@ def test_what_is_no_model_or_reaches_outside_is_refused(tmp_path, text, said):
         read_mjcf(model(tmp_path, text))
 
 
+def test_a_model_in_another_encoding_is_refused(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_bytes("<mujoco/>".encode("utf-16"))
+    with pytest.raises(InputError, match=r"arm\.xml, line 1: not UTF-8 text \(byte 1\); save it as UTF-8"):
+        read_mjcf(file)
+
+
 def test_included_files_are_looked_at_too(tmp_path):
     (tmp_path / "part.xml").write_text('<mujocoinclude><include file="/etc/hosts"/></mujocoinclude>', encoding="utf-8")
     with pytest.raises(InputError, match=r"part\.xml: <include file=\"/etc/hosts\"> is outside"):

@@ -218,6 +218,8 @@ def diagnose(
 
     if save_simulator and not simulator:
         raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
+    if save_simulator and simulator and save_simulator.absolute() == simulator.absolute():
+        raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
     found = workflow.diagnose(
         dataset,
         twin=twin,

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from irtwin.errors import InputError
-from irtwin.input_file import read_input, real_path
+from irtwin.input_file import as_text, read_input, real_path
 
 _MOST = 20_000_000  # bytes
 _FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
@@ -66,6 +66,7 @@ def read_mjcf(path: Path) -> MjcfFile:
 
 def _scanned(path: Path) -> MjcfFile:
     content = read_input(path, _MOST)
+    as_text(path, content)  # what is changed is sought byte by byte
     tags: list[Tag] = []
     parser = expat.ParserCreate()
 
