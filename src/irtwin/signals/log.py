@@ -208,12 +208,12 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
 
 
 def _document(file: Path) -> dict[str, Any]:
-    if file.parent.is_file():
+    folder, real = real_path(file.parent), real_path(file)
+    if folder is not None and folder.is_file():
         raise InputError(
             f"{file.parent}: is a file; a data set is a folder: "
             f"`irtwin import {file.parent} --robot ROBOT --out FOLDER` makes one of a log"
         )
-    real = real_path(file)
     if real is None or not real.exists():
         raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
     return read_toml(file)
