@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.storage.series_place import are_elsewhere
+from irtwin.storage.series_place import are_elsewhere, elsewhere
 
 Current = Callable[[bool], KnowledgeGraph]  # the graph as it is now; True: not even half a second old
 
@@ -46,7 +46,8 @@ class Source:
 
     @contextmanager
     def reading(self) -> Iterator[Current]:
-        """Give what gives the graph as it is. Raises InputError where there is none."""
+        """Give what gives the graph as it is. Raises InputError where there is none, or its series cannot be read."""
+        elsewhere(self.workspace)  # what it imports, too: workers limit their memory afterwards
         if self.url is None:
             with Snapshot(self.folder) as snapshot:
                 yield snapshot.current

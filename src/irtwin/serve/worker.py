@@ -26,7 +26,6 @@ from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.source import Source
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
-from irtwin.storage.series_place import elsewhere
 
 FRAME = struct.Struct(">cI")
 SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
@@ -78,7 +77,6 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
     source = Source.told(json.loads(sys.stdin.buffer.readline()))
     if not source.needs_network:
         leave_network()
-    elsewhere(source.workspace)  # what it imports, too
     with source.reading() as current:
         limit_memory(memory)
         _frame(out, b"H", b"{}")
