@@ -67,7 +67,8 @@ def drop(
         journals = of_robot(place.folder / LIVE, robot_id)
         if set(journals) - set(left_behind(place.folder / LIVE)):
             raise InputError(f'{place.folder}: "{robot}" is being watched; stop `irtwin live` first')
-        made = [*journals, *proposal_files(place, robot_id), place.report_path(robot_id)]
+        reports = place.report_path(robot_id), place.gap_report_path(robot_id)
+        made = [*journals, *proposal_files(place, robot_id), *reports]
         place.drop_robot(robot_id)
         for file in made:
             files.remove(file)

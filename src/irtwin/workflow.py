@@ -40,7 +40,7 @@ from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.extensions import check as check_extensions
-from irtwin.report.gap.page import render_alone
+from irtwin.report.gap.page import render_alone, render_gap
 from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.simulator.differences import differences, written
@@ -162,8 +162,10 @@ def diagnose(
         render_alone(data_set, found.document, found.curves, report, resources.resources_of(kept_in))
     if kept_in is not None:
         announce("Storing the diagnosis")
-        with Workspace(kept_in, database) as place, rewriting(place, graph_url, announce) as graph:
-            _store(place, graph, data_set, found, announce)
+        with Workspace(kept_in, database) as place:
+            with rewriting(place, graph_url, announce) as graph:
+                _store(place, graph, data_set, found, announce)
+            _write_gap_report(place, graph_url, identifier(data_set.robot.name))
     return found
 
 
@@ -399,6 +401,13 @@ def write_report(place: Workspace, graph_url: str | None, robot_id: str) -> Path
         scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
         render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), place.resources)
     return out
+
+
+def _write_gap_report(place: Workspace, graph_url: str | None, robot_id: str) -> None:
+    """Write the report of a robot's last diagnosis from the graph as it stands."""
+    out = place.gap_report_path(robot_id)
+    with open_graph(place.folder, graph_url) as graph:
+        render_gap(graph, graph.iri(robot_iri(robot_id)), place.read_document, out, place.resources)
 
 
 def _clocked(announce: Announce) -> Announce:

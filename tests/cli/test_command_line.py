@@ -133,6 +133,7 @@ def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_pat
     for joint in ("joint_1", "joint_2"):
         error = np.std(np.array(said[f"tau_{joint}"]) - np.array(measured[f"tau_{joint}"]))
         assert error < 0.2 * np.std(np.array(measured[f"tau_{joint}"]))
+    assert "viscous" in (workspace / "reports/Arm.gap.html").read_text()
     assert "9.5,stated" in irtwin("query", "cutoffs", "--workspace", workspace, "--format", "csv").out
     assert irtwin("query", "why_more_energy", "--workspace", workspace, "--format", "csv").out.count("\n") > 1
     adopted = irtwin("adopt", "Arm", "--workspace", workspace)

@@ -37,6 +37,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     (folder / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\n', encoding="utf-8")
     (folder / "reports").mkdir()
     (folder / "reports/Arm_A.html").write_text(REPORT, encoding="utf-8")
+    (folder / "reports/Arm_A.gap.html").write_text(REPORT, encoding="utf-8")
     (folder / "reports/out.html").symlink_to("/etc/hostname")
     with serving(graph, token=None) as running:
         yield running

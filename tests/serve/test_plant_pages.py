@@ -64,6 +64,12 @@ def test_a_hostile_name_is_text(plant: Server, path: str) -> None:
     assert "&lt;script&gt;alert(" in html
 
 
+def test_a_robots_page_leads_to_its_reports(plant: Server) -> None:
+    paths = Elements(CLIENT.get(plant.url + "/robot/Arm_A").text).paths
+    assert {"/reports/Arm_A.html", "/reports/Arm_A.gap.html"} <= paths
+    assert not [path for path in Elements(CLIENT.get(plant.url + "/robot/Arm_D").text).paths if "gap.html" in path]
+
+
 def test_each_link_of_the_plants_page_leads_somewhere(plant: Server) -> None:
     found = set()
     for path in ("/", "/robot/Arm_A", "/run/Arm_A.fit_1"):

@@ -65,7 +65,7 @@ class PlantPages:
     async def _robot(self, request: Request) -> Response:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
-        said = {**self._beside(request), "report": self._reports.of_robot(self._links.tail(iri))}
+        said = self._beside(request) | self._reports.of_robot(self._links.tail(iri))
         said["number"] = page_number(request.query_params.get("page"))
         return await html(
             lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **robot.of_robot(answers), **said)
@@ -75,7 +75,7 @@ class PlantPages:
         iri = self._individual("run", request.path_params["name"])
         answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
         (run,) = answers["run"].rows
-        said = {**self._beside(request), "report": self._reports.of_robot(self._links.tail(run["robot"]))}
+        said = self._beside(request) | self._reports.of_robot(self._links.tail(run["robot"]))
         return await html(
             lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said)
         )

@@ -29,10 +29,10 @@ class ReportFiles:
         folder = self._workspace / _FOLDER
         return sorted(file.name for file in folder.glob("*.html") if file.is_file()) if folder.is_dir() else []
 
-    def of_robot(self, robot_id: str) -> str | None:
-        """Return the name of a robot's energy report, where there is one."""
-        name = f"{robot_id}.html"
-        return name if name in self.names() else None
+    def of_robot(self, robot_id: str) -> dict[str, str | None]:
+        """Return the names of a robot's reports: `report` of its energy and `gap_report`, or None."""
+        names = {"report": f"{robot_id}.html", "gap_report": f"{robot_id}.gap.html"}
+        return {which: name if name in self.names() else None for which, name in names.items()}
 
     def routes(self) -> list[Route]:
         """Return where they are."""

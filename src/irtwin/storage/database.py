@@ -167,8 +167,12 @@ class Workspace:
         return inside(self.folder, path)
 
     def report_path(self, robot_id: str) -> InsidePath:
-        """Where a robot's report lies."""
+        """Where a robot's energy report lies."""
         return self.file(f"reports/{robot_id}.html")
+
+    def gap_report_path(self, robot_id: str) -> InsidePath:
+        """Where the report of a robot's last diagnosis lies."""
+        return self.file(f"reports/{robot_id}.gap.html")
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
