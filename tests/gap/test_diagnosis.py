@@ -22,23 +22,23 @@ from irtwin.signals.log import DataSet
 
 pytestmark = pytest.mark.slow
 
-ROBOT = arm(3)
+ROBOT = arm(2)
 
 
 def data_set(runs, robot=ROBOT, effects=None):
     return DataSet(Path("arm"), robot, tuple(runs), effects, None, "mains", True, {})
 
 
-def runs(count=6, noise=0.3, change=None, role="observed", first=0):
+def runs(count=6, noise=0.3, change=None, role="observed", first=0, robot=ROBOT):
     """Runs of one arm; `change` alters the torque (and so power) of a motion by N m."""
     made = []
     for seed in range(first, first + count):
-        motion = replace(swing(ROBOT, seed // 2, seconds=10.0), run=f"{role}_{seed}")
-        shown = measure(ROBOT, motion, noise=noise, seed=seed)
+        motion = replace(swing(robot, seed // 2, seconds=10.0), run=f"{role}_{seed}")
+        shown = measure(robot, motion, noise=noise, seed=seed)
         if change is not None:
             added = change(motion)
             more = 2 * shown.current * added / 8.0 + (added / 8.0) ** 2  # of the current squared
-            power = (added * motion.dq + truth(ROBOT)["R"] * more).sum(axis=1)
+            power = (added * motion.dq + truth(robot)["R"] * more).sum(axis=1)
             shown = replace(shown, torque=shown.torque + added, power=shown.power + power, current=None)
         run = as_run(replace(shown, current=None))
         made.append(replace(run, role=role, repeat_of=f"{role}_{seed - 1}" if seed % 2 else None))
@@ -142,7 +142,7 @@ def test_oil_that_thins_otherwise_than_before_is_a_change_which_the_twin_takes()
 
 @pytest.mark.parametrize("size", [0.0, 0.15])
 def test_what_has_no_cause_is_told_beyond_what_reference_runs_leave_over_one_another(size):
-    unknown = on_joint(1, lambda m: size * np.sign(np.sin(9 * m.q[:, 0] + 5 * m.q[:, 2])))
+    unknown = on_joint(1, lambda m: size * np.sign(np.sin(9 * m.q[:, 0] + 5 * m.q[:, 1])))
     both = [*runs(role="reference"), *runs(change=unknown, first=20)]
     without_power = [replace(run, signals=replace(run.signals, power=None)) for run in both]
     diagnosis = diagnose(data_set(without_power, effects=WITH_LOSS))
@@ -157,8 +157,11 @@ def test_withheld_friction_comes_back():
     diagnosis = diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["coulomb_friction"])
     (_, cause), *_ = diagnosis.causes
     assert cause.effect == "coulomb_friction"
-    assert set(cause.joints) == {"joint_1", "joint_2", "joint_3"}
+    assert set(cause.joints) == {"joint_1", "joint_2"}
     assert "coulomb_friction" in diagnosis.twin.stack.ids
+    document = valid(diagnosis)
+    assert document["verdict"] in ("attributed", "ambiguous")
+    json.dumps(document, allow_nan=False)
 
 
 def test_power_lacks_the_loss_in_the_windings():
@@ -177,7 +180,7 @@ def test_an_effect_that_the_search_does_not_know_is_neither_named_nor_a_rival():
 
 
 def test_one_run_without_power_is_cut_in_time():
-    (run, *_) = runs(1, change=on_joint(2, lambda m: 2 * np.sin(8 * m.q[:, 2])))
+    (run, *_) = runs(1, change=on_joint(1, lambda m: 2 * np.sin(8 * m.q[:, 1])))
     run = replace(run, signals=replace(run.signals, power=None))
     diagnosis = diagnose(data_set([run]))
     document = valid(diagnosis)
@@ -185,12 +188,6 @@ def test_one_run_without_power_is_cut_in_time():
     assert {"effect": "copper_loss", "why": "no power was measured"} in document["not_testable"]
     (cause,) = document["causes"]
     assert cause["confidence"] > 0.5
-
-
-def test_json_has_the_form_of_the_contract():
-    document = valid(diagnose(data_set(runs()), withhold=["viscous_friction"]))
-    assert document["verdict"] in ("attributed", "ambiguous")
-    json.dumps(document, allow_nan=False)
 
 
 @pytest.mark.nightly

@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import pytest
 from tests.gap.test_diagnosis import WITH_LOSS, data_set, runs
+from tests.synthetic import arm
 
 from irtwin.gap.diagnosis import diagnose
 from irtwin.identification import progress
 
+ROBOT = arm(3)
 STEPS = {
     "case": "friction near zero speed, joint",
     "twin": "the twin without",
@@ -31,7 +33,7 @@ def lines():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(progress, "_EVERY", 0.0)
         said: list[str] = []
-        diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["coulomb_friction"], progress=said.append)
+        diagnose(data_set(runs(robot=ROBOT), ROBOT, WITH_LOSS), withhold=["coulomb_friction"], progress=said.append)
     return said
 
 

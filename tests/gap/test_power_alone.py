@@ -15,7 +15,7 @@ from irtwin.signals.log import DataSet
 
 pytestmark = pytest.mark.slow
 
-ROBOT = arm(3)
+ROBOT = arm(2)
 WITH_LOSS = (*BASELINE, "copper_loss")
 
 
@@ -29,7 +29,7 @@ def runs(shows, role="observed", added=None, first=0, count=6):
     for k in range(count):
         motion = replace(swing(ROBOT, first + k // 2, seconds=10.0), run=f"{role}_{first + k}")
         shown = measure(ROBOT, motion, noise=0.3, seed=first + k)
-        more = np.zeros_like(motion.dq) if added is None else np.outer(added(motion), [1.0, 0, 0])
+        more = np.zeros_like(motion.dq) if added is None else np.outer(added(motion), [1.0, 0])
         loss = truth(ROBOT)["R"] / 8.0**2 * ((2 * shown.current * 8.0 + more) * more)
         kept = shows[k % len(shows)]
         run = as_run(

@@ -20,7 +20,7 @@ def with_signal(made, name, added):
         values = getattr(run.signals, name)
         more = added(number, run.signals.time).reshape(len(values), *(1,) * (values.ndim - 1))
         if name == "torque":
-            more = more * np.array([0.0, 1.0, 0.0])
+            more = more * np.eye(values.shape[1])[1]
         changed.append(replace(run, signals=replace(run.signals, **{name: values + more})))
     return changed
 

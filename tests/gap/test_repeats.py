@@ -22,7 +22,7 @@ ROBOT = arm(3)
 
 
 def repeated(change=None, **more):
-    return case_of(data_set(runs_of_one_motion(change, **more)), (), DEFAULT)
+    return case_of(data_set(runs_of_one_motion(change, **more), ROBOT), (), DEFAULT)
 
 
 def runs_of_one_motion(change=None, count=2, noise=0.3, rate=100.0):
@@ -62,7 +62,7 @@ def wandering(count, memory, rng):
 def test_all_motions_have_the_cutoff_that_is_stated_or_found():
     found = repeated()
     assert not found.cutoff.stated
-    stated = case_of(replace(data_set(list(found.runs)), cutoff=7.25), (), DEFAULT)
+    stated = case_of(replace(data_set(list(found.runs), ROBOT), cutoff=7.25), (), DEFAULT)
     assert stated.cutoff.stated
     for case in (found, stated):
         assert {motion.cutoff for motion in case.motions.values()} == {case.cutoff.hz}
@@ -146,7 +146,7 @@ def test_a_drift_is_located_and_is_no_offset_too():
 
 @pytest.mark.slow
 def test_a_drift_that_both_runs_share_is_found_by_the_search():
-    found = diagnose(data_set(runs_of_one_motion(lambda k, t: in_joint_2(0.5 * t))))
+    found = diagnose(data_set(runs_of_one_motion(lambda k, t: in_joint_2(0.5 * t)), ROBOT))
     assert {cause.effect: cause.joints for _, cause in found.causes}["torque_drift"] == ("joint_2",)
     assert found.not_repeating == ()
 

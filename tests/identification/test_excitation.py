@@ -276,6 +276,7 @@ def test_a_robot_that_reaches_to_the_stars_is_refused() -> None:
         excite(parse_urdf(TWO.urdf.replace("0.2 0 0", "1e300 0 0")), 5.0)
 
 
+@pytest.mark.nightly
 def test_fast_joints_of_a_long_range_are_slowed_until_the_way_is_clear() -> None:
     found = excite(two_joints('<limit lower="-2000" upper="2000" velocity="5000" effort="9"/>'), 5.0, iterations=1)
     assert found.clearance > 0

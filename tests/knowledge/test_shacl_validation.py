@@ -233,7 +233,7 @@ def test_near_a_change_the_same_is_suspected_as_in_all_of_a_part(two_robots: lis
     others = [Literal(-1.0), Literal(float("nan")), Literal("x"), *(one.object for one in values)]
     shapes = validation._shapes(frozenset(ontology.triples), graph.resources.of("shapes"))
     outcomes = []
-    for _ in range(40):
+    for _ in range(16):
         gone = draw.choice(draw.choice((types, values)))
         come = {
             Triple(gone.subject, draw.choice(values).predicate, draw.choice(others)) for _ in range(draw.randrange(2))
@@ -244,7 +244,7 @@ def test_near_a_change_the_same_is_suspected_as_in_all_of_a_part(two_robots: lis
         suspected = any_suspect(*shapes.store_of(ontology.triples | now.asserted), now.nodes)
         assert validation._is_clear(ontology, now, nodes) is not suspected, (gone, come)
         outcomes.append(suspected)
-    assert 5 < sum(outcomes) < 35
+    assert 2 < sum(outcomes) < 14
 
 
 def test_a_change_that_breaks_nothing_is_not_shown_to_pyshacl_nor_asked_of_all(

@@ -105,7 +105,7 @@ def runs_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.lists(JUMPS, min_size=1, max_size=4), st.data())
 def test_no_time_is_stored_twice_whatever_the_clock_does(jumps: list[float], data: st.DataObject) -> None:
     steps = data.draw(st.lists(st.integers(5, 60), min_size=len(jumps) + 1, max_size=len(jumps) + 1))

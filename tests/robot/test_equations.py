@@ -18,7 +18,7 @@ from irtwin.robot.urdf import parse_urdf
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=5)
 @given(urdf=chains(most=3))
 def test_they_are_those_of_newton_and_euler(urdf):
     assert equations(parse_urdf(urdf)).deviation < 1e-9
