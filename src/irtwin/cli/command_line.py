@@ -15,6 +15,7 @@ import click
 from irtwin import __version__
 from irtwin.cli import alarms, bring, fleet, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
+from irtwin.cli.sections import Sections
 from irtwin.errors import GraphBehind, InputError
 
 _LONGEST = 2000  # characters of an error
@@ -70,24 +71,26 @@ def _check_system() -> None:
         sys.exit(2)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Sections,
+    sections={
+        "Bring a log": (bring.import_, bring.init, twin.check, robot.robot),
+        "Build the twin": (twin.demo, twin.run, twin.improve, twin.adopt, twin.case_study, fleet.fleet),
+        "Find the gap": (twin.diagnose, motion.excite),
+        "Plan and save": (motion.plan, motion.predict, motion.slow),
+        "Ask": (graph.query, graph.explain, graph.docs, graph.export, graph.reason, graph.map_database),
+        "Watch": (service.serve, service.live, alarms.alarms),
+        "Keep": (*(upkeep.status, upkeep.trust, upkeep.backup, upkeep.restore), *(upkeep.repair, upkeep.drop)),
+    },
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, prog_name="irtwin")
 def cli() -> None:
     """Build a digital twin of an industrial robot's energy and keep it in a knowledge graph.
 
-    Start with `irtwin demo`. It builds a twin, a graph and a report from simulated logs of a KUKA KR6 R700.
+    Start with `irtwin demo`. It builds a twin, a graph and a report from simulated logs of a KUKA KR6 R700. `irtwin
+    FILE`, of a log, a robot, a model or a folder, says what it is and what can be done with it.
     """
 
 
-for command in (
-    *(bring.init, bring.import_),
-    *(twin.check, twin.run, twin.demo, twin.case_study, twin.diagnose, twin.adopt, twin.improve),
-    *(motion.plan, motion.predict, motion.slow, motion.excite),
-    *(graph.query, graph.explain, graph.reason, graph.export, graph.map_database, graph.docs),
-    *(service.serve, service.live, alarms.alarms),
-    *(upkeep.status, upkeep.trust, upkeep.drop, upkeep.repair, upkeep.backup, upkeep.restore),
-    robot.robot,
-    fleet.fleet,
-):
-    cli.add_command(command)
 add_speech(cli)

@@ -1,0 +1,44 @@
+"""The group of all commands: its help is in sections, and a file in a command's place is told what it is for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+_WHOLE = 1000  # characters: a sentence is wrapped, not cut
+
+
+class Sections(click.Group):
+    """A group whose help lists commands by what people do, and which answers `irtwin FILE`."""
+
+    def __init__(self, *arguments: Any, sections: Mapping[str, Sequence[click.Command]], **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._sections = sections
+        for command in (one for commands in sections.values() for one in commands):
+            self.add_command(command)
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands, a section after the other."""
+        for title, commands in self._sections.items():
+            with formatter.section(title):
+                formatter.write_dl([(str(one.name), one.get_short_help_str(_WHOLE)) for one in commands])
+
+    def resolve_command(
+        self, context: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that is asked for: of a file's name, one that says what the file is for."""
+        if args[0] not in self.commands and (path := Path(args[0])).exists():
+            return None, click.Command("file", callback=lambda: _tell(path)), args[1:]
+        return super().resolve_command(context, args)
+
+
+def _tell(path: Path) -> None:
+    from irtwin.file_kind import file_kind
+
+    kind = file_kind(path)
+    click.echo(f"{path}: {kind.what}")
+    for command, why in kind.commands:
+        click.echo(f"  {command}\n      {why}")
