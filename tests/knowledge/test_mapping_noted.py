@@ -208,9 +208,19 @@ def test_two_graphs_follow_one_database(place: Place, tmp_path: Path) -> None:
         place.follow()
 
 
-def test_a_file_of_another_form_is_made_anew(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "script",
+    [
+        "PRAGMA user_version = 0",
+        "ALTER TABLE entries RENAME TO other; CREATE VIEW entries AS WITH RECURSIVE c(a) AS "
+        "(SELECT 1 UNION ALL SELECT a + 1 FROM c) SELECT other.* FROM other, c",
+        "CREATE TRIGGER t AFTER INSERT ON kept_row BEGIN DELETE FROM kept_row; END",
+    ],
+    ids=["older", "a view that never ends", "a trigger"],
+)
+def test_a_file_of_another_form_is_made_anew(place: Place, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
     with sqlite3.connect(place.file) as connection:
-        connection.execute("PRAGMA user_version = 0")
+        connection.executescript(script)
     place.run("UPDATE person SET city = 2")
     forgotten = []
     forget = RememberedRows.forget

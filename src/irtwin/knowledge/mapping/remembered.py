@@ -27,15 +27,12 @@ ENTRY = np.dtype([("row", np.uint64), ("subject", np.uint64), ("key", np.uint64)
 Entries = npt.NDArray[np.void]
 
 _FORM = 2  # of the file, as its `user_version`
-_TABLES = f"""
-BEGIN EXCLUSIVE;
-CREATE TABLE version (name TEXT NOT NULL);
-CREATE TABLE bookmark (until INTEGER NOT NULL, number INTEGER NOT NULL, token INTEGER NOT NULL);
-CREATE TABLE entries (number INTEGER PRIMARY KEY, content BLOB NOT NULL, crc INTEGER NOT NULL);
-CREATE TABLE kept_row (id INTEGER PRIMARY KEY, content TEXT NOT NULL, crc INTEGER NOT NULL);
-PRAGMA user_version = {_FORM};
-COMMIT;
-"""
+_TABLES = (
+    "CREATE TABLE version (name TEXT NOT NULL)",
+    "CREATE TABLE bookmark (until INTEGER NOT NULL, number INTEGER NOT NULL, token INTEGER NOT NULL)",
+    "CREATE TABLE entries (number INTEGER PRIMARY KEY, content BLOB NOT NULL, crc INTEGER NOT NULL)",
+    "CREATE TABLE kept_row (id INTEGER PRIMARY KEY, content TEXT NOT NULL, crc INTEGER NOT NULL)",
+)
 _KEPT_ROW = "SELECT CAST(content AS BLOB), crc FROM kept_row WHERE id = ?"  # damaged, it may be no text
 _PLAIN = (type(None), bool, int, float, str)
 _RESTORED: dict[str, Callable[[str], Any]] = {
@@ -153,14 +150,16 @@ def _opened(file: Path) -> sqlite3.Connection:
 
 
 def _make_tables(connection: sqlite3.Connection) -> None:
-    """Make the tables of a new file. Raises DatabaseError where another irtwin wrote one of another form."""
+    """Make the tables of a new file. Raises DatabaseError where it has others: a view in place of one may never end."""
     form = connection.execute("PRAGMA user_version").fetchone()[0]
-    if form == _FORM:
+    there = [sql for (sql,) in connection.execute("SELECT sql FROM sqlite_master")]
+    if form == _FORM and there == list(_TABLES):
         return
-    if connection.execute("SELECT 1 FROM sqlite_master").fetchone() is not None:
+    if there:
         connection.close()
         raise sqlite3.DatabaseError(f"a file of form {form}")
-    connection.executescript(_TABLES)
+    made = ("BEGIN EXCLUSIVE", *_TABLES, f"PRAGMA user_version = {_FORM}", "COMMIT", "")
+    connection.executescript(";\n".join(made))
 
 
 def _checked(content: bytes, crc: int) -> bytes:
