@@ -18,9 +18,10 @@ from tests.live.controller import Controller
 
 from irtwin.bring.bring import Options, bring, init
 from irtwin.bring.doubt import Answer, DoubtError
-from irtwin.bring.robot_library import robot_of, robots
+from irtwin.bring.robot_library import robot_of, robots, with_fixed
 from irtwin.check.check import check
 from irtwin.errors import InputError
+from irtwin.robot.urdf import parse_urdf
 from irtwin.ros.bags import write_bag
 from irtwin.signals.channels import columns_of
 from irtwin.signals.log import (
@@ -370,7 +371,7 @@ def test_a_word_that_says_nothing_is_refused(tmp_path: Path, options: Options, s
         ("just a line of words", "no delimiter"),
         ("a,b\n" + "1" * 200_000 + ",2\n", "no delimiter"),
         ("\0\0\0", "is no text"),
-        ("time,a,b\n" + "0,1,2\n" * 30 + "1,2\n", "line 32: 2 values instead of 3"),
+        ("time,a,b\n" + "0,1,2\n" * 30 + "1,2\n" + "0,1,2\n", "line 32: 2 values instead of 3"),
         (
             "t,a,b,c\n" + "0,1,2,5,1,2,3,4\n" * 30,
             "have 8 values, the line above them 4 names; where decimals",
@@ -423,7 +424,9 @@ def test_a_joint_that_is_not_logged_can_be_fixed(tmp_path: Path) -> None:
     log = write_text(
         tmp_path / "run.csv", columns | {f"tau_joint_a{k}": good()[f"tau_joint_a{k}"] for k in range(1, 6)}
     )
-    with pytest.raises(InputError, match="--map COLUMN=q_joint_a6, or, where the joint stood still, --fixed joint_a6"):
+    with pytest.raises(
+        InputError, match=r"--map COLUMN=q_joint_a6, or, where they stood still, --fixed joint_a6 .there"
+    ):
         bring([log], tmp_path / "set", NAME, Options())
     bring([log], tmp_path / "set", NAME, Options(fixed=("joint_a6",)))
     data_set = read_data_set(tmp_path / "set")
@@ -431,6 +434,37 @@ def test_a_joint_that_is_not_logged_can_be_fixed(tmp_path: Path) -> None:
     np.testing.assert_array_equal(data_set.runs[0].signals.q, signals(good()).q[:, :5])
     with pytest.raises(InputError, match=r"--fixed joint_7: the robot has no joint .joint_7. .it has"):
         bring([log], tmp_path / "other", NAME, Options(fixed=("joint_7",)))
+
+
+def test_all_joints_that_are_missing_are_told_at_once_and_held_by_a_pattern(tmp_path: Path) -> None:
+    wanted = ("joint_a1", "joint_a2", "joint_a3")
+    columns = {"time": good()["time"]} | {
+        f"{kind}_{joint}": good()[f"{kind}_{joint}"] for joint in wanted for kind in ("q", "tau")
+    }
+    log = write_text(tmp_path / "run.csv", columns)
+    with pytest.raises(
+        InputError, match=r"the position of joint_a4 and 2 other joints; .* --fixed joint_a4 --fixed joint_a5 --fixed"
+    ):
+        bring([log], tmp_path / "set", NAME, Options())
+    bring([log], tmp_path / "set", NAME, Options(fixed=("joint_a[456]",)))
+    assert read_data_set(tmp_path / "set").robot.joint_names == wanted
+
+
+def test_a_joint_that_mimics_another_is_held_already(tmp_path: Path) -> None:
+    limits = '<axis xyz="1 0 0"/><limit lower="0" upper="1" velocity="1" effort="1"/>'
+    finger = '<link name="finger"/><joint name="finger_joint" type="prismatic"><parent link="base_link"/>'
+    finger += f'<child link="finger"/>{limits}'
+    mimic = '<mimic joint="joint_a6"/></joint></robot>'
+    described = parse_urdf(robot().urdf.replace("</robot>", finger + mimic))
+    assert with_fixed(described, ("finger*",)).joint_names == robot().joint_names
+
+
+def test_a_last_line_that_is_cut_off_is_left_out_and_told(tmp_path: Path) -> None:
+    log = plain(tmp_path)
+    log.write_bytes(log.read_bytes().rstrip()[:-40])
+    brought = bring([log], tmp_path / "set", NAME, Options())
+    assert [line for line in brought.said if "the last, is cut off; it is left out" in line]
+    assert len(read_data_set(tmp_path / "set").runs[0].signals.time) == len(good()["time"]) - 1
 
 
 def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -189,12 +190,15 @@ def _shown(columns: Sequence[str]) -> str:
 
 def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], seen: Collection[str | None]) -> None:
     positions = {each.joint for each in chosen.values() if each.field == "q"}
-    missing = sorted((name for name in robot.joint_names if name not in positions), key=lambda name: name in seen)
+    lacking = [name for name in robot.joint_names if name not in positions]
+    missing = [name for name in lacking if name not in seen] or lacking
     timed = any(each.field == "time" for each in chosen.values())
     if missing or not timed:
-        what = f"the position of {missing[0]}" if missing else "the time"
+        some = 0 < len(missing) < len(robot.joints)
+        others = f" and {len(missing) - 1} other joints" if some and missing[1:] else ""
+        what = f"the position of {missing[0]}{others}" if missing else "the time"
         (column,) = CHANNELS["q" if missing else "time"].columns(missing[:1])
-        held = f", or, where the joint stood still, --fixed {missing[0]}" if missing else ""
+        held = f", or, where they stood still, {_fixed(missing)}" if some else ""
         times = [name for name in recording.texts if not timed and said_by(name).field == "time"]
         if times:
             raise InputError(
@@ -207,3 +211,8 @@ def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], se
             f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column}{held} "
             f"(there are {shown})"
         )
+
+
+def _fixed(joints: Sequence[str]) -> str:
+    """Return the options that hold joints."""
+    return " ".join(f"--fixed {shlex.quote(joint)}" for joint in joints)

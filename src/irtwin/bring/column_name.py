@@ -11,7 +11,7 @@ from irtwin.signals.channels import CHANNELS
 # words, in small letters, by field of Signals; of several in a name the last one counts
 _WORDS = {
     "time": "time timestamp stamp datetime zeit zeitstempel clock elapsed t",
-    "q": "q pos position positions angle angles winkel theta act position_actual istposition lage jointposition",
+    "q": "q pos position positions ang angle angles winkel theta act position_actual istposition lage jointposition",
     "dq": "dq qd qdot vel velocity velocities speed speeds omega geschwindigkeit drehzahl",
     "ddq": "ddq qdd qddot acc accel acceleration accelerations beschleunigung",
     "torque": "tau torque torques trq effort efforts moment moments drehmoment",

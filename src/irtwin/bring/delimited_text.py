@@ -50,7 +50,7 @@ def read_text(path: Path) -> Recording:
     before = kept[form.head.first]
     _check_names(path, form)
     names, units = form.head.names_in(form.rows), form.head.units_in(form.rows)
-    table = _table(path, text.split("\n", before)[-1], form, names, before)
+    table, cut = _table(path, text.split("\n", before)[-1], form, names, before)
     columns, texts = as_columns(path, table, ("line", before + 1))
     nameless = f"{path}: has no line of names; its columns are called column_1, column_2 and so on"
     return Recording(
@@ -59,7 +59,7 @@ def read_text(path: Path) -> Recording:
         columns,
         texts,
         {name: unit for name, unit in zip(names, units, strict=False) if unit},
-        () if form.head.names is not None else (nameless,),
+        tuple(line for line in (None if form.head.names is not None else nameless, cut) if line),
         first=before + 1,
         counted="line",
     )
@@ -139,7 +139,8 @@ def _decoded(path: Path, content: bytes) -> str:
     return text
 
 
-def _table(path: Path, body: str, form: Form, names: list[str], before: int) -> pa.Table:
+def _table(path: Path, body: str, form: Form, names: list[str], before: int) -> tuple[pa.Table, str | None]:
+    """Return the samples, and what is to be said of a last line that was cut off."""
     if form.delimiter == " ":
         body = "\n".join(_BLANKS.sub(" ", line.strip()) for line in body.split("\n"))
     wrong: list[tuple[int, int, int]] = []
@@ -163,7 +164,9 @@ def _table(path: Path, body: str, form: Form, names: list[str], before: int) -> 
         raise InputError(f"{path}: not readable as {form} ({csv_fault(error)}); export it again") from error
     if wrong:
         line, has, expected = wrong[0]
+        if len(wrong) == 1 and line == table.num_rows + 1 and has < expected:
+            return table.rename_columns(names), f"{path}, line {line + before}: the last, is cut off; it is left out"
         raise InputError(
             f"{path}, line {line + before}: {has} values instead of {expected}; correct it, or remove such lines"
         )
-    return table.rename_columns(names)
+    return table.rename_columns(names), None

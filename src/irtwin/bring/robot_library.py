@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -50,13 +51,19 @@ def robots() -> dict[str, Path]:
     return {**{file.stem: file for file in files}, **whole, **shipped}
 
 
-def with_fixed(robot: Robot, joints: Sequence[str]) -> Robot:
-    """Return a robot some of whose joints, and those that mimic them, are fixed at zero. Raises InputError."""
-    for joint in joints:
-        if joint not in robot.joint_names:
+def with_fixed(robot: Robot, patterns: Sequence[str]) -> Robot:
+    """Return a robot some of whose joints, and those that mimic them, are fixed at zero. Raises InputError.
+
+    patterns: names of joints, in which * stands for any letters; what mimics others is held already.
+    """
+    joints: set[str] = set()
+    for pattern in patterns:
+        named = [one for one in (*robot.joint_names, *robot.held) if one == pattern or fnmatchcase(one, pattern)]
+        if not named:
             raise InputError(
-                f'--fixed {joint}: the robot has no joint "{joint}" (it has {", ".join(robot.joint_names)})'
+                f'--fixed {pattern}: the robot has no joint "{pattern}" (it has {", ".join(robot.joint_names)})'
             )
+        joints |= set(named) - set(robot.held)
     if not joints:
         return robot
     root = fromstring(robot.urdf.encode())

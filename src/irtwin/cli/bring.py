@@ -37,7 +37,10 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 @click.option("--power-at", type=click.Choice(["mains", "dc_bus"]), help="Where electrical power was measured.")
 @click.option("--topic", "topics", metavar="COLUMN=TOPIC", multiple=True, help="Which topic of a bag to take.")
 @click.option(
-    "--fixed", metavar="JOINT", multiple=True, help="Joint that stood still and is not logged, as a gripper's."
+    "--fixed",
+    metavar="JOINT",
+    multiple=True,
+    help="Joint that stood still and is not logged, as a gripper's. * stands for any letters.",
 )
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
 @payload_com_option
