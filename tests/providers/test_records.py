@@ -63,6 +63,15 @@ def test_a_data_set_comes_back_as_it_was(on_server, tmp_path, request):
     assert back.signals.dq is None
 
 
+def test_a_joint_that_has_lost_its_row_is_told(tmp_path):
+    with Workspace(tmp_path) as workspace:
+        ingest(workspace, data_set(run()))
+        with workspace.engine.begin() as connection:
+            connection.exec_driver_sql("DELETE FROM joint")
+        with pytest.raises(InputError, match='no row of joint "a" of "One arm"; run its data set again, or restore'):
+            load_robot(workspace, identifier("One arm"))
+
+
 def test_plain_names_are_their_own_identifiers():
     for name in ("KUKA_KR6_R700", "R-1", "a" * 200):
         assert identifier(name) == name

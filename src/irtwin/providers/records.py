@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 from sqlalchemy import ColumnElement, select
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 from irtwin.json_text import parse_json
 from irtwin.planning.admission import check_motion
 from irtwin.providers.mesh_files import MeshCopy, mesh_copies
@@ -271,11 +271,16 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
 
 
 def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
-    """Give back a robot with its data sheet."""
+    """Give back a robot with its data sheet. Raises WorkspaceFault where a joint of its URDF has no row."""
     with workspace.reading() as session:
         row = session.get_one(Robot, robot_id)
         sheets = {joint.name: joint for joint in session.scalars(select(Joint).where(Joint.robot_id == robot_id))}
     bare = parse_urdf(row.urdf, source=f"URDF of {row.name}")
+    if lost := [name for name in bare.joint_names if name not in sheets]:
+        raise WorkspaceFault(
+            f'{workspace.folder}: the database has no row of joint "{lost[0]}" of "{row.name}"; run its data set '
+            "again, or restore a backup by `irtwin restore ARCHIVE --workspace NEW`"
+        )
     joints = tuple(
         description.Joint(
             name=joint.name,
