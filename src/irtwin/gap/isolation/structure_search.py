@@ -12,6 +12,7 @@ from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.posterior import Posterior, Prior, overlap
 from irtwin.gap.regression.evidence import visibility
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
+from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
 from irtwin.identification.progress import Tell, paced
@@ -82,6 +83,7 @@ class _Search:
     floor: np.ndarray | None
     tell: Tell
     tried: dict[tuple[bytes, bytes], Posterior] = field(default_factory=dict)
+    weighed: dict[bytes, list[Moments]] = field(default_factory=dict)  # by the last noise
 
     def beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
         """Try what may stand beside a structure, once; equations are weighed by `noise` (g,)."""
@@ -107,11 +109,17 @@ class _Search:
         ]
         line = f"  {len(left)} hypotheses, beside {len(found)} that are found"
         self.tell(line)
-        moments = self.system.moments(noise)
-        self.tell(line)
-        moments = self.system.without_noise(moments, noise, chosen)
+        moments = self.system.without_noise(self.moments(noise), noise, chosen)
         self.tell(line)
         return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.misfit(noise))
+
+    def moments(self, noise: np.ndarray) -> list[Moments]:
+        """Return the products of columns weighed by `noise`; most looks at them are by that of the look before."""
+        asked = noise.tobytes()
+        if asked not in self.weighed:
+            self.weighed.clear()
+            self.weighed[asked] = self.system.moments(noise)
+        return self.weighed[asked]
 
     def misfit(self, noise: np.ndarray) -> np.ndarray:
         """Return (g,) the misfit along any effect, squared, as a part of the mean square that is left, `noise`.

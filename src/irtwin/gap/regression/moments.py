@@ -147,6 +147,7 @@ class GroupMoments(Moments):
         self.size = products[0].places.size
         order = sorted(range(len(products)), key=lambda equation: not products[equation].places.wide)
         self._weighed = [(products[equation], weights[equation]) for equation in order]
+        self._known: dict[bytes, np.ndarray] = {}  # blocks by their columns: a search asks for the same again and again
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Add up the equations that have any of both: of mostly more columns than rows, each column's side by side."""
@@ -165,6 +166,14 @@ class GroupMoments(Moments):
         return found.T
 
     def blocks(self, columns: np.ndarray) -> np.ndarray:
+        """Return each block as it was worked out when it was first asked for."""
+        asked = [row.tobytes() for row in columns]
+        new = [k for k, row in enumerate(asked) if row not in self._known]
+        if new:
+            self._known.update(zip((asked[k] for k in new), self._worked_out(columns[new]), strict=True))
+        return np.array([self._known[row] for row in asked])
+
+    def _worked_out(self, columns: np.ndarray) -> np.ndarray:
         """Add up the equations: of most blocks they have one column alone, the measurement, and so its square."""
         found = np.zeros((*columns.shape, columns.shape[1]))
         for products, weight in self._weighed:
