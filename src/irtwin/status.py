@@ -24,7 +24,7 @@ from irtwin.storage.engine import shown
 from irtwin.storage.journal import left_behind
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
-from irtwin.storage.schema import LIVE, Base, Robot, Run, Twin
+from irtwin.storage.schema import LIVE, SIMULATED, Base, Robot, Run, Twin
 from irtwin.storage.series_place import elsewhere
 from irtwin.trust import how, trusted
 from irtwin.upkeep import asked, lost_files
@@ -98,11 +98,13 @@ def _tables() -> list[str]:
 def _robots(place: Workspace) -> list[str]:
     with place.reading() as session:
         robots = session.scalars(select(Robot).order_by(Robot.name)).all()
-        runs = Counter(tuple(row) for row in session.execute(select(Run.robot_id, Run.kind)))
+        told = session.execute(select(Run.robot_id, Run.kind, Run.role))
+        runs = Counter((robot_id, SIMULATED if role == SIMULATED else _KINDS[kind]) for robot_id, kind, role in told)
         twins = set(session.scalars(select(Twin.robot_id)))
     lines = []
     for robot in robots:
-        counts = [f"{runs[robot.robot_id, kind]} {word}" for kind, word in _KINDS.items() if runs[robot.robot_id, kind]]
+        words = [word for word in (*_KINDS.values(), SIMULATED) if runs[robot.robot_id, word]]
+        counts = [f"{runs[robot.robot_id, word]} {word}" for word in words]
         report = place.report_path(robot.robot_id)
         lines.append(
             f"{robot.name}: runs: {', '.join(counts) or 'none'}; {'a twin' if robot.robot_id in twins else 'no twin'}; "

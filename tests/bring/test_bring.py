@@ -459,6 +459,19 @@ def test_a_joint_that_mimics_another_is_held_already(tmp_path: Path) -> None:
     assert with_fixed(described, ("finger*",)).joint_names == robot().joint_names
 
 
+def test_a_log_without_names_is_given_some(tmp_path: Path) -> None:
+    log = plain(tmp_path)
+    names, body = log.read_text().split("\n", 1)
+    log.write_text(body)
+    brought = bring([log], tmp_path / "set", NAME, Options(names=tuple(names.split(","))))
+    assert [line for line in brought.said if "has no line of names; they are those of --names" in line]
+    np.testing.assert_allclose(read_data_set(tmp_path / "set").runs[0].signals.q, signals(good()).q, atol=1e-6)
+    with pytest.raises(InputError, match=r"columns; --names gives 2 different names"):
+        bring([log], tmp_path / "other", NAME, Options(names=("a", "b")))
+    with pytest.raises(InputError, match=r"has names of its own, as time; --map says what a column is"):
+        bring([plain(tmp_path)], tmp_path / "other", NAME, Options(names=("a", "b")))
+
+
 def test_a_last_line_that_is_cut_off_is_left_out_and_told(tmp_path: Path) -> None:
     log = plain(tmp_path)
     log.write_bytes(log.read_bytes().rstrip()[:-40])

@@ -36,13 +36,17 @@ _TOPIC = re.compile(r'say which in dataset\.toml: \[topics\] (\S+) = "(.*)"$')
 
 @dataclass(frozen=True)
 class Options:
-    """What the user says: `maps`, `gear_ratios`, `topics`, `fixed` as they are typed, payload in kg and m."""
+    """What the user says: `maps`, `gear_ratios`, `topics`, `fixed` as they are typed, payload in kg and m.
+
+    `names`: of the columns of logs that have no line of names.
+    """
 
     name: str | None = None
     maps: tuple[str, ...] = ()
     gear_ratios: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
     power_at: str | None = None
     payload_mass: float | None = None
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -91,6 +95,7 @@ def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: A
         raise InputError(f"{robot}: {wrong.say}")
     topics = dict(_topic(text) for text in options.topics)
     logs = [_read(file, described, topics) for file in files]
+    logs = [log.named(options.names) for log in logs] if options.names else logs
     while True:
         said = told(options.maps, options.gear_ratios, options.power_at, described)
         try:

@@ -52,7 +52,7 @@ def read_text(path: Path) -> Recording:
     names, units = form.head.names_in(form.rows), form.head.units_in(form.rows)
     table, cut = _table(path, text.split("\n", before)[-1], form, names, before)
     columns, texts = as_columns(path, table, ("line", before + 1))
-    nameless = f"{path}: has no line of names; its columns are called column_1, column_2 and so on"
+    nameless = f"{path}: has no line of names; its columns are called column_1, column_2 and so on, or as --names says"
     return Recording(
         path,
         str(form),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +47,26 @@ class Recording:
     def names(self) -> tuple[str, ...]:
         """Names of all columns."""
         return (*self.columns, *self.texts)
+
+    def named(self, names: Sequence[str]) -> Recording:
+        """Give a recording that has no names these. Raises InputError where it has some, or another count.
+
+        They stand for the file's columns from left to right.
+        """
+        own = [f"column_{number}" for number in range(1, len(self.names) + 1)]
+        if set(own) != set(self.names):
+            raise InputError(f"{self.path}: has names of its own, as {self.names[0]}; --map says what a column is")
+        if len(names) != len(own) or len(set(names)) < len(own):
+            raise InputError(f"{self.path}: has {len(own)} columns; --names gives {len(set(names))} different names")
+        called = dict(zip(own, names, strict=True))
+        said = f"{self.path}: has no line of names; they are those of --names"
+        return replace(
+            self,
+            columns={called[name]: values for name, values in self.columns.items()},
+            texts=tuple(called[name] for name in self.texts),
+            units={called[name]: unit for name, unit in self.units.items()},
+            said=(said, *self.said[1:]),
+        )
 
     def place(self, sample: int) -> str:
         """Return what a message calls a sample, counted from 0."""

@@ -42,6 +42,7 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
     multiple=True,
     help="Joint that stood still and is not logged, as a gripper's. * stands for any letters.",
 )
+@click.option("--names", metavar="NAME,...", default="", help="Names of all columns, where the file has none.")
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
 @payload_com_option
 @click.option("--repair", is_flag=True, help="Drop samples whose time does not rise, and say how many.")
@@ -55,6 +56,7 @@ def import_(
     power_at: str | None,
     topics: tuple[str, ...],
     fixed: tuple[str, ...],
+    names: str,
     payload_mass: float | None,
     payload_com: tuple[float, float, float],
     repair: bool,
@@ -70,6 +72,7 @@ def import_(
 
     options = Options(
         name=name, maps=maps, gear_ratios=gear_ratios, topics=topics, fixed=fixed, power_at=power_at,
+        names=tuple(one.strip() for one in names.split(",")) if names else (),
         payload_mass=payload_mass, payload_com=payload_com, repair=repair,
     )  # fmt: skip
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None

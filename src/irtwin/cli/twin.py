@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -96,10 +98,16 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 @graph_option
 @base_option
 @series_option
+@click.option("--no-open", is_flag=True, help="Do not show the report in a browser.")
 def demo(
-    workspace: Path, database: str | None, graph_url: str | None, base: str | None, series_url: str | None
+    workspace: Path,
+    database: str | None,
+    graph_url: str | None,
+    base: str | None,
+    series_url: str | None,
+    no_open: bool,
 ) -> None:
-    """Run the example data set: simulated logs of a KUKA KR6 R700."""
+    """Run the example data set: simulated logs of a KUKA KR6 R700. On a desktop, show its report in a browser."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
@@ -115,6 +123,8 @@ def demo(
         announce=announce,
     )
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
+    if not no_open and sys.stdout.isatty() and {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        webbrowser.open(report.resolve().as_uri())
     click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
 
 
