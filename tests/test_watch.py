@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import socket
 import subprocess
@@ -98,6 +99,17 @@ def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(wo
     refused = in_this_process("live", "--workspace", workspace)
     assert refused.status == 2
     assert f"{template}, line 1: " in refused.err
+
+
+def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None:
+    shutil.rmtree(workspace / "live", ignore_errors=True)
+    (workspace / "live").touch()
+    done = in_this_process("live", "--workspace", workspace)
+    assert done.status == 2
+    assert done.err.splitlines()[-1] == (
+        f"irtwin: {workspace}/live: File exists; a file is where a folder has to be, or a folder in place of a file; "
+        "move it away"
+    )
 
 
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:

@@ -20,9 +20,11 @@ from irtwin.errors import GraphBehind, InputError
 
 _LONGEST = 2000  # characters of an error
 _NO_ROOM, _NO_RIGHT = "free some space and try again", "ask its owner for the right, or choose another place"
+_OTHER_KIND = "a file is where a folder has to be, or a folder in place of a file; move it away"
 _ASIDE = {  # what the system refuses, and what to do
     **dict.fromkeys((errno.ENOSPC, errno.EFBIG, errno.EDQUOT), _NO_ROOM),
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _NO_RIGHT),
+    **dict.fromkeys((errno.EEXIST, errno.ENOTDIR, errno.EISDIR), _OTHER_KIND),
 }
 _python_warns = warnings.showwarning
 
