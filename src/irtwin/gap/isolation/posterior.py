@@ -109,13 +109,9 @@ class Posterior:
     @cached_property
     def _by_shape(self) -> np.ndarray:
         """(V,) log odds of each variant against nothing."""
-        gains = zip(self.evidence.gain, self.variance, self.evidence.information, strict=True)
-        return np.array(
-            [
-                self.prior[k] + self._explaining(gain, variance, len(information)) - self._size(k, variance)
-                for k, (gain, variance, information) in enumerate(gains)
-            ]
-        )
+        counts = np.array([len(values) for values in self.evidence.values], dtype=int)
+        explained = self._explaining(self.evidence.gain, self.variance, counts)
+        return np.asarray(self.prior + explained - self._sizes(np.arange(len(counts)), self.variance))
 
     def variant(self, place: int) -> Variant:
         """Return the shape of a hypothesis that explains most."""
@@ -162,24 +158,33 @@ class Posterior:
         def left(squares: np.ndarray) -> np.ndarray:
             return -np.asarray(self._explaining(squares / rows, variance, count))
 
-        size = [self._size(int(k), variance) for k in shape]
+        size = self._sizes(shape, np.full(len(shape), variance))
         behind = seen.explained[best] - seen.explained[shape]
         return self.prior[shape] - size + left(behind), float(left(seen.explained[best]))
 
-    def _explaining(self, gain: np.ndarray | float, variance: float, count: int) -> np.ndarray | float:
+    def _explaining(
+        self, gain: np.ndarray | float, variance: np.ndarray | float, count: np.ndarray | int
+    ) -> np.ndarray | float:
         certainty = self.limits.certainty
         return 0.5 * (certainty + count) * np.log1p(gain / (certainty * variance))
 
-    def _size(self, variant: int, variance: float) -> float:
-        """Return the log of how much room a variant's coefficients have, in units of what the data leave open.
+    def _sizes(self, places: np.ndarray, variance: np.ndarray) -> np.ndarray:
+        """Return the log of how much room variants' coefficients have, (P,), in units of what the data leave open.
 
-        They are as large as expected, or as `_SIZES` of that, each as likely.
+        They are as large as expected, or as `_SIZES` of that, each as likely. Those of one count are solved at once.
         """
-        seen = self.evidence
-        open_ones = np.linalg.eigvalsh(seen.information[variant]) / (seen.rows_that_speak[variant] * variance)
-        squares = float(seen.values[variant] @ seen.values[variant])
-        each = [0.5 * (np.log1p(size**2 * np.maximum(open_ones, 0.0)).sum() + squares / size**2) for size in _SIZES]
-        return float(np.log(len(_SIZES)) - np.logaddexp.reduce(-np.array(each)))
+        seen, found = self.evidence, np.zeros(len(places))
+        counts = np.array([len(seen.values[place]) for place in places], dtype=int)
+        sizes = np.array(_SIZES)[:, None]
+        for count in np.unique(counts):
+            own = np.flatnonzero(counts == count)
+            information = np.stack([seen.information[place] for place in places[own]])
+            squares = np.array([seen.values[place] @ seen.values[place] for place in places[own]])
+            scale = seen.rows_that_speak[places[own]] * variance[own]
+            open_ones = np.maximum(np.linalg.eigvalsh(information) / scale[:, None], 0.0)
+            each = 0.5 * (np.log1p(sizes[..., None] ** 2 * open_ones).sum(axis=-1) + squares / sizes**2)
+            found[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-each, axis=0)
+        return found
 
     @cached_property
     def _shapes(self) -> list[np.ndarray]:
