@@ -18,7 +18,7 @@ _FAILED = re.compile(r"^failed +\d|\b[1-9]\d* failed\b", re.M)
 _STEP = re.compile(  # what a command says while it works, and of the log and the workspace
     r"^\s*\d+\.\d s  |^\s*\d+ s  step |^  |^\w[\w ]* \((cure first|doubtful|mended)\): "
     r"|^Rebuilding the graph from the database$|^Reasoning$|^Checking the constraints$"
-    r"|: left aside, as nobody trusts it: |: not told: "
+    r"|: left aside, as nobody trusts it: |: not told: |; its samples are not in the graph; the file is kept as "
 )
 _FOUND = re.compile(r"^\w[\w ]* \(cure first\): |^damage +(?!none$)", re.M)  # all that is said where it is refused
 _WARNING = re.compile(r"^.*\b\w*Warning: .*$", re.M)
