@@ -1,10 +1,14 @@
 """`irtwin fleet`: data sets in, results by batch, and what was set aside."""
 
+import itertools
+import threading
+import time
 from pathlib import Path
 
 import pytest
 from tests import data_sets, small_robots
 
+from irtwin.fleet import fleet
 from irtwin.fleet.fleet import batches_of
 
 pytestmark = pytest.mark.slow
@@ -52,6 +56,16 @@ def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, first: tuple
     again = run(robots, out)
     assert again.out == said.out
     assert {page: page.stat().st_mtime_ns for page in pages} == written
+
+
+def test_it_is_told_how_far_it_is_while_it_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet, "_EVERY", 0.01)
+    told, three = itertools.count(), threading.Event()
+    with fleet.told_meanwhile(lambda: next(told) > 1 and three.set()):
+        assert three.wait(60)
+    heard = next(told)
+    time.sleep(0.05)
+    assert next(told) == heard + 1  # it ends with the block
 
 
 def test_a_fleet_has_one_base_of_iris(robots: Path, out: Path) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import threading
+import time
 import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -18,6 +21,7 @@ from irtwin.storage.object_storage import checked_url
 from irtwin.storage.series_place import look
 
 _NAME = "batch_{:04d}"
+_EVERY = 5.0  # s between two lines of how far a fleet is
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,33 @@ def work(
     def tell(one: Batch) -> None:
         announce(f"{one.folder.name}, {next(ended)} of {len(batches)}: {_line(status_of([one]).counts)}")
 
-    if scheduler is None:
-        work_here(batches, workers, tell)
-    else:
-        work_on_cluster(batches, scheduler, tell)
+    with told_meanwhile(lambda: announce(f"{_line(status_of(batches).counts)} of {kind}")):
+        if scheduler is None:
+            work_here(batches, workers, tell)
+        else:
+            work_on_cluster(batches, scheduler, tell)
     return status_of(batches)
+
+
+@contextmanager
+def told_meanwhile(tell: Callable[[], None]) -> Iterator[None]:
+    """Call a function each five seconds while the block runs, and more seldom where it takes long itself."""
+    over = threading.Event()
+
+    def go_on() -> None:
+        pause = _EVERY
+        while not over.wait(pause):
+            began = time.monotonic()
+            tell()
+            pause = max(_EVERY, 20 * (time.monotonic() - began))
+
+    teller = threading.Thread(target=go_on, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        over.set()
+        teller.join()
 
 
 def _place_of_series(folder: Path, series_url: str | None) -> str | None:
