@@ -54,7 +54,9 @@ def test_where_nothing_is_to_blame_there_is_no_table_of_causes(verdict):
 
 def test_what_to_log_next_has_a_line_each():
     assert all(line.startswith("To log next: ") for line in summary.next_steps(gap_cases.document("ambiguous")))
-    assert summary.next_steps(gap_cases.document("no_gap")) == []
+    for settled in ("no_gap", "attributed"):
+        said = gap_cases.diagnosis("ambiguous") | {"verdict": settled}
+        assert summary.next_steps(Document.from_json(said)) == []
 
 
 def test_of_many_motions_to_log_the_rest_is_counted():

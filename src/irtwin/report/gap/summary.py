@@ -99,8 +99,12 @@ def not_held(causes: Sequence[Cause]) -> list[str]:
 
 
 def next_steps(diagnosis: Document) -> list[str]:
-    """Return what to log next: a line for each of the first few motions, and how many more the report has."""
-    motions = diagnosis.next_experiment.motions if diagnosis.next_experiment else ()
+    """Return what to log next: a line for each of the first few motions, and how many more the report has.
+
+    Nothing where the verdict leaves nothing open: what else could be shown is in the report.
+    """
+    is_open = diagnosis.verdict in ("ambiguous", "unexplained")
+    motions = diagnosis.next_experiment.motions if diagnosis.next_experiment and is_open else ()
     said = [f"To log next: {motion}" for motion in motions[:_STEPS]]
     return said + ([f"{len(motions) - _STEPS} more to log are in the report (--report)"] if motions[_STEPS:] else [])
 
