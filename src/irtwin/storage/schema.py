@@ -423,7 +423,7 @@ class RunEnergy(Base):
 
 
 class RunPrice(Base):
-    """What a planned run will take by its robot's twin, with 95 % intervals of the twin's parameters.
+    """What a planned run will take by its robot's twin, with 95 % intervals.
 
     The twin is named by its id alone: one that was replaced has no row any more, and the price stays what it was.
     """
