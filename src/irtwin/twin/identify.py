@@ -30,7 +30,7 @@ from irtwin.identification.progress import Tell
 from irtwin.identification.remainder import Remainder, remainder
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
-from irtwin.identification.uncertainty import half_widths, normal_covariance
+from irtwin.identification.uncertainty import NORMAL, half_widths, normal_covariance
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
@@ -96,7 +96,7 @@ def identify(
     remaining = _remainder(stack, left, found[-1][0])
     if constants:
         found.append((constants.terms, constants.estimate))
-    parameters = [parameter for terms, result in found for parameter in _parameters(terms, result)]
+    parameters = [parameter for terms, result in found for parameter in _parameters(terms, result, remaining)]
     return Twin(
         robot=robot,
         effects=stack.effects,
@@ -171,9 +171,11 @@ def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Eff
     return [shapes[best].on(*joints) for best, joints in chosen.items()]
 
 
-def _parameters(terms: Terms, found: Estimate) -> list[Parameter]:
+def _parameters(terms: Terms, found: Estimate, left: Remainder | None) -> list[Parameter]:
+    """Return the terms' parameters; what lasts of the remainder looks like what is drawn at rest."""
     spread = np.array([term.spread for _, term in terms])
-    widths = half_widths(found.covariance, spread, found.blocks)
+    lasting = np.array([NORMAL * left.mean if left and effect.drawn_at_rest else 0.0 for effect, _ in terms])
+    widths = np.hypot(half_widths(found.covariance, spread, found.blocks), lasting)
     return [
         Parameter(
             effect=effect.id,
