@@ -460,6 +460,23 @@ class EnergyShare(Base):
     joint: Mapped[str | None]
     robot_id: Mapped[str]
     energy_j: Mapped[float]
+    lower_j: Mapped[float | None]  # of the 95 % interval; none of a live run
+    upper_j: Mapped[float | None]
+    inseparable: Mapped[int | None]  # number of the InseparableEnergy that it is part of
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class InseparableEnergy(Base):
+    """Energy of shares of a run that the data do not part, with its 95 % interval."""
+
+    __tablename__ = "inseparable_energy"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
+    robot_id: Mapped[str]
+    energy_j: Mapped[float]
+    lower_j: Mapped[float]
+    upper_j: Mapped[float]
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
