@@ -53,12 +53,7 @@ def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
         return tuple(Entry((share,), share.energy, None, None) for share in shares)
     whole = cost(twin, [motion]).energy.half_width
     assert whole is not None
-    slopes = _slopes(twin, motion, ledger)
-    covariance = slopes @ twin.covariance @ slopes.T
-    if twin.remainder:  # what lasts of it looks like what is drawn at rest
-        at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
-        lasting = twin.remainder.energy(float(motion.time[-1] - motion.time[0]))
-        covariance += np.diag([lasting**2 if entry.effect in at_rest else 0.0 for entry in ledger])
+    covariance = ledger_covariance(twin, motion, ledger)
     energies = np.array([entry.energy for entry in ledger])
     one_way = _one_way(twin)
 
@@ -75,6 +70,17 @@ def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
         )
         for places in _joined(energies, covariance, whole)
     )
+
+
+def ledger_covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.ndarray:
+    """Return the (E, E) covariance of the ledger's E energies, J^2, of a twin that has one of its parameters."""
+    slopes = _slopes(twin, motion, ledger)
+    found = np.asarray(slopes @ twin.covariance @ slopes.T)
+    if twin.remainder:  # what lasts of it looks like what is drawn at rest
+        at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
+        lasting = twin.remainder.energy(float(motion.time[-1] - motion.time[0]))
+        found += np.diag([lasting**2 if entry.effect in at_rest else 0.0 for entry in ledger])
+    return found
 
 
 def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[list[int]]:
