@@ -163,6 +163,7 @@ def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
     ("name", "words"),
     [
         ("Arm_A.fit_1", "Energy 1.00 kJ In kWh 0.000278 kWh Cost"),
+        ("Arm_A.fit_1", "Drives on at rest, the log says 55.0 W and the twin 50.0 W: they differ by more than"),
         ("Arm_C.press_1", "which is mechanical energy alone"),
         ("Arm_B.live_1", "power is up to 80 W from the twin"),
         ("Arm_A.pick", "It is planned and did not take place: the twin says that it will take 1.90 kJ"),

@@ -22,6 +22,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS
 from irtwin.twin.account import Entry, Share, account
 from irtwin.twin.price import Figure, Price, cost, saving
+from irtwin.twin.supply_states import SupplyState, supply_states
 from irtwin.twin.twin import Twin
 from irtwin.twin.validate import validate
 
@@ -49,6 +50,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         rows=[
             _run_energy(run, twin_id, role, twin, motion, shares),
             *_account(robot_id, run_id, twin_id, entries),
+            *_states(robot_id, run_id, supply_states(twin, motion) if twin.knows_power else ()),
             *(
                 schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
                 for joint, energy in _per_joint(shares).items()
@@ -85,6 +87,20 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
                 upper_j=share.upper,
                 inseparable=number if len(entry.shares) > 1 else None,
             )
+
+
+def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[schema.SupplyState]:
+    for number, one in enumerate(states, start=1):
+        yield schema.SupplyState(
+            run_id=run_id,
+            number=number,
+            robot_id=robot_id,
+            state=one.name,
+            seconds=one.seconds,
+            power_w=one.logged,
+            differs=one.differs,
+            **_figure("modelled_power", "w", one.modelled),
+        )
 
 
 def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twin: Twin) -> Made:

@@ -480,6 +480,24 @@ class InseparableEnergy(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+class SupplyState(Base):
+    """A state of the supply in a run: how long, and its mean power by the log and by the twin, with a 95 % interval."""
+
+    __tablename__ = "supply_state"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
+    robot_id: Mapped[str]
+    state: Mapped[str]  # "off", "moving", "brakes closed" or "drives on at rest"
+    seconds: Mapped[float]
+    power_w: Mapped[float | None]  # none where none was logged
+    modelled_power_w: Mapped[float]
+    modelled_power_lower_w: Mapped[float | None]
+    modelled_power_upper_w: Mapped[float | None]
+    differs: Mapped[bool]  # the log's power lies outside the twin's interval
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
 class JointEnergy(Base):
     """The ledger summed over effects: what one joint took over a run."""
 

@@ -80,6 +80,17 @@ def cost(twin: Twin, motions: Sequence[Motion]) -> Price:
     return Price(seconds, Figure(total, widths[0]), Figure(float(powers[highest][most]), widths[1]), mean)
 
 
+def mean_power(twin: Twin, motion: Motion, where: np.ndarray) -> Figure:
+    """Return the mean power over those samples of a motion `where` (N,) is true, W; some are."""
+    weights = np.where(where, trapezoid(motion.time), 0.0)
+    seconds = float(weights.sum())
+    value = float(weights @ twin.power(motion)) / seconds
+    if twin.covariance is None:
+        return Figure(value, None)
+    left = [twin.remainder.energy(seconds) / seconds] if twin.remainder else []
+    return Figure(value, _half_width(twin, _slope(twin, motion, weights) / seconds, *left))
+
+
 def saving(twin: Twin, motion: Motion, instead: Sequence[Motion]) -> Figure:
     """Return the electrical energy, J, that a motion saves where it takes the place of others; negative if it costs.
 
