@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, measure, swing
+from tests.synthetic import arm, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.supply import HoldingBrakes
@@ -18,7 +18,7 @@ REST, BRAKES, DELAY = 6.0, 30.0, 1.0  # s, W, s
 
 
 def run(seed: int, brakes: float = 0.0):
-    """A motion, then rest at which brakes close after a second; P0 is 120 W."""
+    """A motion, then rest at which brakes, if any, close after a second and carry the links."""
     moving = swing(ROBOT, seed, seconds=10.0)
     after = moving.time[-1] + np.arange(1, 1 + round(REST * moving.rate)) / moving.rate
     rest = np.zeros((len(after), 2))
@@ -31,7 +31,8 @@ def run(seed: int, brakes: float = 0.0):
     )
     shown = measure(ROBOT, whole, 0.2, seed=seed)
     released = HoldingBrakes(delay=DELAY).columns(ROBOT, whole)[:, 0]
-    return replace(shown, power=shown.power + brakes * released)
+    heat = (truth(ROBOT)["R"] * shown.current**2).sum(axis=1)
+    return replace(shown, power=shown.power + brakes * released - (heat * (1 - released) if brakes else 0.0))
 
 
 def states(twin, motion):

@@ -127,10 +127,11 @@ class Effect(ABC):
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
     `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, one
     `of_every_drive` needs no proof, what is `drawn_at_rest` does not depend on the motion, and what `scales_power`
-    multiplies all that a meter shows. A `disturbance` goes its own way, so that no run tells when it acts in another,
-    and repeats of a motion show it; the word says as what, "line" or "switching". `manual_test` is what a person can do
-    to show it where no motion does; `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call
-    its coefficients, of those that they have. What its parameters can be is `possible`.
+    multiplies all that a meter shows. Where the column of one that `frees_joints` is zero, brakes hold the joints and
+    the drives are off. A `disturbance` goes its own way, so that no run tells when it acts in another, and repeats of a
+    motion show it; the word says as what, "line" or "switching". `manual_test` is what a person can do to show it where
+    no motion does; `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call its coefficients,
+    of those that they have. What its parameters can be is `possible`.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -151,6 +152,7 @@ class Effect(ABC):
     carries_torque: ClassVar[bool] = False
     electrical_loss: ClassVar[bool] = False
     of_every_drive: ClassVar[bool] = False
+    frees_joints: ClassVar[bool] = False
     drawn_at_rest: ClassVar[bool] = False
     scales_power: ClassVar[bool] = False
     disturbance: ClassVar[str | None] = None

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.supply import HoldingBrakes
 from irtwin.signals.motion import Motion, standstill
 from irtwin.twin.price import Figure, mean_power, trapezoid
 from irtwin.twin.twin import Twin
@@ -41,7 +40,8 @@ def supply_states(twin: Twin, motion: Motion) -> tuple[SupplyState, ...]:
     off = np.zeros(len(still), dtype=bool)
     if motion.power is not None:
         off = motion.power < _OFF * _at_rest(twin)
-    closed = still & _closed(twin, motion)
+    on = twin.stack.drives_on(motion)
+    closed = still & (np.zeros_like(still) if on is None else on == 0)
     found = {"off": off, "moving": ~still, "brakes closed": closed, "drives on at rest": still}
     return tuple(_states(twin, motion, found))
 
@@ -60,11 +60,3 @@ def _states(twin: Twin, motion: Motion, found: dict[str, np.ndarray]) -> Iterato
 def _at_rest(twin: Twin) -> float:
     """Return the power that is drawn whatever the robot does, W."""
     return sum(twin.value(effect.id, term) for effect, term in twin.stack.power_terms if effect.drawn_at_rest)
-
-
-def _closed(twin: Twin, motion: Motion) -> np.ndarray:
-    """Return where the brakes of the twin are closed, (N,) bool."""
-    for effect in twin.stack.effects:
-        if isinstance(effect, HoldingBrakes):
-            return np.asarray(effect.columns(twin.robot, motion)[:, 0] == 0)
-    return np.zeros(len(motion.time), dtype=bool)
