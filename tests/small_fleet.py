@@ -72,6 +72,10 @@ LEDGER = {  # run: effect, joint, J
     "Arm_C.press_1": "rigid_body j1 200, coulomb_friction j1 80, no_regeneration - 20",
     "Arm_C.press_2": "rigid_body j1 196, coulomb_friction j1 80, no_regeneration - 24",
 }
+FRICTION_TOGETHER = ("Arm_A.fit_1", "coulomb_friction")  # of both joints: not told apart
+SUPPLY = {  # run: state, s, W by the log and by the twin
+    "Arm_A.fit_1": [("moving", 9.0, 105.0, 104.0), ("drives on at rest", 1.0, 55.0, 50.0)],
+}
 PARAMETERS = [  # robot, effect, joint, name, value, unit, lower, upper
     ("Arm_A", "coulomb_friction", "j1", "Fc", 4.0, "N m", 3.9, 4.1),
     ("Arm_A", "coulomb_friction", "j2", "Fc", 2.5, "N m", 2.3, 2.7),
@@ -334,7 +338,18 @@ def _energies() -> Iterator[Base]:
             yield schema.EnergyShare(
                 twin_id=f"{robot}.t1", run_id=run_id, effect=effect, robot_id=robot,
                 place=joint.replace("-", "robot"), joint=None if joint == "-" else joint,
-                energy_j=float(joules), activity_id=made,
+                energy_j=float(joules), lower_j=0.5 * float(joules), upper_j=1.5 * float(joules),
+                inseparable=1 if (run_id, effect) == FRICTION_TOGETHER else None, activity_id=made,
+            )  # fmt: skip
+        if run_id == FRICTION_TOGETHER[0]:
+            yield schema.InseparableEnergy(
+                run_id=run_id, number=1, robot_id=robot, energy_j=80.0, lower_j=77.0, upper_j=83.0, activity_id=made
+            )
+        for number, (state, lasts, logged, told) in enumerate(SUPPLY.get(run_id, ()), start=1):
+            yield schema.SupplyState(
+                run_id=run_id, number=number, robot_id=robot, state=state, seconds=lasts, power_w=logged,
+                modelled_power_w=told, modelled_power_lower_w=told - 3, modelled_power_upper_w=told + 3,
+                differs=abs(logged - told) > 3, activity_id=made,
             )  # fmt: skip
         for joint in JOINTS[robot]:
             taken = sum(float(joules) for _, at, joules in entries if at == joint)

@@ -65,8 +65,12 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     ]
     effects = _effects(machine, len(motions), more)
     traces = _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng)
-    copper = (machine.drive.resistance * (traces.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
-    drawn = _power(machine, traces, copper, more) if exact else meter(traces, machine, effects, STEP)
+    released = _released(traces) if more else np.ones(traces.torque.shape[:2])
+    driven = replace(traces, torque=traces.torque * released[:, :, None])  # closed brakes carry the links
+    copper = (machine.drive.resistance * (driven.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
+    drawn = (
+        _power(machine, driven, copper) + BRAKES * released * more if exact else meter(driven, machine, effects, STEP)
+    )
     sensed = shown(traces, machine, (), STEP)[::STRIDE]
     sensors, cut = drawings.sensors, slice(None, None, STRIDE)
     noise = np.random.default_rng([9, seed])
@@ -138,15 +142,17 @@ def _followed(machine: Machine, motions: list[Motion], more: bool) -> Traces:
     return Traces(q, dq, ddq, torque, np.full_like(q, 35.0))
 
 
-def _power(machine: Machine, traces: Traces, copper: np.ndarray, more: bool) -> np.ndarray:
+def _power(machine: Machine, traces: Traces, copper: np.ndarray) -> np.ndarray:
     """Return the power (T, R) W of these: iron with speed and its square, inverters with current, a chopper."""
     drive, speed = machine.drive, np.abs(traces.dq) * machine.drive.gear_ratio / 314.16
     iron = drive.iron_loss * (0.5 * speed + 0.5 * speed**2)
     inverter = 2.0 * np.abs(traces.torque) / drive.joint_torque_constant
     axes = (traces.torque * traces.dq + iron + inverter).sum(axis=2) + copper
-    total = np.maximum(axes, 0.0) + machine.drawings.supply.standby
-    if not more:
-        return total
+    return np.maximum(axes, 0.0) + machine.drawings.supply.standby
+
+
+def _released(traces: Traces) -> np.ndarray:
+    """Return (T, R) whether brakes are open: half a second longer than a joint moves."""
     moving = (np.abs(traces.dq) > 0.01).any(axis=2)
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving))[:, None], -(10**9)), axis=0)
-    return total + BRAKES * ((np.arange(len(moving))[:, None] - last) * STEP <= 0.5)
+    return ((np.arange(len(moving))[:, None] - last) * STEP <= 0.5).astype(float)

@@ -18,19 +18,23 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.gap.choice import identified
 from irtwin.identification.cutoff import cutoff_for
+from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import Split, energy, energy_error, split
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion
+from irtwin.twin.account import ledger_covariance
 from irtwin.twin.price import cost
 from irtwin.twin.twin import Twin
 
 
 @dataclass(frozen=True)
 class Row:
-    """What a method made of a case: energy errors of held-out runs, %, and whether intervals held; ratios to truth."""
+    """What a method made of a case: energy errors of held-out runs, %, whether 95 % intervals held, ratios to truth."""
 
     errors: list[float]
     covered: list[bool]
+    copper_covered: list[bool]
+    standby_covered: bool | None
     standby: float
     copper: float
     seconds: float
@@ -38,17 +42,24 @@ class Row:
 
 
 def of_twin(case: Case, twin: Twin, parts: Split, seconds: float) -> Row:
-    errors, covered, copper = [], [], []
+    errors, covered, copper, copper_covered = [], [], [], []
     for motion in parts.held_out:
         assert motion.power is not None
         told, taken = energy(motion.time, motion.power), cost(twin, [motion]).energy
         errors.append(100 * abs(taken.value - told) / told)
         covered.append(taken.half_width is not None and abs(taken.value - told) <= taken.half_width)
-        heat = sum(entry.energy for entry in twin.ledger(motion) if entry.effect == "copper_loss")
-        copper.append(heat / case.copper[motion.run])
-    standby = next((one.value for one in twin.parameters if one.effect == "standby_power"), 0.0)
+        ledger, true = twin.ledger(motion), case.copper[motion.run]
+        own = [place for place, entry in enumerate(ledger) if entry.effect == "copper_loss"]
+        heat = sum(ledger[place].energy for place in own)
+        copper.append(heat / true)
+        if own:
+            variance = ledger_covariance(twin, motion, ledger)[np.ix_(own, own)].sum()
+            copper_covered.append(bool(abs(heat - true) <= NORMAL * variance**0.5))
+    rest = next(one for one in twin.parameters if one.effect == "standby_power")
+    held = rest.lower is not None and rest.upper is not None and rest.lower <= case.standby <= rest.upper
     listed = ", ".join(one for one in twin.effect_ids if one not in BASELINE)
-    return Row(errors, covered, standby / case.standby, float(np.mean(copper)), seconds, listed)
+    mean = float(np.mean(copper))
+    return Row(errors, covered, copper_covered, held, rest.value / case.standby, mean, seconds, listed)
 
 
 def least_squares(case: Case, parts: Split, effects: Sequence[str]) -> Row:
@@ -78,7 +89,7 @@ def least_squares(case: Case, parts: Split, effects: Sequence[str]) -> Row:
         errors.append(energy_error(energy(motion.time, motion.power), energy(motion.time, modelled)))
         copper.append(energy(motion.time, own @ np.where(heat, free, 0.0)) / case.copper[motion.run])
     standby = free[names.index("standby_power")] / case.standby
-    return Row(errors, [], standby, float(np.mean(copper)), time.perf_counter() - began)
+    return Row(errors, [], [], None, standby, float(np.mean(copper)), time.perf_counter() - began)
 
 
 def methods(case: Case) -> dict[str, Row]:
@@ -102,12 +113,14 @@ def line(name: str, rows: Sequence[Row]) -> str:
     """Return a line of the table over cases."""
     errors = [error for row in rows for error in row.errors]
     covered = [held for row in rows for held in row.covered]
-    cover = f"{100 * np.mean(covered):.0f} %" if covered else "-"
+    copper = [held for row in rows for held in row.copper_covered]
+    standby = [row.standby_covered for row in rows if row.standby_covered is not None]
+    cover = [f"{100 * np.mean(held):.0f} %" if held else "-" for held in (covered, standby, copper)]
     ranges = (
         f"{min(values):.2f} to {max(values):.2f}" for values in zip(*((r.standby, r.copper) for r in rows), strict=True)
     )
     seconds = np.mean([row.seconds for row in rows])
-    parts = (name, f"{np.mean(errors):.2f}", f"{max(errors):.2f}", cover, *ranges, f"{seconds:.0f}")
+    parts = (name, f"{np.mean(errors):.2f}", f"{max(errors):.2f}", *cover, *ranges, f"{seconds:.0f}")
     return "| " + " | ".join(parts) + " |"
 
 
@@ -122,8 +135,9 @@ def main() -> None:
         for name, row in methods(case).items():
             kinds.setdefault(kind, {}).setdefault(name, []).append(row)
             print(f"# {case.name}, {name}: {np.mean(row.errors):.2f} {max(row.errors):.2f} {row.chosen}", flush=True)
-    print("| effects | energy error, %: mean | worst | covered | standby / truth | copper / truth | s |")
-    print("| --- " * 7 + "|")
+    heads = ("effects", "energy error, %: mean", "worst", "covered: energy", "standby", "copper")
+    print("| " + " | ".join((*heads, "standby / truth", "copper / truth", "s")) + " |")
+    print("| --- " * 9 + "|")
     for kind, of_kind in kinds.items():
         for name, rows in of_kind.items():
             print(line(f"{kind}: {name}", rows))

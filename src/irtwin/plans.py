@@ -21,10 +21,10 @@ from irtwin.providers.records import (
     load_run,
     load_twin,
 )
-from irtwin.providers.run_state import standstill
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan
+from irtwin.signals.motion import standstill
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged

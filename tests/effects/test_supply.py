@@ -1,13 +1,16 @@
 """Effects on what is drawn from the mains."""
 
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.synthetic import arm, swing, with_constants
 
 from irtwin.effects.effect import Predicted
-from irtwin.effects.supply import BusCapacitor
+from irtwin.effects.stack import Stack
+from irtwin.effects.supply import BusCapacitor, HoldingBrakes
 from irtwin.resources import folder
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.motion import Motion
@@ -23,3 +26,20 @@ def test_the_flow_into_the_bus_is_that_of_a_store_filled_sample_by_sample(axes: 
     flow = BusCapacitor(E=most).columns(ROBOT, motion, Predicted(still, axes=np.array(axes)))[:, 0] * most
     held = list(accumulate(axes, lambda before, power: min(max(before - power / 10, 0.0), most), initial=0.0))
     np.testing.assert_allclose(flow, np.diff(held) * 10, atol=1e-9 * 1e3)
+
+
+def test_closed_brakes_carry_the_links_so_that_no_current_heats() -> None:
+    robot = with_constants(arm(2))
+    motion = swing(robot, 1, seconds=3.0)
+    still = replace(motion, dq=np.where(motion.time[:, None] < 1.0, motion.dq, 0.0))
+    torque = np.full(still.dq.shape, 20.0)
+    listed = ["mechanical_power", "standby_power", "copper_loss", "inverter_loss"]
+    without, braked = Stack(robot, listed), Stack(robot, [*listed, HoldingBrakes(delay=0.5)])
+    assert without.drives_on(still) is None
+    on = braked.drives_on(still).astype(bool)
+    assert on.any() and not on[still.time > 1.6].any()
+    heat = [effect.electrical_loss and term.joint is not None for effect, term in without.power_terms]
+    free, held = without.power_columns(still, torque), braked.power_columns(still, torque)[:, :-1]
+    assert np.array_equal(held[on], free[on])
+    assert not held[~on][:, heat].any() and free[~on][:, heat].all()
+    assert np.array_equal(held[~on][:, np.invert(heat)], free[~on][:, np.invert(heat)])

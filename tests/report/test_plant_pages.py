@@ -163,6 +163,7 @@ def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
     ("name", "words"),
     [
         ("Arm_A.fit_1", "Energy 1.00 kJ In kWh 0.000278 kWh Cost"),
+        ("Arm_A.fit_1", "Drives on at rest, the log says 55.0 W and the twin 50.0 W: they differ by more than"),
         ("Arm_C.press_1", "which is mechanical energy alone"),
         ("Arm_B.live_1", "power is up to 80 W from the twin"),
         ("Arm_A.pick", "It is planned and did not take place: the twin says that it will take 1.90 kJ"),
@@ -227,3 +228,15 @@ def test_one_day_is_no_trend_and_negative_energy_no_bar() -> None:
     assert [(bar.day, bar.height) for bar in trend.bars] == [("2026-03-02", 0.0), ("2026-03-03", 1.0)]
     nothing = days({"2026-03-02": 0.0, "2026-03-03": 0.0}, 2)
     assert nothing is not None and {bar.height for bar in nothing.bars} == {0.0}
+
+
+def test_what_data_do_not_part_is_one_entry_with_a_range_of_each_part(graph: KnowledgeGraph) -> None:
+    answers = ask(graph, page.questions("run"), {"run": f"{ID}run/Arm_A.fit_1"})
+    entries = robot.of_run(answers)["entries"]
+    (friction,) = (entry for entry in entries if len(entry) > 1)
+    assert [(row["effect_name"], row["lower_j"], row["upper_j"]) for row in friction] == [
+        ("Coulomb friction", 25.0, 75.0),
+        ("Coulomb friction", 15.0, 45.0),
+    ]
+    assert {(row["entry_j"], row["entry_lower_j"], row["entry_upper_j"]) for row in friction} == {(80.0, 77.0, 83.0)}
+    assert sum(entry[0]["entry_j"] for entry in entries) == sum(row["energy_j"] for row in answers["ledger"].rows)

@@ -42,6 +42,8 @@ from irtwin.storage.revisions.versions import (
     r0011_cutoff,
     r0012_one_criterion,
     r0013_choices,
+    r0014_inseparable,
+    r0015_supply_states,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -87,6 +89,7 @@ def digest() -> str:
 
 AFTER_0_1 = {  # columns that revisions have added
     "run": ("time_scaling_of", "time_scale", "product", "pieces", "cycles", "started", "ended"),
+    "energy_share": ("lower_j", "upper_j", "inseparable"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
     "robot": ("cutoff_hz",),
     "gap_diagnosis": ("unexplained_because", "cutoff_hz", "cutoff_why"),
@@ -128,6 +131,8 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
         if of_0_1:
             connection.execute(text("DROP TABLE robot_note"))
             connection.execute(text("DROP TABLE twin_choice"))
+            connection.execute(text("DROP TABLE inseparable_energy"))
+            connection.execute(text("DROP TABLE supply_state"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
@@ -162,6 +167,8 @@ def test_each_revision_follows_another() -> None:
     assert r0010_log_odds.down_revision == r0009_no_consumption.revision
     assert r0011_cutoff.down_revision == r0010_log_odds.revision
     assert r0013_choices.down_revision == r0012_one_criterion.revision
+    assert r0014_inseparable.down_revision == r0013_choices.revision
+    assert r0015_supply_states.down_revision == r0014_inseparable.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:

@@ -75,3 +75,11 @@ def test_a_twin_of_an_older_file_prices_without_intervals(tmp_path):
 def test_what_was_never_seen_has_no_price():
     motions = [replace(measure(ROBOT, swing(ROBOT, seed, seconds=10.0)), power=None) for seed in (1, 2)]
     assert price(identify(ROBOT, motions), [swing(ROBOT, 7)]) is None
+
+
+def test_what_effects_leave_of_power_is_in_the_interval():
+    """Runs that take more or less than each other, for no reason that a twin knows, take no less from then on."""
+    motions = [measure(ROBOT, swing(ROBOT, of, seconds=10.0), 0.1, seed=of) for of in range(6)]
+    off = [replace(one, power=one.power + by) for one, by in zip(motions, (9, -7, 4, -8, 6, -4), strict=True)]
+    steady, varying = (price(identify(ROBOT, of), [swing(ROBOT, 7)]).energy.half_width for of in (motions, off))
+    assert varying > 3 * steady

@@ -219,7 +219,7 @@ def slow(
     )
     by = "" if saved.half_width is None else f" +- {saved.half_width:.2g}"
     said = f"takes {abs(saved.value):.3g}{by} J {'less' if saved.value >= 0 else 'more'}"
-    click.echo(f"{_where(None, kept)}: {said} than {run} followed by waiting (95 % interval of the twin's parameters)")
+    click.echo(f"{_where(None, kept)}: {said} than {run} followed by waiting (95 % interval)")
 
 
 @click.command()

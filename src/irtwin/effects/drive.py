@@ -66,14 +66,11 @@ class CopperLoss(JointEffect):
     id: ClassVar[str] = "copper_loss"
     family: ClassVar[str] = "drive"
     electrical_loss: ClassVar[bool] = True
+    of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power while holding loaded poses, then unloaded ones, brakes open"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
-
-    def stated(self, robot: Robot) -> bool:
-        """Return whether some winding's resistance is known: what has a resistance heats."""
-        return any(joint.winding_resistance for joint in robot.joints)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return R, expected as the data sheet says."""
@@ -140,6 +137,7 @@ class IronLoss(JointEffect):
     id: ClassVar[str] = "iron_loss"
     family: ClassVar[str] = "drive"
     electrical_loss: ClassVar[bool] = True
+    of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power at constant speeds up to the limit in poses without load"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
@@ -165,6 +163,7 @@ class InverterLoss(JointEffect):
     id: ClassVar[str] = "inverter_loss"
     family: ClassVar[str] = "drive"
     electrical_loss: ClassVar[bool] = True
+    of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power while holding poses of rising load, brakes open"
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"

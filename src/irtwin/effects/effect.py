@@ -125,12 +125,13 @@ class Effect(ABC):
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
-    `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, what is
-    `drawn_at_rest` does not depend on the motion, and what `scales_power` multiplies all that a meter shows. A
-    `disturbance` goes its own way, so that no run tells when it acts in another, and repeats of a motion show it; the
-    word says as what, "line" or "switching". `manual_test` is what a person can do to show it where no motion does;
-    `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call its coefficients, of those that
-    they have. What its parameters can be is `possible`.
+    `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, one
+    `of_every_drive` needs no proof, what is `drawn_at_rest` does not depend on the motion, and what `scales_power`
+    multiplies all that a meter shows. Where the column of one that `frees_joints` is zero, brakes hold the joints and
+    the drives are off. A `disturbance` goes its own way, so that no run tells when it acts in another, and repeats of a
+    motion show it; the word says as what, "line" or "switching". `manual_test` is what a person can do to show it where
+    no motion does; `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call its coefficients,
+    of those that they have. What its parameters can be is `possible`.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
@@ -150,6 +151,8 @@ class Effect(ABC):
     within_bodies: ClassVar[bool] = False
     carries_torque: ClassVar[bool] = False
     electrical_loss: ClassVar[bool] = False
+    of_every_drive: ClassVar[bool] = False
+    frees_joints: ClassVar[bool] = False
     drawn_at_rest: ClassVar[bool] = False
     scales_power: ClassVar[bool] = False
     disturbance: ClassVar[str | None] = None
@@ -192,10 +195,6 @@ class Effect(ABC):
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the effect in each shape that is worth trying; a robot's data sheet may add some."""
         return (self,)
-
-    def stated(self, robot: Robot) -> bool:
-        """Return whether the robot's data sheet says that it has the effect."""
-        return False
 
     def changes(self) -> tuple[Effect, ...]:
         """Return the shapes that are worth trying for a change alone."""

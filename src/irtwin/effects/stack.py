@@ -230,7 +230,7 @@ class Stack:
             if effect.needs == "power" or not effect.acts_in(motion)
             else self.columns(effect, motion, None)
             if effect.memory
-            else effect.columns(self.robot, motion, Predicted(torque))
+            else self._while_on(effect, motion, effect.columns(self.robot, motion, Predicted(torque)))
             for effect in self._power
         ]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
@@ -256,13 +256,26 @@ class Stack:
             return np.zeros(shape if effect.signal == "power" else (shape[0], motion.dq.shape[1], shape[1]))
         stop = motion.start + len(motion.time)
         if not effect.memory:
-            return effect.columns(self.robot, motion, None if below is None else below.part(motion.start, stop))
+            own = effect.columns(self.robot, motion, None if below is None else below.part(motion.start, stop))
+            return self._while_on(effect, motion, own)
         whole = motion.whole or motion
         last = self._last_columns.get(id(effect))
         if last is None or last[0] is not whole or last[1] is not below:
             last = (whole, below, effect.columns(self.robot, whole, below))
             self._last_columns[id(effect)] = last
         return last[2][motion.start : stop]
+
+    def drives_on(self, motion: Motion) -> np.ndarray | None:
+        """Return (N,) 1 where the drives are on, 0 where closed brakes hold the joints; None: they are always on."""
+        brakes = next((effect for effect in self._power if effect.frees_joints), None)
+        return None if brakes is None else self.columns(brakes, motion, None)[:, 0]
+
+    def _while_on(self, effect: Effect, motion: Motion, columns: np.ndarray) -> np.ndarray:
+        """Return an effect's columns without the heat of drives that are off."""
+        if not (effect.electrical_loss and isinstance(effect, JointEffect)):
+            return columns
+        on = self.drives_on(motion)
+        return columns if on is None else columns * on[:, None]
 
     def _contribution(self, effect: Effect, motion: Motion, values: np.ndarray, below: Predicted | None) -> np.ndarray:
         """Return what (k,) coefficients of an effect of torque add, (N, n) N m; `below` as in `columns`."""

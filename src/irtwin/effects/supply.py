@@ -139,9 +139,10 @@ class NoRegeneration(Effect):
 
 @dataclass(frozen=True)
 class HoldingBrakes(Effect):
-    """Pb while the brakes are released: as long as a joint moves, and `delay` longer."""
+    """Pb while the brakes are released: as long as a joint moves, and `delay` longer. Closed, they carry the links."""
 
     id: ClassVar[str] = "holding_brakes"
+    frees_joints: ClassVar[bool] = True
     family: ClassVar[str] = "supply"
     electrical_loss: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power while standing with brakes closed, then open"

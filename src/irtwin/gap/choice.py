@@ -25,18 +25,17 @@ from irtwin.gap.search import power_causes, torque_causes, torque_source, twin_e
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.progress import Tell
 from irtwin.identification.threads import one_blas_thread
-from irtwin.robot.description import Robot
-from irtwin.signals.log import DataSet
+from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.choice import Choice
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 
 
-def begin(robot: Robot) -> tuple[str, ...]:
-    """Return the effects that need no proof: the baseline's, and those that the data sheet says the robot has."""
-    stated = (one.id for one in catalogue().values() if one.id not in BASELINE and one.stated(robot))
-    return (*BASELINE, *stated)
+def begin(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Return the effects that need no proof: the baseline's, and the heat of every drive, where power was logged."""
+    heat = (one.id for one in catalogue().values() if one.of_every_drive)
+    return (*BASELINE, *(heat if any(run.signals.power is not None for run in runs) else ()))
 
 
 def identified(data_set: DataSet, motions: Sequence[Motion], tell: Tell | None = None) -> Twin:
@@ -50,7 +49,7 @@ def identified(data_set: DataSet, motions: Sequence[Motion], tell: Tell | None =
     """
     if data_set.effects is not None:
         return identify(data_set.robot, motions, data_set.effects, tell=tell)
-    begun = begin(data_set.robot)
+    begun = begin(data_set.runs)
     runs = tuple(replace(run, role="observed") for run in data_set.runs)
     try:
         effects, choices = _chosen(replace(data_set, runs=runs, effects=begun), tell or (lambda line: None))

@@ -45,11 +45,11 @@ def fit_torque(stack: Stack, motions: Sequence[Motion], tell: Tell | None = None
     return blocks, found
 
 
-def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Estimate:
-    """Fit the free coefficients of power on top of the torque that was found."""
+def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> tuple[list[Block], Estimate]:
+    """Fit the free coefficients of power on top of the torque that was found; as `fit_torque` returns them."""
     free = free_terms(stack)
 
-    def fit(values: np.ndarray) -> Estimate:
+    def fit(values: np.ndarray) -> tuple[list[Block], Estimate]:
         def equations(motion: Motion) -> Rows:
             assert motion.power is not None
             columns = stack.predicted_power_columns(motion, torque_values, values)
@@ -59,15 +59,15 @@ def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray
         return _of_one(motions, equations, free, stack.prior_rows(free))
 
     values = _expected(stack.power_terms)
-    found = fit(values)
+    blocks, found = fit(values)
     for _ in range(_REPEATS if stack.power_coupled else 0):
         before = found.values
         values = values.copy()
         values[~stack.fixed] = before
-        found = fit(values)
+        blocks, found = fit(values)
         if _converged(found.values, before, _of(free)):
             break
-    return found
+    return blocks, found
 
 
 def fit_both(
@@ -87,7 +87,7 @@ def fit_both(
     """
     if CopperLoss.id not in stack.ids:
         stack = stack.with_effects([*stack.effects, CopperLoss()])
-    power = fit_power(stack, [motion for motion in motions if motion.power is not None], torque_values)
+    power = fit_power(stack, [motion for motion in motions if motion.power is not None], torque_values)[1]
     free, count = free_terms(stack), len(stack.torque_terms)
     terms = [*_of(stack.torque_terms), *_of(free), _SCALE]
     known = stack.prior_rows([*stack.torque_terms, *free])
@@ -184,24 +184,24 @@ def real_terms(stack: Stack) -> Terms:
     return [pair for pair, is_real in zip(stack.torque_terms, stack.real, strict=True) if is_real]
 
 
-def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray, Estimate]:
+def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray, list[Block], Estimate]:
     """Fit the coefficients of torque and power together to measured power, which torque carries into it.
 
-    Return the coefficients of torque (K,) and of power (L,), those not free as expected; and the estimate of
-    `real_terms` and `free_terms`. Losses grow with torque squared, so power is not linear in both: Gauss-Newton, from
-    no torque, where the first step is that of a robot without such losses.
+    Return the coefficients of torque (K,) and of power (L,), those not free as expected; and equations and estimate of
+    `real_terms` and `free_terms`, as `fit_torque` returns them. Losses grow with torque squared, so power is not linear
+    in both: Gauss-Newton, from no torque, where the first step is that of a robot without such losses.
     """
     real, free = real_terms(stack), free_terms(stack)
     torque_values, power_values = np.zeros(len(stack.torque_terms)), _expected(stack.power_terms)
     before = np.full(len(real) + len(free), np.inf)
     for _ in range(_STEPS):
         equations = _power_equations(stack, torque_values.copy(), power_values.copy())
-        found = _of_one(motions, equations, [*real, *free], stack.prior_rows([*real, *free]))
+        blocks, found = _of_one(motions, equations, [*real, *free], stack.prior_rows([*real, *free]))
         torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
         if _converged(found.values, before, _of([*real, *free])):
             break
         before = found.values
-    return torque_values, power_values, found
+    return torque_values, power_values, blocks, found
 
 
 def _power_equations(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
@@ -246,10 +246,13 @@ def _converged(values: np.ndarray, before: np.ndarray, terms: Sequence[Term]) ->
     return bool(np.all(np.abs(values - before) < _CONVERGED * np.array([term.spread for term in terms])))
 
 
-def _of_one(motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None) -> Estimate:
-    """Estimate the terms of one equation a sample."""
+def _of_one(
+    motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None
+) -> tuple[list[Block], Estimate]:
+    """Estimate the terms of one equation a sample; return them with the equations, reduced."""
     pattern = np.ones((1, len(terms)), dtype=bool)
-    return estimate(accumulate(motions, equations, pattern), pattern, _of(terms), prior_rows)
+    blocks = accumulate(motions, equations, pattern)
+    return blocks, estimate(blocks, pattern, _of(terms), prior_rows)
 
 
 def _of(terms: Terms) -> list[Term]:

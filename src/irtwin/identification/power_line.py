@@ -66,18 +66,18 @@ def power_slope(stack: Stack, motion: Motion, torque: np.ndarray, values: np.nda
     within = np.array([isinstance(effect, JointEffect) for effect, _ in stack.power_terms], dtype=bool)
     of_joint = np.array([[term.joint == name for name in names] for _, term in stack.power_terms], dtype=float)
     of_joint = of_joint.reshape(len(within), len(names)) * within[:, None]
-    slope = _rise(stack, motion, torque, np.ones(len(names))) @ (of_joint * values[:, None])
+    slope = power_rise(stack, motion, torque, np.ones(len(names))) @ (of_joint * values[:, None])
     if any(
         effect.needs == "torque" and not inside for (effect, _), inside in zip(stack.power_terms, within, strict=True)
     ):
         others = np.where(within, 0.0, values)
         for joint in range(len(names)):
-            slope[:, joint] += _rise(stack, motion, torque, np.eye(len(names))[joint]) @ others
+            slope[:, joint] += power_rise(stack, motion, torque, np.eye(len(names))[joint]) @ others
     return np.asarray(slope)
 
 
-def _rise(stack: Stack, motion: Motion, torque: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Return the slope of the columns of power, (N, L), where the joints' torques rise `along` (n,)."""
+def power_rise(stack: Stack, motion: Motion, torque: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return the slope of the columns of power, (N, L), where the joints' torques (N, n) rise `along` (n,)."""
     step = _STEP * along
     rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
     return np.asarray(rise / (2 * _STEP))

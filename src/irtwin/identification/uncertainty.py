@@ -10,7 +10,7 @@ from scipy.stats import t as student
 
 from irtwin.identification.accumulate import Block, triangle
 
-_LEVEL = 0.95
+LEVEL = 0.95
 NORMAL = 1.959963984540054  # deviations of a normal distribution that are half its 95 % interval
 _LEARNT = 0.5  # of the prior's standard deviation: an estimate less sure than this says what was expected, not measured
 
@@ -61,10 +61,10 @@ def half_widths(covariance: np.ndarray, spread: np.ndarray, blocks: int) -> np.n
     `spread`: (K,) the prior's standard deviations; `blocks`: how many the covariance rests on (Student's t).
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))  # a sure sum of unsure terms may round below
-    factor = float(student.ppf((1 + _LEVEL) / 2, max(blocks - 1, 1)))
+    factor = float(student.ppf((1 + LEVEL) / 2, max(blocks - 1, 1)))
     return np.where(deviation < _LEARNT * spread, factor * deviation, np.nan)
 
 
 def normal_covariance(covariance: np.ndarray, blocks: int) -> np.ndarray:
     """Return the (K, K) covariance grown so that `NORMAL` deviations are half a 95 % interval by Student's t."""
-    return np.asarray(covariance * (student.ppf((1 + _LEVEL) / 2, max(blocks - 1, 1)) / NORMAL) ** 2)
+    return np.asarray(covariance * (student.ppf((1 + LEVEL) / 2, max(blocks - 1, 1)) / NORMAL) ** 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from irtwin.live.joint_stream import State
-from irtwin.providers.run_state import STILL_SPEED
+from irtwin.signals.motion import STILL_SPEED
 
 FROZEN = 3.0  # s that every value must have been the same
 _LEAST = 20  # states in that time: of a slower source a value may well come three times

@@ -16,8 +16,8 @@ import pyarrow as pa
 from irtwin.live.joint_stream import STREAMED, State
 from irtwin.providers.live_energy import watching
 from irtwin.providers.records import run_iri
-from irtwin.providers.run_state import STILL_SHARE, STILL_SPEED
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
+from irtwin.signals.motion import STILL_SHARE, STILL_SPEED
 from irtwin.storage.journal import Header, Rows
 from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunEnergy, RunState
 

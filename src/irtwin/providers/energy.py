@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pyarrow as pa
@@ -19,8 +20,10 @@ from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS
+from irtwin.twin.account import Entry, Share, account
 from irtwin.twin.price import Figure, Price, cost, saving
-from irtwin.twin.twin import LedgerEntry, Twin
+from irtwin.twin.supply_states import SupplyState, supply_states
+from irtwin.twin.twin import Twin
 from irtwin.twin.validate import validate
 
 
@@ -37,33 +40,67 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     with workspace.reading() as session:
         role = session.get_one(schema.TwinRun, (twin_id, run_id))
     motion = robot_motions(workspace, robot_id).motions[run_id]
-    ledger = twin.ledger(motion)
+    entries = account(twin, motion)
+    shares = [share for entry in entries for share in entry.shares]
     read = inputs(workspace, robot_id, [run_id])
     return Made(
         robot_id=robot_id,
         used=[*read, twin_iri(twin_id)],
         metered=[] if motion.power is None else [one for one in read if one.startswith("series/")],
         rows=[
-            _run_energy(run, twin_id, role, twin, motion, ledger),
-            *(
-                schema.EnergyShare(
-                    twin_id=twin_id,
-                    run_id=run_id,
-                    effect=entry.effect,
-                    place=entry.joint or "robot",
-                    joint=entry.joint,
-                    robot_id=robot_id,
-                    energy_j=entry.energy,
-                )
-                for entry in ledger
-            ),
+            _run_energy(run, twin_id, role, twin, motion, shares),
+            *_account(robot_id, run_id, twin_id, entries),
+            *_states(robot_id, run_id, supply_states(twin, motion) if twin.knows_power else ()),
             *(
                 schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
-                for joint, energy in _per_joint(ledger).items()
+                for joint, energy in _per_joint(shares).items()
             ),
         ],
         series={run_id: modelled_series(twin, motion, held_out(role, motion))},
     )
+
+
+def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry]) -> Iterator[schema.Base]:
+    """Yield a run's shares of energy, and what is told of those together that are not told apart."""
+    number = 0
+    for entry in entries:
+        if len(entry.shares) > 1:
+            number += 1
+            yield schema.InseparableEnergy(
+                run_id=run_id,
+                number=number,
+                robot_id=robot_id,
+                energy_j=entry.energy,
+                lower_j=entry.lower,
+                upper_j=entry.upper,
+            )
+        for share in entry.shares:
+            yield schema.EnergyShare(
+                twin_id=twin_id,
+                run_id=run_id,
+                effect=share.effect,
+                place=share.joint or "robot",
+                joint=share.joint,
+                robot_id=robot_id,
+                energy_j=share.energy,
+                lower_j=share.lower,
+                upper_j=share.upper,
+                inseparable=number if len(entry.shares) > 1 else None,
+            )
+
+
+def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[schema.SupplyState]:
+    for number, one in enumerate(states, start=1):
+        yield schema.SupplyState(
+            run_id=run_id,
+            number=number,
+            robot_id=robot_id,
+            state=one.name,
+            seconds=one.seconds,
+            power_w=one.logged,
+            differs=one.differs,
+            **_figure("modelled_power", "w", one.modelled),
+        )
 
 
 def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twin: Twin) -> Made:
@@ -172,14 +209,14 @@ def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
 
 
 def _run_energy(
-    run: schema.Run, twin_id: str, role: schema.TwinRun, twin: Twin, motion: Motion, ledger: tuple[LedgerEntry, ...]
+    run: schema.Run, twin_id: str, role: schema.TwinRun, twin: Twin, motion: Motion, shares: Sequence[Share]
 ) -> schema.RunEnergy:
     (whole,) = validate(twin, [motion])
     start = int(np.argmax(held_out(role, motion)))
     judged = whole if start == 0 else validate(twin, [motion.part(start, len(motion.time))])[0]
     power = twin.power(motion) if motion.power is None else motion.power
     at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
-    standby = sum(entry.energy for entry in ledger if entry.effect in at_rest)
+    standby = sum(share.energy for share in shares if share.effect in at_rest)
     electrical = any(effect.electrical_loss for effect in twin.stack.effects)
     energy = whole.modelled_energy if whole.measured_energy is None else whole.measured_energy
     return schema.RunEnergy(
@@ -206,9 +243,9 @@ def returned_energy(twin: Twin, motion: Motion) -> float:
     return float(np.trapezoid(given.sum(axis=1), motion.time))
 
 
-def _per_joint(ledger: tuple[LedgerEntry, ...]) -> dict[str, float]:
+def _per_joint(shares: Sequence[Share]) -> dict[str, float]:
     energies: dict[str, float] = defaultdict(float)
-    for entry in ledger:
-        if entry.joint is not None:
-            energies[entry.joint] += entry.energy
+    for share in shares:
+        if share.joint is not None:
+            energies[share.joint] += share.energy
     return dict(energies)

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs
-from irtwin.signals.motion import Motion
+from irtwin.signals.motion import standstill
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import JointState, Run, RunState
-
-# A joint stands still below this share of its fastest speed in the run, or below a speed that no task needs.
-STILL_SHARE, STILL_SPEED = 0.005, 1e-3
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
@@ -41,9 +36,3 @@ def provide(workspace: Workspace, run_id: str) -> Made:
         for place, joint in enumerate(known.robot.joints)
     ]
     return Made(robot_id, inputs(workspace, robot_id, [run_id]), [state, *joints])
-
-
-def standstill(motion: Motion) -> np.ndarray:
-    """Return where no joint moves, (N,) bool."""
-    speed = np.abs(motion.dq)
-    return np.asarray((speed < np.maximum(STILL_SPEED, STILL_SHARE * speed.max(axis=0))).all(axis=1))

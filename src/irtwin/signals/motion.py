@@ -9,6 +9,9 @@ import numpy as np
 
 from irtwin.signals.channels import Signals
 
+# A joint stands still below this share of its fastest speed in the run, or below a speed that no task needs.
+STILL_SHARE, STILL_SPEED = 0.005, 1e-3  # -, rad/s
+
 
 @dataclass(frozen=True)
 class Motion(Signals):
@@ -43,3 +46,9 @@ class Motion(Signals):
     def part(self, start: int, stop: int) -> Motion:
         """Return samples start..stop (exclusive) as a motion of the same run."""
         return replace(self.rows(slice(start, stop)), whole=self.whole or self, start=self.start + start)
+
+
+def standstill(motion: Motion) -> np.ndarray:
+    """Return where no joint moves, (N,) bool."""
+    speed = np.abs(motion.dq)
+    return np.asarray((speed < np.maximum(STILL_SPEED, STILL_SHARE * speed.max(axis=0))).all(axis=1))

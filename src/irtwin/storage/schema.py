@@ -423,7 +423,7 @@ class RunEnergy(Base):
 
 
 class RunPrice(Base):
-    """What a planned run will take by its robot's twin, with 95 % intervals of the twin's parameters.
+    """What a planned run will take by its robot's twin, with 95 % intervals.
 
     The twin is named by its id alone: one that was replaced has no row any more, and the price stays what it was.
     """
@@ -460,6 +460,41 @@ class EnergyShare(Base):
     joint: Mapped[str | None]
     robot_id: Mapped[str]
     energy_j: Mapped[float]
+    lower_j: Mapped[float | None]  # of the 95 % interval; none of a live run
+    upper_j: Mapped[float | None]
+    inseparable: Mapped[int | None]  # number of the InseparableEnergy that it is part of
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class InseparableEnergy(Base):
+    """Energy of shares of a run that the data do not part, with its 95 % interval."""
+
+    __tablename__ = "inseparable_energy"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
+    robot_id: Mapped[str]
+    energy_j: Mapped[float]
+    lower_j: Mapped[float]
+    upper_j: Mapped[float]
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
+class SupplyState(Base):
+    """A state of the supply in a run: how long, and its mean power by the log and by the twin, with a 95 % interval."""
+
+    __tablename__ = "supply_state"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
+    robot_id: Mapped[str]
+    state: Mapped[str]  # "off", "moving", "brakes closed" or "drives on at rest"
+    seconds: Mapped[float]
+    power_w: Mapped[float | None]  # none where none was logged
+    modelled_power_w: Mapped[float]
+    modelled_power_lower_w: Mapped[float | None]
+    modelled_power_upper_w: Mapped[float | None]
+    differs: Mapped[bool]  # the log's power lies outside the twin's interval
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 

@@ -14,6 +14,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.identification.remainder import Remainder
 from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
@@ -46,6 +47,7 @@ _TORQUE_SCALE: _Columns = {
     "high": (float,),
     "why": (str,),
 }
+_REMAINDER: _Columns = {"sample": (float,), "mean": (float,), "seconds": (float,)}
 _CHOICE: _Columns = {
     "effect": (str,),
     "probability": (float,),
@@ -97,6 +99,8 @@ def to_json(twin: Twin) -> str:
         document["torque_scale"] = asdict(twin.torque_scale)
     if twin.quantities:
         document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
+    if twin.remainder is not None:
+        document["remainder"] = asdict(twin.remainder)
     if twin.choices:
         document["choices"] = [asdict(choice) for choice in twin.choices]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
@@ -126,6 +130,7 @@ def from_json(text: str | bytes, path: Path) -> Twin:
         if "quantities" in document
         else (),
         torque_scale=_torque_scale(reader) if "torque_scale" in document else None,
+        remainder=Remainder(**reader.inner("remainder").columns(_REMAINDER)) if "remainder" in document else None,
         choices=tuple(map(_choice, reader.each("choices"))) if "choices" in document else (),
     )
     _check_complete(path, twin)

@@ -27,9 +27,10 @@ from irtwin.identification.fits import (
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.progress import Tell
+from irtwin.identification.remainder import Remainder, remainder
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.torque_constants import TorqueConstants, torque_constants
-from irtwin.identification.uncertainty import half_widths, normal_covariance
+from irtwin.identification.uncertainty import NORMAL, half_widths, normal_covariance
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
@@ -72,6 +73,7 @@ def identify(
     robot = with_friction_near_zero(robot, with_torque, effects, tell)
     stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
+    left: list[Block] = []
     base: tuple[BaseParameter, ...] = ()
     condition: float | None = None
     if with_torque:
@@ -80,19 +82,21 @@ def identify(
         of_power: list[Found] = []
         if with_power and not stack.fixed.all():
             values = torque.values
-            stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values))
+            stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values)[1])
             if any(effect.carries_torque for effect in stack.effects):
                 known = blocks if len(with_torque) == len(measured) else None
                 torque = fit_both(stack, measured, values, known, tell)
-            of_power = [(free_terms(stack), fit_power(stack, with_power, torque.values))]
+            left, power = fit_power(stack, with_power, torque.values)
+            of_power = [(free_terms(stack), power)]
         found: list[Found] = [(stack.torque_terms, torque), *of_power]
         base, condition = _base(stack, blocks, torque)
     else:
-        through = fit_through_power(stack, with_power)[2]
+        left, through = fit_through_power(stack, with_power)[2:]
         found = [([*real_terms(stack), *free_terms(stack)], through)]
+    remaining = _remainder(stack, left, found[-1][0])
     if constants:
         found.append((constants.terms, constants.estimate))
-    parameters = [parameter for terms, result in found for parameter in _parameters(terms, result)]
+    parameters = [parameter for terms, result in found for parameter in _parameters(terms, result, remaining)]
     return Twin(
         robot=robot,
         effects=stack.effects,
@@ -104,7 +108,16 @@ def identify(
         fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
         quantities=_quantities(robot, found[: len(found) - bool(constants)], parameters),
         covariance=block_diag(*(normal_covariance(result.covariance, result.blocks) for _, result in found)),
+        remainder=remaining,
     )
+
+
+def _remainder(stack: Stack, blocks: Sequence[Block], terms: Terms) -> Remainder | None:
+    """Return what the fit of power, of these terms, leaves; None where there is none, or no standby in it."""
+    ones = [k for k, (effect, _) in enumerate(terms) if effect.drawn_at_rest]
+    if not blocks or not ones:
+        return None
+    return remainder(blocks, [term for _, term in terms], stack.prior_rows(terms), ones[0])
 
 
 def _visible(whole: Stack, *, torque: bool, power: bool) -> Stack:
@@ -158,9 +171,11 @@ def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Eff
     return [shapes[best].on(*joints) for best, joints in chosen.items()]
 
 
-def _parameters(terms: Terms, found: Estimate) -> list[Parameter]:
+def _parameters(terms: Terms, found: Estimate, left: Remainder | None) -> list[Parameter]:
+    """Return the terms' parameters; what lasts of the remainder looks like what is drawn at rest."""
     spread = np.array([term.spread for _, term in terms])
-    widths = half_widths(found.covariance, spread, found.blocks)
+    lasting = np.array([NORMAL * left.mean if left and effect.drawn_at_rest else 0.0 for effect, _ in terms])
+    widths = np.hypot(half_widths(found.covariance, spread, found.blocks), lasting)
     return [
         Parameter(
             effect=effect.id,

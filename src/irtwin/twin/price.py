@@ -29,7 +29,7 @@ class Figure:
 class Price:
     """What a motion takes: seconds, energy J, greatest and mean electrical power W.
 
-    The intervals are those of the twin's parameters; what its effects leave out is not in them.
+    The intervals hold how unsure the twin's parameters are, and what its effects leave of power.
     """
 
     seconds: float
@@ -45,7 +45,7 @@ class Price:
             f"mean power {_shown(self.mean)} W",
         )
         known = self.energy.half_width is not None
-        return ", ".join(parts) + ("; +- 95 % interval of the twin's parameters" if known else "; intervals not known")
+        return ", ".join(parts) + ("; +- 95 % interval" if known else "; intervals not known")
 
 
 def price(twin: Twin, motions: Sequence[Motion]) -> Price | None:
@@ -59,33 +59,53 @@ def price(twin: Twin, motions: Sequence[Motion]) -> Price | None:
 def cost(twin: Twin, motions: Sequence[Motion]) -> Price:
     """Return what `price` does; of a twin that knows nothing of power, what its joints take together."""
     powers = [twin.power(motion) for motion in motions]
-    seconds = sum(float(motion.time[-1] - motion.time[0]) for motion in motions)
+    seconds = sum(map(_seconds, motions))
     total = sum(energy(motion.time, power) for motion, power in zip(motions, powers, strict=True))
     highest = int(np.argmax([power.max() for power in powers]))
     most = int(np.argmax(powers[highest]))
     widths: tuple[float | None, float | None] = (None, None)
     if twin.covariance is not None:
-        slope = sum((_slope(twin, motion, _weights(motion.time)) for motion in motions), np.zeros(len(twin.parameters)))
+        slope = sum(
+            (_slope(twin, motion, trapezoid(motion.time)) for motion in motions), np.zeros(len(twin.parameters))
+        )
         at_peak = np.zeros(len(powers[highest]))
         at_peak[most] = 1.0
-        widths = _half_width(twin, slope), _half_width(twin, _slope(twin, motions[highest], at_peak))
+        at_peak = _slope(twin, motions[highest], at_peak)
+        left = twin.remainder
+        widths = (
+            _half_width(twin, slope, *(left.energy(_seconds(motion)) for motion in motions if left)),
+            _half_width(twin, at_peak, *([left.sample] if left else [])),
+        )
     mean = Figure(total / seconds, _scaled(widths[0], 1 / seconds))
     return Price(seconds, Figure(total, widths[0]), Figure(float(powers[highest][most]), widths[1]), mean)
+
+
+def mean_power(twin: Twin, motion: Motion, where: np.ndarray) -> Figure:
+    """Return the mean power over those samples of a motion `where` (N,) is true, W; some are."""
+    weights = np.where(where, trapezoid(motion.time), 0.0)
+    seconds = float(weights.sum())
+    value = float(weights @ twin.power(motion)) / seconds
+    if twin.covariance is None:
+        return Figure(value, None)
+    left = [twin.remainder.energy(seconds) / seconds] if twin.remainder else []
+    return Figure(value, _half_width(twin, _slope(twin, motion, weights) / seconds, *left))
 
 
 def saving(twin: Twin, motion: Motion, instead: Sequence[Motion]) -> Figure:
     """Return the electrical energy, J, that a motion saves where it takes the place of others; negative if it costs.
 
-    The interval is that of the difference: what is unsure in both alike, as the standby power, drops out.
+    The interval is that of the difference: what is unsure in both alike, as the standby power, drops out. What effects
+    leave of power does not.
     """
     less = [energy(one.time, twin.power(one)) for one in instead]
     saved = sum(less) - energy(motion.time, twin.power(motion))
     if twin.covariance is None:
         return Figure(saved, None)
-    slope = -_slope(twin, motion, _weights(motion.time))
+    slope = -_slope(twin, motion, trapezoid(motion.time))
     for one in instead:
-        slope = slope + _slope(twin, one, _weights(one.time))
-    return Figure(saved, _half_width(twin, slope))
+        slope = slope + _slope(twin, one, trapezoid(one.time))
+    left = [twin.remainder.energy(_seconds(one)) for one in (motion, *instead) if twin.remainder]
+    return Figure(saved, _half_width(twin, slope, *left))
 
 
 def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
@@ -113,12 +133,17 @@ def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
     return result
 
 
-def _half_width(twin: Twin, slope: np.ndarray) -> float:
+def _half_width(twin: Twin, slope: np.ndarray, *left: float) -> float:
+    """Return half the 95 % interval of what goes by a `slope` (p,) with the parameters; `left`: what effects leave."""
     assert twin.covariance is not None
-    return NORMAL * float(np.sqrt(max(float(slope @ twin.covariance @ slope), 0.0)))
+    return NORMAL * float(np.sqrt(max(float(slope @ twin.covariance @ slope), 0.0) + sum(one**2 for one in left)))
 
 
-def _weights(time: np.ndarray) -> np.ndarray:
+def _seconds(motion: Motion) -> float:
+    return float(motion.time[-1] - motion.time[0])
+
+
+def trapezoid(time: np.ndarray) -> np.ndarray:
     """Return the weights of the trapezoidal rule, (N,) s."""
     steps = np.diff(time)
     return np.asarray((np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / 2)

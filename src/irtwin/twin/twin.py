@@ -10,6 +10,7 @@ import numpy as np
 from irtwin.effects.effect import Effect, Term
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
+from irtwin.identification.remainder import Remainder
 from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
@@ -64,6 +65,7 @@ class Twin:
     `covariance` (p, p) is that of the p parameters, so that 1.96 deviations are half a 95 % interval; None: not known.
     Neither it nor the parameters' intervals hold how sure the scale of the fitted torque is: `torque_scale`; None: no
     torque was fitted, or nobody asked. `choices`: which effects were chosen by what data show, where nobody named them.
+    `remainder`: what the effects leave of power; None: not known.
     """
 
     robot: Robot
@@ -78,6 +80,7 @@ class Twin:
     covariance: np.ndarray | None = field(default=None, repr=False, compare=False)
     torque_scale: TorqueScale | None = None
     choices: tuple[Choice, ...] = ()
+    remainder: Remainder | None = None
 
     @property
     def knows_power(self) -> bool:

@@ -20,7 +20,11 @@ _RUNS = {  # columns of a table by what the question calls them
     "idle_share": "standstill_share_of_time", "standby_j": "standby_J", "standby_share": "standby_share_of_energy",
     "error_percent": "twin_error_percent", "part": "part_in_twin", "planned": "planned",
 }  # fmt: skip
-_LEDGER = {"joint_name": "joint", "effect_name": "effect", "effect": "effect_iri", "energy_j": "energy_J"}
+_LEDGER = {
+    "joint_name": "joint", "effect_name": "effect", "effect": "effect_iri", "energy_j": "energy_J",
+    "lower_j": "lower_J", "upper_j": "upper_J",
+    "entry": "entry_iri", "entry_j": "entry_J", "entry_lower_j": "entry_lower_J", "entry_upper_j": "entry_upper_J",
+}  # fmt: skip
 
 
 def questions() -> Mapping[str, Question]:
@@ -54,7 +58,13 @@ def of_run(answers: Answers) -> dict[str, Any]:
     """Return what a run's page says of the answers to its questions."""
     run = answers["run"].first
     assert run is not None
-    return {"of": kind(run["energy_from"]) if run["energy_j"] is not None else None}
+    entries: dict[str, list[Row]] = {}  # what the data do not part is one
+    for row in answers["ledger"].rows:
+        entries.setdefault(row["entry"], []).append(row)
+    return {
+        "of": kind(run["energy_from"]) if run["energy_j"] is not None else None,
+        "entries": list(entries.values()),
+    }
 
 
 def runs_sheet(answers: Answers) -> Sheet:

@@ -1,0 +1,57 @@
+"""What a fit leaves of power that it did not see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from irtwin.effects.effect import Term
+from irtwin.identification.accumulate import Block
+from irtwin.identification.remainder import Remainder, remainder
+
+TERMS = [Term("P0", "W", spread=600.0, lowest=0.0), Term("F", "N m", spread=100.0)]
+SECONDS, ROWS = 10.0, 200
+
+
+def blocks(runs: int, lasting: float, noise: float, seed: int = 0) -> list[Block]:
+    """Two blocks a run of 100 W and 3 x; each run is `lasting` W off by one draw, each row by `noise` W."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for run in range(runs):
+        off = lasting * rng.standard_normal()
+        for half in range(2):
+            speed = rng.uniform(0, 2, ROWS)
+            watts = 100 + off + 3 * speed + noise * rng.standard_normal(ROWS)
+            rows = np.column_stack([np.ones(ROWS), speed, watts])
+            start = half * SECONDS / 2
+            found.append(Block(str(run), start, start + SECONDS / 2, np.array([ROWS]), (np.linalg.qr(rows, "r"),)))
+    return found
+
+
+def test_what_lasts_a_run_is_told_from_noise():
+    found = remainder(blocks(60, 2.0, 1.0), TERMS, None, 0)
+    assert found.sample == pytest.approx(5**0.5, rel=0.25)
+    assert found.seconds == pytest.approx(50.0)  # five runs a group
+    assert found.mean == pytest.approx(1.12 * 2.0 / 5**0.5, rel=0.5)  # by Student's t of twelve groups
+
+
+def test_what_coefficients_are_unsure_by_is_no_remainder():
+    noisy, lasting = (remainder(blocks(8, off, 1.0), TERMS, None, 0).mean for off in (0.0, 2.0))
+    assert noisy < 0.1 * lasting
+
+
+def test_of_one_run_stretches_of_time_tell():
+    long = [block for k, block in enumerate(blocks(10, 2.0, 0.1)) for block in [replaced(block, k)]]
+    assert remainder(long, TERMS, None, 0).mean > 0.5
+    assert remainder(long[:3], TERMS, None, 0) is None
+
+
+def replaced(block: Block, place: int) -> Block:
+    return Block("one", place * SECONDS, (place + 1) * SECONDS, block.rows, block.factors)
+
+
+def test_it_lasts_a_motion_and_is_noise_in_a_shorter_one():
+    left = Remainder(sample=3.0, mean=2.0, seconds=10.0)
+    assert left.energy(20.0) == pytest.approx(40.0)
+    assert left.energy(10.0) == pytest.approx(20.0)
+    assert left.energy(2.5) == pytest.approx(10.0)

@@ -1,0 +1,72 @@
+"""States of the supply in a run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.synthetic import arm, measure, swing, truth
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.supply import HoldingBrakes
+from irtwin.twin.identify import identify
+from irtwin.twin.supply_states import supply_states
+
+ROBOT = arm(2)
+REST, BRAKES, DELAY = 6.0, 30.0, 1.0  # s, W, s
+
+
+def run(seed: int, brakes: float = 0.0):
+    """A motion, then rest at which brakes, if any, close after a second and carry the links."""
+    moving = swing(ROBOT, seed, seconds=10.0)
+    after = moving.time[-1] + np.arange(1, 1 + round(REST * moving.rate)) / moving.rate
+    rest = np.zeros((len(after), 2))
+    whole = replace(
+        moving,
+        time=np.concatenate([moving.time, after]),
+        q=np.concatenate([moving.q, rest + moving.q[-1]]),
+        dq=np.concatenate([moving.dq, rest]),
+        ddq=np.concatenate([moving.ddq, rest]),
+    )
+    shown = measure(ROBOT, whole, 0.2, seed=seed)
+    released = HoldingBrakes(delay=DELAY).columns(ROBOT, whole)[:, 0]
+    heat = (truth(ROBOT)["R"] * shown.current**2).sum(axis=1)
+    return replace(shown, power=shown.power + brakes * released - (heat * (1 - released) if brakes else 0.0))
+
+
+def states(twin, motion):
+    return {state.name: state for state in supply_states(twin, motion)}
+
+
+def test_drives_hold_a_robot_without_brakes_at_rest():
+    twin = identify(ROBOT, [run(1), run(2)])
+    found = states(twin, run(3))
+    assert set(found) == {"moving", "drives on at rest"}
+    assert found["drives on at rest"].seconds == pytest.approx(REST, abs=0.5)
+    assert sum(state.seconds for state in found.values()) == pytest.approx(run(3).time[-1])
+
+
+def test_brakes_close_after_a_motion_and_take_less():
+    twin = identify(ROBOT, [run(1, BRAKES), run(2, BRAKES)], [*BASELINE, "copper_loss", HoldingBrakes(delay=DELAY)])
+    found = states(twin, run(3, BRAKES))
+    assert found["brakes closed"].seconds == pytest.approx(REST - DELAY, abs=0.5)
+    held, closed = found["drives on at rest"], found["brakes closed"]
+    assert held.logged - closed.logged == pytest.approx(BRAKES, abs=3.0)
+    assert held.modelled.value - closed.modelled.value == pytest.approx(BRAKES, abs=3.0)
+    assert not closed.differs
+
+
+def test_a_rest_that_takes_other_than_the_twin_says_differs():
+    twin, motion = identify(ROBOT, [run(1), run(2)]), run(3)
+    other = states(twin, replace(motion, power=motion.power + 25.0))
+    assert other["drives on at rest"].differs
+    assert not states(twin, replace(motion, power=None))["drives on at rest"].differs
+
+
+def test_a_supply_that_is_off_takes_next_to_nothing():
+    twin, motion = identify(ROBOT, [run(1), run(2)]), run(3)
+    power = np.where(motion.time > motion.time[-1] - 2.0, 1.0, motion.power)
+    off = states(twin, replace(motion, power=power))["off"]
+    assert off.seconds == pytest.approx(2.0, abs=0.1) and off.logged == pytest.approx(1.0)
+    assert off.differs
