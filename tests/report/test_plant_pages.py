@@ -149,7 +149,7 @@ def test_a_robots_page(graph: KnowledgeGraph, name: str) -> None:
 
 def of_robot(graph: KnowledgeGraph, bindings: Mapping[str, str]) -> str:
     answers = ask(graph, robot.questions(), bindings)
-    said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": None}
+    said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": None, "gap_report": None}
     return page.render("robot/page.html.jinja", answers, bindings, **robot.of_robot(answers), **said)
 
 
