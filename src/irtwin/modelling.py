@@ -31,6 +31,7 @@ from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled
 from irtwin.storage.files import check_place, write
+from irtwin.twin.described import places, text_of
 from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit
 from irtwin.twin.price import Price, price
@@ -148,6 +149,20 @@ def write_expectation(expected: Expectation, out: Path) -> None:
     buffer = io.BytesIO()
     pa.parquet.write_table(expected.table, buffer)
     write(out, buffer.getvalue())
+
+
+def write_model(twin: Twin, form: str, out: Path) -> list[str]:
+    """Write a twin's robot as "urdf", "mjcf" or "sdf"; return a line on what that holds, and one on what it does not.
+
+    Raises InputError where there is no place to write, or a body of the twin is not consistent.
+    """
+    check_place(out)
+    write(out, text_of(twin, form).encode())
+    held = [f"{effect} ({place})" for effect, place in places(twin, form) if place]
+    lacking = [effect for effect, place in places(twin, form) if not place]
+    said = [twin.doubt_of_bodies, f"{form.upper()} has {', '.join(held) or 'nothing'} of the twin"]
+    said += [f"{form.upper()} has no place for {', '.join(lacking)}"] if lacking else []
+    return [line for line in said if line]
 
 
 def read_twin(source: Path) -> Twin:

@@ -48,8 +48,11 @@ class Kept:
     report: Path
 
 
-def robot_twin(robot: str, workspace: Path | str, database: str | None = None) -> Twin:
-    """Return the twin of a robot of a workspace. Raises InputError where there is no such robot, or no twin of it."""
+def robot_twin(robot: str | None, workspace: Path | str, database: str | None = None) -> Twin:
+    """Return the twin of a robot of a workspace, of the only one where None.
+
+    Raises InputError where there is no such robot, or no twin of it.
+    """
     with Workspace.existing(Path(workspace), database) as place:
         return load_twin(place, find_robot(place, robot))[1]
 

@@ -35,7 +35,7 @@ from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.planner import populate
-from irtwin.providers.records import check_name, check_plans, find_robot, identifier, ingest, robot_iri
+from irtwin.providers.records import check_name, check_plans, find_robot, identifier, ingest, known_twin, robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
@@ -154,6 +154,7 @@ def diagnose(
     if json_file is not None:
         write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
     if twin_file is not None and found.twin is not None:
+        _say_doubt(found.twin, announce)
         write(twin_file, to_json(found.twin).encode())
     if motion_file is not None:
         announce(f"  {save_motion(found, motion_file)}")
@@ -167,6 +168,11 @@ def diagnose(
                 _store(place, graph, data_set, found, announce)
             _write_gap_report(place, graph_url, identifier(data_set.robot.name))
     return found
+
+
+def _say_doubt(twin: Twin | None, announce: Announce) -> None:
+    if twin is not None and twin.doubt_of_bodies:
+        announce(f"  {twin.doubt_of_bodies}")
 
 
 def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis, announce: Announce) -> None:
@@ -348,6 +354,8 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
         announce("Running the data providers")
         try:
             populate_apart(apart, announce)
+            known = known_twin(apart, robot_id)
+            _say_doubt(known and known[1], announce)
             check_plans(apart, robot_id, data_set.plans)
         except InputError as error:
             error.args = (f"{data_set.folder}: {error}; nothing of this data set was stored",)

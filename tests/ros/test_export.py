@@ -16,14 +16,20 @@ from tests.synthetic import arm, as_run, measure, swing
 from tests.virtual.scene_data import kr6
 
 from irtwin import resources
+from irtwin.effects.catalogue import catalogue
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.planning.plan import nominal_twin
 from irtwin.providers.records import ingest, load_robot, load_run
+from irtwin.robot.structure import structure_of
+from irtwin.robot.urdf import read_urdf
+from irtwin.ros import export
 from irtwin.ros.ros_package import write_package
 from irtwin.signals.log import DataSet
 from irtwin.signals.samples import read_signals
 from irtwin.storage.database import Workspace
+from irtwin.twin.twin import Parameter
 
 pytestmark = pytest.mark.slow
 
@@ -54,6 +60,26 @@ def test_the_package_of_the_graph_is_that_of_the_urdf(workspace: Path, tmp_path:
     said = irtwin("robot", "ros", KR6, "--out", tmp_path / "command")
     assert (said.status, said.err) == (0, "")
     assert files(tmp_path / "graph") == files(tmp_path / "command")
+
+
+def test_a_robot_with_a_twin_has_its_bodies_and_friction(
+    workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = nominal_twin(kr6())
+    masses = {"link_3": 8.25}
+    changed = [
+        replace(one, value=masses.get(one.link or "", one.value)) if one.name == "m" else one
+        for one in known.parameters
+    ]
+    friction = Parameter("viscous_friction", "joint_a1", None, "Fv", 3.5, "N m s/rad")
+    effects = (*known.effects, catalogue()["viscous_friction"].on("joint_a1"))
+    twin = replace(known, effects=effects, parameters=(*changed, friction))
+    monkeypatch.setattr(export, "known_twin", lambda place, robot: (robot, twin))
+    export.export_package(tmp_path / "out", workspace, None)
+    found = structure_of(read_urdf(tmp_path / "out" / "urdf" / "KUKA_KR6_R700.urdf"))
+    before = {body.name: body.mass for body in structure_of(kr6()).bodies}
+    assert {body.name: body.mass for body in found.bodies} == before | masses
+    assert {one.name: one.damping for one in found.connections if one.damping} == {"joint_a1": 3.5}
 
 
 def test_meshes_of_the_workspace_go_along(tmp_path: Path) -> None:
@@ -103,7 +129,10 @@ def test_of_several_robots_one_has_to_be_named(tmp_path: Path) -> None:
 def test_one_form_is_asked_for(workspace: Path, tmp_path: Path) -> None:
     said = irtwin("export", "--workspace", workspace)
     assert said.status == 2
-    assert "Give one of --owl, --ros, --mcap, --bag." in said.err
+    assert "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --mcap, --bag." in said.err
+    said = irtwin("export", "--owl", tmp_path / "a.owl", "--twin", tmp_path / "twin.json")
+    assert said.status == 2
+    assert "--twin goes with --urdf, --mjcf or --sdf." in said.err
     said = irtwin("export", "--owl", tmp_path / "a.owl", "--robot", "KUKA_KR6_R700", "--workspace", workspace)
     assert said.status == 2
     assert "--owl writes the whole graph; leave --robot out." in said.err
@@ -142,7 +171,10 @@ def test_what_is_wrong_with_a_run_is_told(with_runs: Path, tmp_path: Path) -> No
         (("--mcap", out), "--run goes with --mcap or --bag, and these with it."),
         (("--owl", tmp_path / "a.owl", "--run", "work"), "--run goes with --mcap or --bag, and these with it."),
         (("--mcap", tmp_path / "run", "--run", "again"), "--mcap writes a file whose name ends in .mcap."),
-        (("--mcap", out, "--bag", tmp_path / "b", "--run", "again"), "Give one of --owl, --ros, --mcap, --bag."),
+        (
+            ("--mcap", out, "--bag", tmp_path / "b", "--run", "again"),
+            "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --mcap, --bag.",
+        ),
     ):
         said = irtwin("export", *given, "--workspace", with_runs)
         assert said.status == 2

@@ -26,7 +26,16 @@ TWIN = identify(
 def test_a_saved_twin_is_the_same_twin(tmp_path):
     (tmp_path / "twin.json").write_text(to_json(TWIN))
     again = load(tmp_path / "twin.json")
-    for name in ("effects", "parameters", "base_parameters", "cutoff", "unidentified", "condition_number", "fitted"):
+    for name in (
+        "effects",
+        "parameters",
+        "base_parameters",
+        "cutoff",
+        "unidentified",
+        "condition_number",
+        "fitted",
+        "body_change",
+    ):
         assert getattr(again, name) == getattr(TWIN, name)
     assert again.robot.joints == TWIN.robot.joints
     np.testing.assert_array_equal(again.torque(MOTION), TWIN.torque(MOTION))

@@ -161,37 +161,56 @@ def reason(
 @graph_option
 @click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), help="RDF/XML file to write: the whole graph.")
 @click.option("--ros", type=click.Path(path_type=Path, file_okay=False), help="Folder to write: a robot's ROS package.")
+@click.option("--urdf", type=click.Path(path_type=Path, dir_okay=False), help="URDF file to write: a robot's twin.")
+@click.option("--mjcf", type=click.Path(path_type=Path, dir_okay=False), help="The same for MuJoCo.")
+@click.option("--sdf", type=click.Path(path_type=Path, dir_okay=False), help="The same for Gazebo and Drake.")
 @click.option("--mcap", type=click.Path(path_type=Path, dir_okay=False), help="MCAP file to write: a run, for ROS 2.")
 @click.option("--bag", type=click.Path(path_type=Path), help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
 @click.option("--robot", metavar="NAME", help="The robot; not needed where there is one alone.")
 @click.option("--run", "run_name", metavar="NAME", help="The run.")
+@click.option(
+    "--twin",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Twin that `irtwin diagnose --save-twin` wrote, instead of the workspace's.",
+)
 def export(
     workspace: Path,
     database: str | None,
     graph_url: str | None,
     owl: Path | None,
     ros: Path | None,
+    urdf: Path | None,
+    mjcf: Path | None,
+    sdf: Path | None,
     mcap: Path | None,
     bag: Path | None,
     robot: str | None,
     run_name: str | None,
+    twin: Path | None,
 ) -> None:
-    """Write the graph for Protégé, or a robot or a run for ROS.
+    """Write the graph for Protégé, a robot for ROS or simulators, or a run for ROS.
 
     --owl writes ontology, individuals and inferences as one RDF/XML file.
 
     --ros writes a package for ROS 1 and 2 made of what the graph says of a robot: URDF, SRDF, limits, kinematics,
     RViz and launch files. MoveIt's setup needs nothing added to it. `irtwin robot ros` makes it of a URDF.
 
+    --urdf, --mjcf and --sdf write a robot with the bodies, damping, dry friction and armature of its twin, as far as
+    the format has them; what it has no place for is said. Of the URDF all else stays as it was. The package of --ros
+    has them too, where the robot has a twin.
+
     --mcap and --bag write a run: positions, speeds and torques as /joint_states, each other column as a topic of
     numbers, such as /power. Needs irtwin[ros].
     """
-    asked = [place for place in (owl, ros, mcap, bag) if place is not None]
-    if len(asked) != 1:
-        raise click.UsageError("Give one of --owl, --ros, --mcap, --bag.")
-    if (run_name is not None) != (mcap is not None or bag is not None):
+    every = {"owl": owl, "ros": ros, "urdf": urdf, "mjcf": mjcf, "sdf": sdf, "mcap": mcap, "bag": bag}
+    form, out = _asked(every)
+    if (run_name is not None) != (form in ("mcap", "bag")):
         raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
-    if owl is not None:
+    if form in ("urdf", "mjcf", "sdf"):
+        _export_model(form, out, workspace, robot, twin, database)
+    elif twin is not None:
+        raise click.UsageError("--twin goes with --urdf, --mjcf or --sdf.")
+    elif owl is not None:
         from irtwin import asking
 
         if robot is not None:
@@ -200,15 +219,38 @@ def export(
     elif ros is not None:
         from irtwin.ros.export import export_package
 
-        for line in export_package(ros, workspace, robot, graph_url):
+        for line in export_package(ros, workspace, robot, graph_url, database):
             say(f"irtwin: {line}")
     elif run_name is not None:
         from irtwin.ros.export import export_bag
 
         if mcap is not None and mcap.suffix.lower() != ".mcap":
             raise click.UsageError("--mcap writes a file whose name ends in .mcap.")
-        export_bag(asked[0], workspace, run_name, robot, database)
-    click.echo(asked[0])
+        export_bag(out, workspace, run_name, robot, database)
+    click.echo(out)
+
+
+def _asked(every: dict[str, Path | None]) -> tuple[str, Path]:
+    """Return the one form that is asked for, and the place to write it to."""
+    found = [(form, place) for form, place in every.items() if place is not None]
+    if len(found) != 1:
+        raise click.UsageError(f"Give one of {', '.join(f'--{form}' for form in every)}.")
+    return found[0]
+
+
+def _export_model(
+    form: str, out: Path, workspace: Path, robot: str | None, twin: Path | None, database: str | None
+) -> None:
+    from irtwin import modelling
+
+    if twin is None:
+        from irtwin import plans
+
+        known = plans.robot_twin(robot, workspace, database)
+    else:
+        known = modelling.read_twin(twin)
+    for line in modelling.write_model(known, form, out):
+        say(f"irtwin: {line}")
 
 
 @click.command("map")

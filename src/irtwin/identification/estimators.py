@@ -22,13 +22,23 @@ _LEAST_SHOWN = 1e-10  # of a column as large as expected: dead data, too
 class Estimate:
     """Coefficients `values` (K,) with `covariance` (K, K), and the residual `noise` (g,) of each equation (RMS).
 
-    `blocks` is the number of independent blocks behind the covariance.
+    `blocks` is the number of independent blocks behind the covariance. `equations` (K, K + 1): a triangle and a right
+    side of noise one, what data and prior say of the values together, bounds apart.
     """
 
     values: np.ndarray
     covariance: np.ndarray
     noise: np.ndarray
     blocks: int
+    equations: np.ndarray
+
+    def of(self, places: Sequence[int], noise: np.ndarray | None = None) -> Estimate:
+        """Return what is said of coefficients at some places, whatever the others are; `noise`: of equations left."""
+        others = np.setdiff1d(np.arange(len(self.values)), places)
+        turned = triangle(self.equations[:, [*others, *places, -1]])[len(others) :, len(others) :]
+        own = np.ix_(places, places)
+        left = self.noise if noise is None else noise
+        return Estimate(self.values[list(places)], self.covariance[own], left, self.blocks, turned)
 
 
 def estimate(
@@ -63,7 +73,7 @@ def estimate(
     noise = np.maximum(size, dead)
     for turn in range(_REWEIGHTINGS):
         told(f"  {len(terms)} coefficients, weighed {turn} times")
-        values = _solve(factors, noise, expected, spread, lowest, prior)
+        values, _ = _solve(factors, noise, expected, spread, lowest, prior)
         residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
         noise = np.maximum(residual / np.sqrt(count), least)
     told(f"  how sure {len(terms)} coefficients are")
@@ -74,10 +84,10 @@ def estimate(
         mine = blocks if len(own) == len(pattern) else [_only(block, own) for block in blocks]
         _, effect = covariance(mine, pattern[own], [factors[e] for e in own], values, noise[own], spread, prior)
         level[own] *= np.sqrt(effect)
-    values = _solve(factors, level, expected, spread, lowest, prior)
+    values, equations = _solve(factors, level, expected, spread, lowest, prior)
     told(f"  how sure {len(terms)} coefficients are")
     sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
-    return Estimate(values, sureness, noise, len(blocks))
+    return Estimate(values, sureness, noise, len(blocks), equations)
 
 
 def _only(block: Block, equations: np.ndarray) -> Block:
@@ -99,8 +109,8 @@ def _solve(
     spread: np.ndarray,
     lowest: np.ndarray,
     prior: np.ndarray,
-) -> np.ndarray:
-    """Solve in the coefficients' deviation from expectation, in units of their spread: well scaled."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return values and their equations, solved for deviations from expectation in units of spread: well scaled."""
     rows = np.concatenate([factor / level for factor, level in zip(factors, noise, strict=True)])
     target = rows[:, -1] - rows[:, :-1] @ expected
     scaled = np.concatenate([rows[:, :-1] * spread, prior])
@@ -111,4 +121,5 @@ def _solve(
     bounds = (lowest - expected) / spread
     if np.any(deviation < bounds):
         deviation = lsq_linear(left, right, bounds=(bounds, np.inf), method="bvls").x
-    return np.asarray(np.maximum(expected + deviation * spread, lowest))
+    equations = np.column_stack([left / spread, right + left @ (expected / spread)])
+    return np.maximum(expected + deviation * spread, lowest), equations

@@ -112,7 +112,7 @@ def fit_both(
         values, sure = found.values, np.sqrt(np.diag(found.covariance))
         if np.all(np.abs(values - before)[:count] < _SETTLED * sure[:count]):
             break
-    return Estimate(values[:count], found.covariance[:count, :count], found.noise[:joints], found.blocks)
+    return found.of(range(count), found.noise[:joints])
 
 
 def _both_equations(stack: Stack, values: np.ndarray) -> Equations:

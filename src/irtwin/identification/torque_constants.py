@@ -50,10 +50,9 @@ def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants
     wide = resistance or common[2].spread
     heat = [Term("R", "ohm", joint=joint.name, expected=resistance, spread=wide, lowest=0.0) for joint in joints]
     found = _balance(motions, [standby, *own, *heat], pooled=False)
-    index = slice(1, 1 + len(joints))
     mechanical = next(effect for effect in catalogue().values() if effect.carries_torque)
-    kept = Estimate(found.values[index], found.covariance[index, index], found.noise, found.blocks)
-    return TorqueConstants(found.values[index], tuple((mechanical, term) for term in own), kept)
+    kept = found.of(range(1, 1 + len(joints)))
+    return TorqueConstants(kept.values, tuple((mechanical, term) for term in own), kept)
 
 
 def _balance(motions: Sequence[Motion], terms: Sequence[Term], *, pooled: bool) -> Estimate:

@@ -162,9 +162,17 @@ def identifier(name: str) -> str:
     return f"{readable}~{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:16]}"
 
 
-def find_robot(workspace: Workspace, name: str) -> str:
-    """Return the robot_id of a robot by its name. Raises InputError, with the nearest name, where there is none."""
+def find_robot(workspace: Workspace, name: str | None) -> str:
+    """Return the robot_id of a robot by its name, of the only one where None.
+
+    Raises InputError, with the nearest name, where there is none, or where there are others.
+    """
     known = _names(workspace)
+    if name is None and len(known) == 1:
+        return next(iter(known))
+    if name is None:
+        shown = ", ".join(sorted(known.values())[:10]) or "none: run a data set first"
+        raise InputError(f"{workspace.folder}: say which robot by --robot; known are {shown}")
     for robot_id, of in known.items():
         if name == robot_id or identifier(of) == identifier(name):
             return robot_id
@@ -340,10 +348,18 @@ def check_plans(workspace: Workspace, robot_id: str, plans: Sequence[log.Run]) -
 
 def load_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin]:
     """Give back a robot's twin with its twin_id. Raises InputError where it has none, or its file is gone."""
+    found = known_twin(workspace, robot_id)
+    if found is None:
+        raise InputError(f"{workspace.folder}: robot {robot_id} has no twin yet; run its data set first")
+    return found
+
+
+def known_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin] | None:
+    """Give back a robot's twin with its twin_id; None where it has none. Raises InputError where its file is gone."""
     with workspace.reading() as session:
         row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
     if row is None:
-        raise InputError(f"{workspace.folder}: robot {robot_id} has no twin yet; run its data set first")
+        return None
     document = workspace.read_document(row.file, row.sha256)
     return row.twin_id, from_json(document, inside(workspace.folder, row.file))
 

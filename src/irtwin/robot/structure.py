@@ -52,7 +52,7 @@ class Connection:
     """A joint between two links, at zero at `origin` in the parent's frame; `axis`, of length one, in its own.
 
     kind: "revolute", "continuous", "prismatic", or "fixed", which a joint that mimics another is too; a fixed one has
-    no axis.
+    no axis. `damping` (N m s/rad, N s/m) and dry `friction` (N m, N): 0 where none is said.
     """
 
     name: str
@@ -61,6 +61,8 @@ class Connection:
     child: str
     origin: Origin
     axis: Three | None
+    damping: float = 0.0
+    friction: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -136,11 +138,13 @@ def _connection(joint: Element, child: str, moving: set[str]) -> Connection:
     axis = None
     if name in moving:
         element = joint.find("axis")
-        said = np.array([1.0, 0.0, 0.0] if element is None else numbers(element.get("xyz"), 3, name))
-        said = said / np.abs(said).max()  # else the squares of huge numbers would be infinite
-        axis = _three(said / np.linalg.norm(said))
+        along = np.array([1.0, 0.0, 0.0] if element is None else numbers(element.get("xyz"), 3, name))
+        along = along / np.abs(along).max()  # else the squares of huge numbers would be infinite
+        axis = _three(along / np.linalg.norm(along))
     kind = str(joint.get("type")) if name in moving else "fixed"
-    return Connection(name, kind, _parent(joint), child, _origin(joint), axis)
+    dynamics = joint.find("dynamics") if name in moving else None
+    said = [numbers("0" if dynamics is None else dynamics.get(key, "0"), 1, name)[0] for key in ("damping", "friction")]
+    return Connection(name, kind, _parent(joint), child, _origin(joint), axis, *said)
 
 
 def _solids(robot: str, name: str, link: Element, colours: dict[str | None, Element | None]) -> Iterator[Solid]:

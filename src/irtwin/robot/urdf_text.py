@@ -57,6 +57,8 @@ def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
     SubElement(joint, "child", link=connection.child)
     if connection.axis is not None:
         SubElement(joint, "axis", xyz=_words(connection.axis))
+    if connection.damping or connection.friction:
+        SubElement(joint, "dynamics", damping=repr(connection.damping), friction=repr(connection.friction))
     if limits is not None:
         said = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "effort")}
         known = {name: repr(value) for name, value in said.items() if np.isfinite(value)}

@@ -13,28 +13,34 @@ from irtwin.asking import open_graph
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import robot_named
 from irtwin.providers.mesh_files import mesh_copies_of_graph
-from irtwin.providers.records import find_robot, load_robot, load_run
+from irtwin.providers.records import find_robot, known_twin, load_robot, load_run
 from irtwin.providers.robot_of_graph import robot_of_graph
+from irtwin.robot.description import Robot
 from irtwin.ros.bags import write_bag
 from irtwin.ros.ros_package import write_package
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import read_document
+from irtwin.twin.described import described
 
 _NO_START = datetime(1970, 1, 1, tzinfo=UTC)  # of a plan: its bag begins at 0 s
 
 
-def export_package(out: Path, workspace: Path, robot: str | None, graph_url: str | None = None) -> list[str]:
+def export_package(
+    out: Path, workspace: Path, robot: str | None, graph_url: str | None = None, database: str | None = None
+) -> list[str]:
     """Write the ROS package of a robot of the graph into a folder; return what one should know of it.
 
-    robot: its name; the only one's where None. Raises InputError where there is no such robot, or no place to write, or
-    a copy of a mesh is gone from the workspace.
+    Where the workspace has a twin of the robot, the package has the twin's bodies and friction. robot: its name; the
+    only one's where None. Raises InputError where there is no such robot, or no place to write, or a copy of a mesh is
+    gone from the workspace.
     """
     with open_graph(workspace, graph_url) as graph:
         iri = robot_named(graph, robot)
-        described = robot_of_graph(graph, iri)
+        found = robot_of_graph(graph, iri)
         copies = mesh_copies_of_graph(graph, iri, partial(read_document, workspace))
-    return write_package(described, out, {name: copy.content for name, copy in copies.items()})
+    found = _as_identified(found, workspace, database)
+    return write_package(found, out, {name: copy.content for name, copy in copies.items()})
 
 
 def export_bag(out: Path, workspace: Path, run: str, robot: str | None, database: str | None = None) -> None:
@@ -45,9 +51,18 @@ def export_bag(out: Path, workspace: Path, run: str, robot: str | None, database
     """
     with Workspace.existing(workspace, database) as place:
         row = _run(place, run, None if robot is None else find_robot(place, robot))
-        described = load_robot(place, row.robot_id)
-        stored = load_run(place, described, row.run_id)
-    write_bag(out, described, stored.signals, row.start_time or _NO_START)
+        owner = load_robot(place, row.robot_id)
+        stored = load_run(place, owner, row.run_id)
+    write_bag(out, owner, stored.signals, row.start_time or _NO_START)
+
+
+def _as_identified(robot: Robot, workspace: Path, database: str | None) -> Robot:
+    """Return a robot as its twin has it, where the workspace has one."""
+    if not Workspace.is_there(workspace, database):
+        return robot
+    with Workspace.existing(workspace, database) as place:
+        twin = known_twin(place, find_robot(place, robot.name))
+    return robot if twin is None else described(twin[1], robot)
 
 
 def _run(place: Workspace, name: str, robot_id: str | None) -> schema.Run:

@@ -97,6 +97,8 @@ def to_json(twin: Twin) -> str:
         document["covariance"] = [" ".join(map(repr, row[: k + 1])) for k, row in enumerate(twin.covariance.tolist())]
     if twin.torque_scale is not None:
         document["torque_scale"] = asdict(twin.torque_scale)
+    if twin.body_change is not None:
+        document["body_change"] = twin.body_change
     if twin.quantities:
         document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
     if twin.remainder is not None:
@@ -132,6 +134,7 @@ def from_json(text: str | bytes, path: Path) -> Twin:
         torque_scale=_torque_scale(reader) if "torque_scale" in document else None,
         remainder=Remainder(**reader.inner("remainder").columns(_REMAINDER)) if "remainder" in document else None,
         choices=tuple(map(_choice, reader.each("choices"))) if "choices" in document else (),
+        body_change=reader.take("body_change", float) if "body_change" in document else None,
     )
     _check_complete(path, twin)
     return replace(twin, covariance=_covariance(reader)) if "covariance" in document else twin

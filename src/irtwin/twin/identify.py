@@ -15,6 +15,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block
 from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
+from irtwin.identification.consistent_bodies import spreads, with_consistent_bodies
 from irtwin.identification.estimators import Estimate, combine
 from irtwin.identification.fits import (
     Terms,
@@ -76,27 +77,33 @@ def identify(
     left: list[Block] = []
     base: tuple[BaseParameter, ...] = ()
     condition: float | None = None
+    change: float | None = None
     if with_torque:
         stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque, tell)[1])
         blocks, torque = fit_torque(stack, with_torque, tell)
-        of_power: list[Found] = []
-        if with_power and not stack.fixed.all():
+        powered = bool(with_power) and not stack.fixed.all()
+        if powered:
             values = torque.values
             stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values)[1])
             if any(effect.carries_torque for effect in stack.effects):
                 known = blocks if len(with_torque) == len(measured) else None
                 torque = fit_both(stack, measured, values, known, tell)
+        free, torque = torque, with_consistent_bodies(stack, stack.torque_terms, torque)
+        found: list[Found] = [(stack.torque_terms, torque)]
+        if powered:
             left, power = fit_power(stack, with_power, torque.values)
-            of_power = [(free_terms(stack), power)]
-        found: list[Found] = [(stack.torque_terms, torque), *of_power]
-        base, condition = _base(stack, blocks, torque)
+            found.append((free_terms(stack), power))
+        factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
+        base, condition = _base(stack, factors, torque)
+        change = _change(factors, torque.values - free.values)
     else:
+        terms = [*real_terms(stack), *free_terms(stack)]
         left, through = fit_through_power(stack, with_power)[2:]
-        found = [([*real_terms(stack), *free_terms(stack)], through)]
+        found = [(terms, with_consistent_bodies(stack, terms, through))]
     remaining = _remainder(stack, left, found[-1][0])
     if constants:
         found.append((constants.terms, constants.estimate))
-    parameters = [parameter for terms, result in found for parameter in _parameters(terms, result, remaining)]
+    parameters = [parameter for terms, result in found for parameter in _parameters(stack, terms, result, remaining)]
     return Twin(
         robot=robot,
         effects=stack.effects,
@@ -109,6 +116,7 @@ def identify(
         quantities=_quantities(robot, found[: len(found) - bool(constants)], parameters),
         covariance=block_diag(*(normal_covariance(result.covariance, result.blocks) for _, result in found)),
         remainder=remaining,
+        body_change=change,
     )
 
 
@@ -171,11 +179,10 @@ def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Eff
     return [shapes[best].on(*joints) for best, joints in chosen.items()]
 
 
-def _parameters(terms: Terms, found: Estimate, left: Remainder | None) -> list[Parameter]:
+def _parameters(stack: Stack, terms: Terms, found: Estimate, left: Remainder | None) -> list[Parameter]:
     """Return the terms' parameters; what lasts of the remainder looks like what is drawn at rest."""
-    spread = np.array([term.spread for _, term in terms])
     lasting = np.array([NORMAL * left.mean if left and effect.drawn_at_rest else 0.0 for effect, _ in terms])
-    widths = np.hypot(half_widths(found.covariance, spread, found.blocks), lasting)
+    widths = np.hypot(half_widths(found.covariance, spreads(stack, terms), found.blocks), lasting)
     return [
         Parameter(
             effect=effect.id,
@@ -207,12 +214,20 @@ def _quantities(robot: Robot, found: Sequence[Found], parameters: Sequence[Param
     return tuple(told)
 
 
-def _base(stack: Stack, blocks: Sequence[Block], found: Estimate) -> tuple[tuple[BaseParameter, ...], float | None]:
+def _base(
+    stack: Stack, factors: Sequence[np.ndarray], found: Estimate
+) -> tuple[tuple[BaseParameter, ...], float | None]:
     """Return the base parameters, and the condition number of the equations of torque; None where it is infinite."""
     base = base_parameters(stack)
-    factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
     condition = condition_number(np.concatenate(factors)[:, :-1], base)
     return _base_values(base, found), condition if np.isfinite(condition) else None
+
+
+def _change(factors: Sequence[np.ndarray], moved: np.ndarray) -> float:
+    """Return what coefficients that `moved` (K,) change of a joint's torque, as a share of it (RMS); the greatest."""
+    sizes = (float(np.linalg.norm(factor[:, -1])) for factor in factors)
+    changes = (float(np.linalg.norm(factor[:, :-1] @ moved)) for factor in factors)
+    return max((change / size for change, size in zip(changes, sizes, strict=True) if size), default=0.0)
 
 
 def _base_values(base: BaseParameters, found: Estimate) -> tuple[BaseParameter, ...]:

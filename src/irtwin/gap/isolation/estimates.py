@@ -30,8 +30,7 @@ class BesidePower:
         whole, torque = self.equations.whole, self.equations.torque
         fitted = estimate_of(whole, self._columns(chosen), tell)
         used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
-        covariance, noise = fitted.covariance[np.ix_(used, used)], fitted.noise[: len(torque.pattern)]
-        return Estimate(fitted.values[used], covariance, noise, fitted.blocks)
+        return fitted.of(used, fitted.noise[: len(torque.pattern)])
 
     def _columns(self, chosen: Sequence[int]) -> list[int]:
         return [*map(self.equations.in_whole, chosen), *self.columns]

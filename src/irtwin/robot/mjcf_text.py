@@ -1,0 +1,81 @@
+"""MJCF text of a robot: what MuJoCo needs to move it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.robot.description import Joint, Robot
+from irtwin.robot.structure import Connection, Origin, Solid, structure_of
+
+_FULL = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # MuJoCo's order of an inertia's numbers
+
+
+def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
+    """Return a robot as MJCF text, numbers to their last digit; `armature`, kg m^2 (kg), of joints by name.
+
+    Links that are fixed together are one body's, whose inertia stands at the link that moves. Shapes collide with the
+    surroundings, not with one another; meshes are left out. A motor drives each joint.
+    """
+    structure = structure_of(robot)
+    root = Element("mujoco", model=robot.name)
+    SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
+    world = SubElement(root, "worldbody")
+    joints = {joint.name: joint for joint in robot.joints}
+    above = {connection.child: connection for connection in structure.connections}
+    bodies: dict[str, Element] = {}
+    for link in structure.bodies:
+        connection = above.get(link.name)
+        parent = world if connection is None else bodies[connection.parent]
+        placed = {} if connection is None else _place(connection.origin)
+        body = bodies[link.name] = SubElement(parent, "body", {"name": link.name} | placed)
+        if connection is not None and connection.axis is not None:
+            _joint(body, connection, joints[connection.name], armature.get(connection.name))
+            _inertial(body, robot.model.inertias[1 + robot.index(connection.name)])
+        for solid in structure.solids:
+            if solid.link == link.name and solid.kind != "mesh":
+                _geom(body, solid)
+    motors = SubElement(root, "actuator")
+    for joint in robot.joints:
+        limits = {"ctrlrange": _words(-joint.effort, joint.effort)} if np.isfinite(joint.effort) else {}
+        SubElement(motors, "motor", {"name": joint.name, "joint": joint.name} | limits)
+    indent(root)
+    return tostring(root, encoding="unicode") + "\n"
+
+
+def _joint(body: Element, connection: Connection, limits: Joint, armature: float | None) -> None:
+    kind = "slide" if connection.kind == "prismatic" else "hinge"
+    assert connection.axis is not None
+    said = {"name": connection.name, "type": kind, "axis": _words(*connection.axis)}
+    if np.isfinite(limits.lower) and np.isfinite(limits.upper):
+        said["range"] = _words(limits.lower, limits.upper)
+    numbers = {"damping": connection.damping, "frictionloss": connection.friction, "armature": armature}
+    SubElement(body, "joint", said | {name: repr(value) for name, value in numbers.items() if value})
+
+
+def _inertial(body: Element, inertia: pin.Inertia) -> None:
+    moments = _words(*(inertia.inertia[place] for place in _FULL))
+    SubElement(body, "inertial", pos=_words(*inertia.lever), mass=repr(float(inertia.mass)), fullinertia=moments)
+
+
+def _geom(body: Element, solid: Solid) -> None:
+    half = [0.5 * size for size in solid.size]
+    sizes = {"box": half, "cylinder": [solid.size[0], *half[1:]], "sphere": solid.size}[solid.kind]
+    geom = {"type": solid.kind, "size": _words(*sizes), "conaffinity": "0"} | _place(solid.origin)
+    if solid.purpose == "visual":
+        geom |= {"contype": "0", "group": "2"}
+    if solid.colour is not None:
+        geom["rgba"] = _words(*solid.colour)
+    SubElement(body, "geom", geom)
+
+
+def _place(origin: Origin) -> dict[str, str]:
+    x, y, z, w = pin.Quaternion(origin.transform[:3, :3]).coeffs()
+    return {"pos": _words(*origin.xyz), "quat": _words(w, x, y, z)}
+
+
+def _words(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)

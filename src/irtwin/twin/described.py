@@ -1,0 +1,111 @@
+"""A twin as descriptions of robots have it: bodies and numbers of joints; and what a format has no place for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect
+from irtwin.errors import InputError
+from irtwin.robot.description import Robot
+from irtwin.robot.mjcf_text import mjcf_text
+from irtwin.robot.pseudo_inertia import consistent
+from irtwin.robot.sdf_text import sdf_text
+from irtwin.robot.structure import Structure, structure_of
+from irtwin.robot.urdf import parse_urdf
+from irtwin.robot.urdf_numbers import with_numbers
+from irtwin.twin.twin import Twin
+
+_URDF = {"damping": "damping", "frictionloss": "friction"}  # what MJCF's numbers are called
+NUMBERS = {"urdf": _URDF, "mjcf": {name: name for name in (*_URDF, "armature")}, "sdf": _URDF}
+_SAME = 1e-12  # of a body's numbers
+
+
+def text_of(twin: Twin, form: str) -> str:
+    """Return the twin's robot in a format, "urdf", "mjcf" or "sdf". Raises InputError as `described` does."""
+    robot = described(twin, twin.robot)
+    if form == "mjcf":
+        return mjcf_text(robot, {joint: numbers.get("armature", 0.0) for joint, numbers in _numbers(twin).items()})
+    return sdf_text(robot) if form == "sdf" else robot.urdf
+
+
+def places(twin: Twin, form: str) -> tuple[tuple[str, str | None], ...]:
+    """Return the twin's effects by id, each with what holds it in a format; None: nothing does."""
+    return tuple((effect, _place(catalogue()[effect], form)) for effect in twin.effect_ids)
+
+
+def described(twin: Twin, robot: Robot) -> Robot:
+    """Return a robot of the twin's links and joints whose URDF has the twin's bodies, damping and dry friction.
+
+    All else of the URDF stays as it is, and so does what the twin does not know or says alike. Raises InputError where
+    a body of the twin is not physically consistent: readers refuse it.
+    """
+    dynamics = {
+        joint: {_URDF[name]: value for name, value in numbers.items() if name in _URDF}
+        for joint, numbers in _numbers(twin).items()
+    }
+    structure = structure_of(robot)
+    stand = {one.name: {"damping": one.damping, "friction": one.friction} for one in structure.connections}
+    changed = {joint: numbers for joint, numbers in dynamics.items() if stand[joint] != stand[joint] | numbers}
+    text = with_numbers(robot.urdf, _bodies(twin, robot, structure), changed)
+    return replace(robot, urdf=text, links=parse_urdf(text).links)
+
+
+def _place(effect: Effect, form: str) -> str | None:
+    if effect.bodies:
+        return "inertia"
+    held = [NUMBERS[form].get(name) for name in effect.in_mjcf.values()]
+    return held[0] if held else None
+
+
+def _numbers(twin: Twin) -> dict[str, dict[str, float]]:
+    """Return what MJCF calls a joint's numbers, by joint."""
+    standing = {effect.id: effect.in_mjcf for effect in twin.standing}
+    found: dict[str, dict[str, float]] = {}
+    for one in twin.parameters:
+        name = standing.get(one.effect, {}).get(one.name)
+        if name is not None and one.joint is not None:
+            found.setdefault(one.joint, {})[name] = one.value
+    return found
+
+
+def _bodies(twin: Twin, robot: Robot, structure: Structure) -> dict[str, pin.Inertia]:
+    """Return the bodies of links that are not those of the robot's URDF, each in its link's frame.
+
+    A body stands at the link that its joint moves, less what is fixed to that; all where the rest is not consistent.
+    """
+    found: dict[str, pin.Inertia] = {}
+    ids = {effect.id for effect in twin.standing if effect.bodies}
+    own = [parameter.value for parameter in twin.parameters if parameter.effect in ids]
+    moved = {one.name: one.child for one in structure.connections}
+    for joint, values in zip(robot.joint_names, np.reshape(own, (-1, 10)), strict=False):
+        index = robot.model.getJointId(joint)
+        before = robot.model.inertias[index].toDynamicParameters()
+        if np.allclose(values, before, rtol=0.0, atol=_SAME * np.abs(before).max()):
+            continue
+        if not consistent(values[None])[0]:
+            raise InputError(
+                f"{robot.name}: the body that {joint} moves is not physically consistent; identify the twin again"
+            )
+        fixed = _fixed(robot, structure, index, moved[joint])
+        rest = values - sum((one.toDynamicParameters() for one in fixed.values()), np.zeros(10))
+        if not consistent(rest[None])[0]:
+            rest = values
+            found |= dict.fromkeys(fixed, pin.Inertia.Zero())
+        found[moved[joint]] = pin.Inertia.FromDynamicParameters(rest)
+    return found
+
+
+def _fixed(robot: Robot, structure: Structure, joint: int, moved: str) -> dict[str, pin.Inertia]:
+    """Return the bodies of links that are fixed to the one that a joint moves, in that one's frame."""
+    found = {}
+    for link in structure.bodies:
+        frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
+        if frame.parentJoint == joint and link.name != moved and link.mass:
+            xx, yy, zz, xy, xz, yz = link.inertia or (0.0,) * 6
+            moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            found[link.name] = frame.placement.act(pin.Inertia(link.mass, np.array(link.com), moments))
+    return found
