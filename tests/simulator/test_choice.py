@@ -24,7 +24,7 @@ def chosen(arm, numbers):
     data_set, _, own = arm
     runs = servo_arm.played(data_set, own, numbers).runs
     stretches = [one for run in runs for one in each(run, 2.7, 2)]
-    return choose(Fit(alone(own, stretches, 0.005), np.full(2, 1e-2), np.full(2, 3.0)))
+    return choose(Fit(alone(own, stretches, 0.01), np.full(2, 1e-2), np.full(2, 3.0)))
 
 
 def test_equal_models_have_no_number_that_differs(arm):
