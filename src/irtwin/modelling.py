@@ -95,7 +95,7 @@ def check_log(folder: Path, *, repair: bool = False, json_file: Path | None = No
     """Read a data set and check its logs; write what was found. Raises InputError on what cannot be read."""
     if json_file is not None:
         check_place(json_file)
-    result = check(read_data_set(folder, repair=repair))
+    result = check(read_data_set(folder, repair=repair, commanded=True))
     if json_file is not None:
         document = {"findings": [finding.to_json() for finding in result.findings]}
         write(json_file, (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())

@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
@@ -45,6 +45,8 @@ from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.simulator.differences import differences, written
 from irtwin.simulator.model import read_model
+from irtwin.simulator.playing import Playing, to_be_played
+from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.simulated_runs import with_simulated_runs
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
@@ -115,17 +117,18 @@ def diagnose(
     motion_file: Path | str | None = None,
     simulator_file: Path | str | None = None,
     announce: Announce = lambda line: None,
-) -> Diagnosis:
+) -> Diagnosis | Playing:
     """Diagnose the gap between a robot's twin, or its simulator, and its runs.
 
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
     in their shapes, and its numbers as the prior. `simulator` is the file of a model of MuJoCo: what it says of the
-    observed motions is held against the robot, as runs of a simulator are. `withhold` takes effects out of the twin and
-    leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace`
-    the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each
-    whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added,
-    `motion_file` the motion of the next experiment, where one is designed, `simulator_file` the simulator's model with
-    the numbers that the robot has.
+    observed motions is held against the robot, as runs of a simulator are; of runs with commands and no torque, these
+    are played through it (`document.played`). `withhold` takes effects out of the twin and leaves them in the
+    catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is
+    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
+    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
+    motion of the next experiment, where one is designed, `simulator_file` the simulator's model with the numbers that
+    the robot has.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = _clocked(announce)
@@ -138,10 +141,12 @@ def diagnose(
     json_file, report, twin_file, motion_file, simulator_file = places
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
-    data_set = _read(Path(dataset), repair, announce)
-    if cutoff is not None:
-        signals = [run.signals for run in data_set.runs]
-        data_set = replace(data_set, cutoff=checked_cutoff(cutoff, signals, "cutoff"))
+    data_set = _read(Path(dataset), repair, announce, commanded=simulator is not None)
+    if simulator is not None and to_be_played(data_set):
+        lacking = {"a twin": twin, "a report": report, "a twin's file": twin_file, "a motion": motion_file}
+        _check_alone(data_set, lacking | {"a workspace": workspace})
+        return _by_playing(data_set, Path(simulator), json_file, simulator_file, announce)
+    data_set = _with_cutoff(data_set, cutoff)
     if kept_in is not None and Workspace.is_there(kept_in, database):
         with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
             check_before(place)
@@ -173,6 +178,36 @@ def diagnose(
 def _say_doubt(twin: Twin | None, announce: Announce) -> None:
     if twin is not None and twin.doubt_of_bodies:
         announce(f"  {twin.doubt_of_bodies}")
+
+
+def _with_cutoff(data_set: DataSet, cutoff: float | None) -> DataSet:
+    """Return the data set with a cutoff, Hz, in place of its own, if one is given. Raises InputError by `cutoff`."""
+    if cutoff is None:
+        return data_set
+    signals = [run.signals for run in data_set.runs]
+    return replace(data_set, cutoff=checked_cutoff(cutoff, signals, "cutoff"))
+
+
+def _check_alone(data_set: DataSet, lacking: Mapping[str, object]) -> None:
+    """Raise InputError where something is given or asked for that a diagnosis by playing lacks."""
+    for name, value in lacking.items():
+        if value is not None:
+            raise InputError(
+                f"{data_set.folder}: has commands and no torque: {name} is of no use for it; it gives --json and "
+                "--save-simulator"
+            )
+
+
+def _by_playing(
+    data_set: DataSet, simulator: Path, json_file: Path | None, simulator_file: Path | None, announce: Announce
+) -> Playing:
+    """Play the runs' commands through a model; write what was found, and the model with the robot's numbers."""
+    played = diagnose_by_playing(data_set, read_model(simulator, data_set.robot), announce)
+    if simulator_file is not None:
+        write(simulator_file, played.written())
+    if json_file is not None:
+        write(json_file, (json.dumps(played.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
+    return played
 
 
 def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis, announce: Announce) -> None:
@@ -266,9 +301,9 @@ def unpack_demo(workspace: Path) -> Path:
     return data_set
 
 
-def _read(folder: Path, repair: bool, announce: Announce) -> DataSet:
+def _read(folder: Path, repair: bool, announce: Announce, commanded: bool = False) -> DataSet:
     """Read a data set and check it; say what was dropped, found and mended. Raises InputError on what must be cured."""
-    data_set = read_data_set(folder, repair=repair)
+    data_set = read_data_set(folder, repair=repair, commanded=commanded)
     _check_effects(data_set)
     return sound(data_set, announce)
 

@@ -137,6 +137,12 @@ def test_a_payload_in_grams():
     assert found(heavy) == {("unit", "payload_mass")}
 
 
+def test_torque_without_its_sign_has_to_be_cured():
+    (finding,) = check(spoilt(healthy(), lambda signals: replace(signals, torque=np.abs(signals.torque)))).findings
+    assert (finding.fault, finding.stops) == ("unsigned", True)
+    assert finding.say.startswith("tau_JOINT has no sign: it is never below zero, though each joint moves both ways")
+
+
 def test_a_sign_is_mended_and_a_dead_channel_stops():
     torque = healthy().runs[0].signals.torque
     mended = checked(spoilt(healthy(), one("torque", 2, np.negative))).data_set

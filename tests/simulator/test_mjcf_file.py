@@ -33,15 +33,26 @@ def test_a_file_with_nothing_changed_is_the_same_bytes(tmp_path):
 
 
 def test_changed_numbers_alone_differ(tmp_path):
-    new = {("joint", "pan"): {"damping": 1.25}, ("joint", "lift"): {"armature": 0.5}}
+    file = read_mjcf(model(tmp_path))
+    pan, lift = (file.tag(["joint"], "name", name) for name in ("pan", "lift"))
+    new = {pan: {"damping": 1.25}, lift: {"armature": 0.5}}
     expected = TEXT.replace("damping = '1.0'", "damping = '1.25'").replace('class="x" >', 'class="x" armature="0.5">')
-    assert read_mjcf(model(tmp_path)).changed(new).decode() == expected
+    assert file.changed(new).decode() == expected
+
+
+def test_an_element_takes_another_name_and_attributes_go(tmp_path):
+    file = read_mjcf(model(tmp_path))
+    changed = file.changed({file.tag(["joint"], "name", "lift"): {"": "freejoint", "class": None, "user": "1 2"}})
+    assert changed.decode() == TEXT.replace(
+        '<joint name="lift" class="x" ></joint>', '<freejoint name="lift" user="1 2"></freejoint>'
+    )
 
 
 @given(value=st.floats(0, 1e6))
 def test_numbers_are_read_back_as_they_were(tmp_path_factory, value):
     folder = tmp_path_factory.mktemp("model")
-    changed = read_mjcf(model(folder)).changed({("joint", "lift"): {"frictionloss": value}})
+    file = read_mjcf(model(folder))
+    changed = file.changed({file.tag(["joint"], "name", "lift"): {"frictionloss": value}})
     tags = read_mjcf(model(folder, changed.decode())).tags
     (lift,) = [tag for tag in tags if tag.attributes.get("name") == "lift"]
     assert float(lift.attributes["frictionloss"]) == value
@@ -49,7 +60,7 @@ def test_numbers_are_read_back_as_they_were(tmp_path_factory, value):
 
 def test_an_element_of_another_file_is_not_changed(tmp_path):
     with pytest.raises(InputError, match=r'arm\.xml: has no <joint name="elbow"> of its own; give the file'):
-        read_mjcf(model(tmp_path)).changed({("joint", "elbow"): {"damping": 1.0}})
+        read_mjcf(model(tmp_path)).tag(["joint"], "name", "elbow")
 
 
 @pytest.mark.parametrize(

@@ -43,3 +43,11 @@ def test_a_log_without_torque_is_refused(tmp_path):
     data_set, model = made(tmp_path, torque=None, current=None)
     with pytest.raises(InputError, match=r"no run has torque to hold the simulator against"):
         with_simulated_runs(data_set, model)
+
+
+def test_a_run_of_commands_alone_beside_runs_with_torque_is_refused(tmp_path):
+    data_set, model = made(tmp_path)
+    first, second = data_set.runs
+    alone = replace(second, signals=replace(second.signals, torque=None, current=None, power=None))
+    with pytest.raises(InputError, match=r"has commands and no torque, where other runs have torque; leave it out"):
+        with_simulated_runs(replace(data_set, runs=(first, alone)), model)

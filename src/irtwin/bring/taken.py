@@ -76,6 +76,10 @@ class _Taking:
         self._resolve(
             "q", lambda joints, _: evidence.position([self.robot.joints[j] for j in joints], self._raw("q", joints))
         )
+        self._resolve(
+            "command",
+            lambda joints, _: evidence.position([self.robot.joints[j] for j in joints], self._raw("command", joints)),
+        )
         positions = self._si("q")
         seconds, started = self._seconds(positions)
         self.motions = [Motion(*pair) for pair in zip(seconds, positions, strict=True)]

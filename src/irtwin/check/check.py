@@ -15,7 +15,7 @@ from irtwin.check.estimates import estimate_findings
 from irtwin.check.moving import Moving, moving
 from irtwin.check.plausibility import plausibility_findings
 from irtwin.check.speeds import speed_findings
-from irtwin.check.torque import torque_findings
+from irtwin.check.torque import torque_findings, unsigned_findings
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Signals, columns_of, from_columns
@@ -48,7 +48,7 @@ def _findings(data_set: DataSet) -> list[Finding]:
     found = _by_column(data_set)
     seen = moving(data_set)
     if seen.runs:
-        found += plausibility_findings(data_set, seen)
+        found += plausibility_findings(data_set, seen) + unsigned_findings(data_set.robot, seen)
         if not any(finding.stops for finding in found):
             found += channel_findings(data_set.robot, seen) + speed_findings(data_set.robot, seen)
         if not any(finding.stops for finding in found):

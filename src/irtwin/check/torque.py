@@ -18,6 +18,7 @@ from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import Finding
 
 _ROWS = 1500  # over all runs
+_SEVERAL = 2  # joints, from which torques without sign are no chance of their loads
 _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _SURE = 4.0  # standard deviations
 _LIKELY = 2.0
@@ -35,6 +36,25 @@ def torque_findings(robot: Robot, moving: Moving) -> list[Finding]:
     nominal = rows.nominal()
     found = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
     return [finding for finding in found if finding is not None]
+
+
+def unsigned_findings(robot: Robot, moving: Moving) -> list[Finding]:
+    """Return that torque has no sign, where no joint of several has any below zero though all move both ways."""
+    torques = [run.signals.torque for run in moving.runs if run.signals.torque is not None]
+    if len(torques) < len(moving.runs) or moving.joints.sum() < _SEVERAL:
+        return []
+    own = [torque[:, moving.joints] for torque in torques]
+    size = all((each >= 0).all() and (np.ptp(each, axis=0) > 0).all() for each in own)
+    q = [np.diff(run.signals.q[:, moving.joints], axis=0) for run in moving.runs]
+    both_ways = np.any([(each > 0).any(axis=0) & (each < 0).any(axis=0) for each in q], axis=0).all()
+    if not size or not both_ways:
+        return []
+    say = (
+        "tau_JOINT has no sign: it is never below zero, though each joint moves both ways; log it with its sign, "
+        "or leave it out: commands (cmd_JOINT) can be held against a simulator's model without it"
+    )
+    name = CHANNELS["torque"].column(robot.joints[int(np.flatnonzero(moving.joints)[0])].name)
+    return [Finding("unsigned", name, moving.names, certain=True, mended=False, evidence={}, say=say)]
 
 
 def scale_findings(robot: Robot, moving: Moving) -> list[Finding]:

@@ -25,6 +25,7 @@ from irtwin.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from irtwin.document.document import Document
     from irtwin.signals.finding import Finding
 
 
@@ -178,7 +179,8 @@ def case_study(workspace: Path) -> None:
     "--simulator",
     metavar="MODEL.xml",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Model of the robot in MuJoCo, to hold the data against: what differs is said. Needs irtwin[mujoco].",
+    help="Model of the robot in MuJoCo, to hold the data against: what differs is said. Logs with commands and without "
+    "torque are played through it. Needs irtwin[mujoco].",
 )
 @click.option(
     "--save-simulator",
@@ -225,6 +227,7 @@ def diagnose(
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import differences, not_held
     from irtwin.simulator.model import read_model
+    from irtwin.simulator.playing import Playing
 
     if save_simulator and not simulator:
         raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
@@ -248,6 +251,9 @@ def diagnose(
         simulator_file=save_simulator,
         announce=announce,
     )
+    if isinstance(found, Playing):
+        _show_played(found.document)
+        return
     click.echo(line(found.document, found.against))
     for said in (*refused(found.document), *summary.filtered(found.document)):
         click.echo(said)
@@ -263,6 +269,17 @@ def diagnose(
         click.echo(f"\n{said}")
     for said in summary.next_steps(found.document):
         click.echo(f"\n{said}")
+
+
+def _show_played(document: Document) -> None:
+    """Print a diagnosis by playing."""
+    from irtwin.report.gap import played
+    from irtwin.report.terminal import show
+
+    click.echo(played.line(document))
+    for table in played.tables(document):
+        click.echo()
+        show(table, counted=False)
 
 
 @click.command()

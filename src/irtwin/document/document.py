@@ -14,8 +14,9 @@ from typing import Annotated, Any
 from irtwin.document import form
 from irtwin.document.experiment import Experiment
 from irtwin.document.form import Between, OneOf
+from irtwin.document.played import Played
 from irtwin.document.told import Names, part, tells, told
-from irtwin.document.words import ONTOLOGY, Channel, Effect, Joint, Regime, Run
+from irtwin.document.words import ONTOLOGY, Channel, Effect, Explained, Joint, Regime, Run
 from irtwin.errors import InputError
 
 Share = Annotated[float, Between(0, 1)]
@@ -141,7 +142,7 @@ class Evidence:
     `runs` and `window` (s of the clock): where it acts in some runs, or for a while, only.
     """
 
-    channel: Channel = told("located_in_Channel")
+    channel: Explained = told("located_in_Channel")
     share_of_what_is_closed: float | None = told("Share_Of_Closed", column="share_of_closed")
     closed_where_it_acts: float = told("Closed_Where_It_Acts")
     gain: float = told("Gain")
@@ -210,7 +211,7 @@ class Finding:
     family: Family = told("has_Family")
     joints: tuple[Joint, ...] = told("found_in_Joint")
     scope: Scope = told("has_Scope")
-    channel: Channel = told("located_in_Channel")
+    channel: Explained = told("located_in_Channel")
     confidence: Share = told("Confidence")
     share: float = told("Closed_Share")
     share_interval95: Interval = told("Closed_Share")
@@ -399,6 +400,7 @@ class Document:
     `findings` and `causes` are ordered by what they close, the largest first.
     `unexplained_because`: why the verdict is `unexplained`. The causes leave much of the gap; only a number that cannot
     be true would close it; runs of one motion differ by what no effect explains; or no cause that matters is likely.
+    `played`: where a simulator was told the commands of logs without torque; its causes are in the channel "position".
     """
 
     verdict: Verdict = told("has_Verdict")
@@ -415,6 +417,7 @@ class Document:
     refused: tuple[Refused, ...] | None = told(default=None)
     torque_scale: TorqueScale | None = told(default=None)
     cutoff: Cutoff | None = told(default=None)
+    played: Played | None = None
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

@@ -10,6 +10,7 @@ from irtwin.document.told import Names
 ONTOLOGY = "https://w3id.org/irtwin"
 
 Channel = Annotated[str, OneOf("torque", "power"), Names(f"{ONTOLOGY}/channel/{{}}", "channel")]
+Explained = Annotated[str, OneOf("torque", "power", "position"), Names(f"{ONTOLOGY}/channel/{{}}", "channel")]
 Effect = Annotated[str, Names(f"{ONTOLOGY}/effect/{{}}", "effect")]
 Joint = Annotated[str, Names("joint/{robot_id}/{}", "joint")]
 Regime = Annotated[str, Names(f"{ONTOLOGY}/regime/{{}}")]

@@ -73,6 +73,9 @@ class Signals:
         Channel("tau", "N m", 1e6, "torque", sliding="N", streamed="effort", strict=True, device="torque_sensor"),
     ] = None
     current: Annotated[Logged, Channel("i", "A", 1e5, "motor current", device="current_sensor")] = None
+    command: Annotated[Logged, Channel("cmd", "rad", 1e4, "commanded position", sliding="m", device="controller")] = (
+        None
+    )
     temperature: Annotated[
         Logged, Channel("temp", "degC", 1e3, "temperature", streamed="temperature", device="thermometer")
     ] = None

@@ -88,8 +88,8 @@ class DataSet:
     sha256: Mapping[Path, str] = field(default_factory=dict)  # of `dataset.toml` and the URDF, as they were read
 
 
-def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
-    """Read and check a data set; `repair` drops bad samples.
+def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool = False) -> DataSet:
+    """Read and check a data set; `repair` drops bad samples; `commanded`: runs with commands need no torque or power.
 
     A run NAME with holes in time becomes several, NAME, NAME.2 and so on. Raises InputError, naming file, line or
     column, on whatever is wrong.
@@ -105,7 +105,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
     ]
     findings: list[Finding] = []
     topics = _topics(file, document, robot)
-    listed = _resolved(list(_runs(folder, file, document, robot, repair, repairs, findings, topics)), file)
+    listed = _resolved(list(_runs(folder, file, document, robot, repair, commanded, repairs, findings, topics)), file)
     runs = tuple(run for run in listed if run.role != PLANNED)
     if not runs:
         raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
@@ -127,7 +127,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False) -> DataSet:
         power_at=power_at,
         simulated=table.values.get("simulated") is True or all(run.role == "simulated" for run in runs),
         notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
-        repairs=tuple(repairs),
+        repairs=tuple(dict.fromkeys(repairs)),
         findings=tuple(findings),
         urdf=urdf,
         plans=tuple(run for run in listed if run.role == PLANNED),
@@ -290,6 +290,7 @@ def _runs(
     document: dict[str, Any],
     robot: Robot,
     repair: bool,
+    commanded: bool,
     repairs: list[str],
     findings: list[Finding],
     topics: Mapping[str, str],
@@ -301,7 +302,9 @@ def _runs(
         role = table.text("role", "observed") or ""
         if role not in ROLES:
             raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
-        signals, dropped = read_signals(path, robot, repair=repair, measured=role != PLANNED, topics=topics)
+        signals, dropped = read_signals(
+            path, robot, repair=repair, measured=role != PLANNED, commanded=commanded, topics=topics
+        )
         if role == PLANNED:
             signals = signals.motion
             check_plan(signals, path)

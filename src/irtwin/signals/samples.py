@@ -16,6 +16,7 @@ from irtwin.signals.channels import CHANNELS, REQUIRED, Channel, Signals, by_col
 from irtwin.signals.sources.catalogue import source_of
 from irtwin.signals.sources.source import Source, check_names
 
+UNSIGNED = "abs_"  # of a column of torque without its sign, tau_abs_JOINT: no torque
 FEWEST = 20  # samples; fewer cannot be filtered
 
 
@@ -25,13 +26,14 @@ def read_signals(
     *,
     repair: bool = False,
     measured: bool = True,
+    commanded: bool = False,
     topics: Mapping[str, str] | None = None,
 ) -> tuple[Signals, list[str]]:
     """Read a run's file; return its signals and a line for each kind of sample that was dropped.
 
-    `repair` drops bad samples; `measured`: whether torque or power has to be there, or the motion is enough; `topics`:
-    what [topics] of dataset.toml says. Raises InputError, naming file, line or row and column, on anything
-    `LOG_FORMAT.md` calls bad input.
+    `repair` drops bad samples; `measured`: whether torque or power has to be there, or the motion is enough;
+    `commanded`: whether commands do in their place; `topics`: what [topics] of dataset.toml says. Raises InputError,
+    naming file, line or row and column, on anything `LOG_FORMAT.md` calls bad input.
     """
     source = source_of(path, robot, topics)
     channels = by_column(robot.joint_names)
@@ -44,9 +46,10 @@ def read_signals(
     if len(columns["time"]) < FEWEST:
         raise InputError(f"{path}: has {len(columns['time'])} samples; a run needs at least {FEWEST}")
     signals = _signals(columns, robot, path)
-    if measured and signals.torque is None and signals.power is None:
+    played = commanded and signals.command is not None
+    if measured and not played and signals.torque is None and signals.power is None:
         raise InputError(f"{path}: has neither torque nor power; {_remedy(signals)}")
-    return signals, repairs + dropped
+    return signals, repairs + dropped + _unsigned(source.columns())
 
 
 def _known(columns: Sequence[str], channels: Mapping[str, Channel], robot: Robot, path: Path) -> list[str]:
@@ -59,7 +62,8 @@ def _known(columns: Sequence[str], channels: Mapping[str, Channel], robot: Robot
     strict = {channel.prefix for channel in CHANNELS.values() if channel.strict}
     for name in names:
         prefix, _, joint = name.partition("_")
-        if prefix in strict and joint and name not in channels and joint not in robot.held:
+        unsigned = prefix == CHANNELS["torque"].prefix and joint.startswith(UNSIGNED)
+        if prefix in strict and joint and name not in channels and joint not in robot.held and not unsigned:
             raise InputError(
                 f'{path}: column {name}: the robot has no moving joint "{joint}" '
                 f"(it has {', '.join(robot.joint_names)})"
@@ -140,7 +144,17 @@ def _signals(columns: Mapping[str, np.ndarray], robot: Robot, path: Path) -> Sig
     return replace(signals, torque=torque, power=power)
 
 
+def _unsigned(columns: Sequence[str]) -> list[str]:
+    """Return a line where a log has torque without its sign."""
+    prefix = f"{CHANNELS['torque'].prefix}_{UNSIGNED}"
+    if not any(name.strip().startswith(prefix) for name in columns):
+        return []
+    return [f"{prefix}JOINT is torque without its sign, as of a current's size, and no torque: left out"]
+
+
 def _remedy(signals: Signals) -> str:
+    if signals.command is not None:
+        return "its commands can be held against a model: irtwin diagnose DATASET --simulator MODEL.xml"
     if signals.current is not None:
         return "give torque_constant for each joint in dataset.toml, or log tau_ or power"
     return "log tau_, i_ or power"

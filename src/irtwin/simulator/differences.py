@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from irtwin.document.document import Cause, Document
 from irtwin.effects.catalogue import catalogue
+from irtwin.simulator.mjcf_file import Tag
 from irtwin.simulator.model import Model
 
 
@@ -44,9 +45,9 @@ def not_held(document: Document) -> tuple[Cause, ...]:
 
 def written(model: Model, found: Sequence[Difference]) -> bytes:
     """Return the model's file with the robot's numbers; all else stays, byte for byte."""
-    changed: dict[tuple[str, str], dict[str, float]] = {}
+    changed: dict[Tag, dict[str, float]] = {}
     for one in found:
-        changed.setdefault(("joint", one.joint), {})[one.name] = one.robot
+        changed.setdefault(model.file.tag(["joint"], "name", one.joint), {})[one.name] = one.robot
     return model.file.changed(changed)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
@@ -15,7 +15,7 @@ _MOST = 20_000_000  # bytes
 _FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tag:
     """A start tag: its element, attributes, and the bytes of the file that it takes."""
 
@@ -33,22 +33,36 @@ class MjcfFile:
     content: bytes
     tags: tuple[Tag, ...]
 
-    def changed(self, numbers: Mapping[tuple[str, str], Mapping[str, float]]) -> bytes:
-        """Return the file with attributes of elements changed, by (element, name); all else stays, byte for byte.
+    def changed(self, changes: Mapping[Tag, Mapping[str, float | str | None]]) -> bytes:
+        """Return the file with attributes of tags changed; all else stays, byte for byte.
 
-        Raises InputError where the file has no such element: an included file may have it.
+        A number takes the place of the first one of several, a text that of all, None takes the attribute out. The key
+        "" gives the element another name.
         """
-        content, left = self.content, dict(numbers)
-        for tag in reversed(self.tags):  # from behind: places before stay right
-            values = left.pop((tag.element, tag.attributes.get("name", "")), {})
-            text = content[tag.start : tag.stop]
-            for attribute, value in values.items():
-                text = _with_attribute(text, attribute, repr(value))
-            content = content[: tag.start] + text + content[tag.stop :]
-        if left:
-            element, name = next(iter(left))
-            raise InputError(f'{self.path}: has no <{element} name="{name}"> of its own; give the file that defines it')
+        content = self.content
+        for tag in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
+            text, after = content[tag.start : tag.stop], content[tag.stop :]
+            for attribute, value in changes[tag].items():
+                if attribute:
+                    text = _with_attribute(text, attribute, repr(value) if isinstance(value, float) else value)
+                else:
+                    text = text.replace(f"<{tag.element}".encode(), f"<{value}".encode(), 1)
+                    if not text.endswith(b"/>"):
+                        after = after.replace(f"</{tag.element}".encode(), f"</{value}".encode(), 1)
+            content = content[: tag.start] + text + after
         return content
+
+    def tag(self, elements: Sequence[str], key: str, value: str) -> Tag:
+        """Return the tag of one of some elements with an attribute's value.
+
+        Raises InputError where the file has none of its own: an included file may have it.
+        """
+        for one in self.tags:
+            if one.element in elements and one.attributes.get(key) == value:
+                return one
+        raise InputError(
+            f'{self.path}: has no <{elements[0]} {key}="{value}"> of its own; give the file that defines it'
+        )
 
 
 def read_mjcf(path: Path) -> MjcfFile:
@@ -127,9 +141,13 @@ def _files(file: MjcfFile) -> Iterator[tuple[str, str]]:
                 yield tag.element, value
 
 
-def _with_attribute(tag: bytes, name: str, value: str) -> bytes:
-    """Return a start tag with an attribute's value changed, or with the attribute added."""
-    said = re.compile(rb"(\s" + name.encode() + rb"\s*=\s*[\"']\s*)[^\s\"']+")
+def _with_attribute(tag: bytes, name: str, value: str | None) -> bytes:
+    """Return a start tag with an attribute's value changed, with the attribute added, or without it."""
+    whole = re.compile(rb"(\s" + name.encode() + rb"\s*=\s*)([\"']).*?\2", re.DOTALL)
+    if value is None:
+        return whole.sub(b"", tag, count=1)
+    several = " " in value
+    said = re.compile(rb"(\s" + name.encode() + rb"\s*=\s*[\"']\s*)" + (rb"[^\"']+" if several else rb"[^\s\"']+"))
     if said.search(tag):  # of several numbers the first one: those after it are of higher powers
         return said.sub(lambda match: match[1] + value.encode(), tag, count=1)
     end = -2 if tag.endswith(b"/>") else -1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,7 @@ class Model:
     positions: np.ndarray  # (n,) in qpos
     speeds: np.ndarray  # (n,) in qvel
     others: tuple[str, ...]
+    delays: np.ndarray  # (number of actuators,), s; the compiled model has none
 
     @property
     def name(self) -> str:
@@ -46,12 +48,15 @@ class Model:
         """
         import mujoco
 
-        data = mujoco.MjData(self.compiled)
+        still = copy.copy(self.compiled)
+        still.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        still.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+        data = mujoco.MjData(still)
         found = np.empty(q.shape)
         for row, (position, speed, acceleration) in enumerate(zip(q, dq, ddq, strict=True)):
             data.qpos[self.positions], data.qvel[self.speeds] = position, speed
             data.qacc[self.speeds] = acceleration
-            mujoco.mj_inverse(self.compiled, data)
+            mujoco.mj_inverse(still, data)
             found[row] = data.qfrc_inverse[self.speeds]
         return np.asarray(found + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
 
@@ -68,7 +73,7 @@ def read_model(path: Path, robot: Robot) -> Model:
     are not among the model's.
     """
     file = read_mjcf(path)
-    compiled = _compiled(file)
+    compiled, delays = _compiled(file)
     own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= 2}
     lacking = [name for name in robot.joint_names if name not in own]
     if lacking:
@@ -84,10 +89,12 @@ def read_model(path: Path, robot: Robot) -> Model:
         compiled.jnt_qposadr[places],
         compiled.jnt_dofadr[places],
         tuple(name for name in own if name not in robot.joint_names),
+        delays,
     )
 
 
-def _compiled(file: MjcfFile) -> mujoco.MjModel:
+def _compiled(file: MjcfFile) -> tuple[mujoco.MjModel, np.ndarray]:
+    """Return the compiled model without the delays of its actuators, and these."""
     try:
         import mujoco
     except ModuleNotFoundError as error:
@@ -95,12 +102,12 @@ def _compiled(file: MjcfFile) -> mujoco.MjModel:
     try:
         spec = mujoco.MjSpec.from_file(str(file.path))
         _drop_pictures(spec, mujoco)
-        compiled = spec.compile()
+        delays = np.array([one.delay for one in spec.actuators], dtype=float)
+        for one in spec.actuators:
+            one.delay, one.nsample = 0.0, 0
+        return spec.compile(), delays
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
-    compiled.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    compiled.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    return compiled
 
 
 def _drop_pictures(spec: mujoco.MjSpec, mujoco: Any) -> None:

@@ -1,0 +1,136 @@
+"""Each joint of a model played by itself, the others as they were measured: quick enough to fit numbers by.
+
+The equations are MuJoCo's of one joint: its servo within the force that it has, damping, and dry friction that gives
+way as its impedance says. Bodies load the joint as the measured motion has it.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from irtwin.signals.sampling import interval
+from irtwin.simulator.play import Stretch
+from irtwin.simulator.servos import NAMES, Servos
+
+_SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
+_AT_ONCE = 3_000_000  # positions that are held at a time
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What stretches of runs are to a joint by itself, at steps of `step` s.
+
+    `load` (steps, p, n): torque of bodies and of the other joints, N m; `inertia` of the bodies likewise, kg m^2;
+    `begun` (2, p, n): position and speed.
+    """
+
+    servos: Servos
+    stretches: tuple[Stretch, ...]
+    step: float
+    load: np.ndarray
+    inertia: np.ndarray
+    begun: np.ndarray
+
+    def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
+        """Return, for each set of numbers (7, n) and each stretch, the positions (N, n) at its samples."""
+        most = max(1, _AT_ONCE // self.load.size)
+        found: list[list[np.ndarray]] = []
+        for first in range(0, len(numbers), most):
+            found += self._some(np.array(numbers[first : first + most]))
+        return found
+
+    def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
+        steps = len(self.load)
+        begin = np.arange(steps) * self.step
+        told = np.array([[one.commands(begin, self.step, each) for one in self.stretches] for each in numbers])
+        positions = self._moved(numbers, np.moveaxis(told, 2, 0))
+        at = [one.time / self.step for one in self.stretches]
+        return [
+            [_between(positions[:, one, place], at[place]) for place in range(len(self.stretches))]
+            for one in range(len(numbers))
+        ]
+
+    def _moved(self, numbers: np.ndarray, told: np.ndarray) -> np.ndarray:
+        """Return positions (steps + 1, v, p, n) under the commands told (steps, v, p, n)."""
+        compiled, servos, step = self.servos.model.compiled, self.servos, self.step
+        at, dof = servos.actuators, servos.model.speeds
+        stiffness, damping, friction, holding, armature, _, _ = np.moveaxis(numbers, 1, 0)[:, :, None, :]
+        joint, servo = servos.dampings(damping)
+        limited = compiled.actuator_forcelimited[at] == 1
+        least, most = np.where(limited, compiled.actuator_forcerange[at].T, [[-np.inf], [np.inf]])
+        changed = holding != servos.numbers[NAMES.index("holding")]
+        firm = np.where(changed, holding, compiled.dof_solimp[dof, 1])
+        back = 2 / (firm * np.maximum(compiled.dof_solref[dof, 0], 2 * step))
+        own = compiled.dof_armature[dof]
+        bodies = 1 / np.maximum(compiled.dof_invweight0[dof], 1e-9) - own
+        soft = (1 - holding) / holding / np.maximum(bodies + armature, 1e-9)
+        filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
+        share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
+        q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
+        followed = q.copy()
+        positions = np.empty((len(told) + 1, *told.shape[1:]))
+        positions[0] = q
+        for row in range(len(told)):
+            inverse = 1 / (self.inertia[row] + armature)
+            followed += share * (told[row] - followed)
+            force = np.minimum(np.maximum(stiffness * (followed - q) - servo * v, least), most)
+            force -= joint * v + self.load[row]
+            held = (force * inverse + back * v) / (inverse + soft)
+            force -= np.minimum(np.maximum(held, -friction), friction)
+            v = v + step * force * inverse / (1 + step * damping * inverse)
+            q = q + step * v
+            positions[row + 1] = q
+        return positions
+
+
+def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
+    """Return stretches of runs as each joint by itself is played over them."""
+    steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
+    shape = (steps, len(stretches), len(servos.model.joints))
+    load, inertia = np.empty(shape), np.empty(shape)
+    for place, one in enumerate(stretches):
+        torque, bodies = _bodies(servos, one)
+        for joint in range(shape[2]):
+            times = np.arange(steps) * step
+            load[:, place, joint] = np.interp(times, one.time, torque[:, joint])
+            inertia[:, place, joint] = np.interp(times, one.time, bodies[:, joint])
+    return Alone(
+        servos, tuple(stretches), step, load, inertia, np.array([one.state() for one in stretches]).swapaxes(0, 1)
+    )
+
+
+def _bodies(servos: Servos, stretch: Stretch) -> tuple[np.ndarray, np.ndarray]:
+    """Return at a stretch's samples the torque (N, n) but of the joint's own acceleration, and the inertia (N, n)."""
+    import mujoco
+
+    dof, at = servos.model.speeds, servos.model.positions
+    bare = copy.copy(servos.model.compiled)
+    bare.dof_armature[dof] = bare.dof_damping[dof] = bare.dof_frictionloss[dof] = 0.0
+    bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    data, full = mujoco.MjData(bare), np.zeros((bare.nv, bare.nv))
+    gap = interval(stretch.time)
+    rows = min(2 * max(2, round(_SMOOTH / gap / 2)) + 1, (len(stretch.q) - 1) // 2 * 2 + 1)
+    q, dq, ddq = (
+        savgol_filter(stretch.q, rows, min(3, rows - 1), deriv=order, delta=gap, axis=0) for order in range(3)
+    )
+    torque, inertia = np.empty(q.shape), np.empty(q.shape)
+    for row in range(len(q)):
+        data.qpos[at], data.qvel[dof], data.qacc[dof] = q[row], dq[row], ddq[row]
+        mujoco.mj_inverse(bare, data)
+        mujoco.mj_fullM(bare, data, full)
+        inertia[row] = np.diag(full)[dof]
+        torque[row] = data.qfrc_inverse[dof] - inertia[row] * ddq[row]
+    return torque, inertia
+
+
+def _between(positions: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return positions (N, n) at places (N,) between those of the steps."""
+    before = np.clip(at.astype(int), 0, len(positions) - 2)
+    share = np.clip(at - before, 0.0, 1.0)[:, None]
+    return np.asarray(positions[before] * (1 - share) + positions[before + 1] * share)

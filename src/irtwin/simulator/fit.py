@@ -1,0 +1,191 @@
+"""Numbers of servos by least squares on what is played: the joints side by side, one change tried in all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from irtwin.identification.progress import Tell
+from irtwin.simulator.alone import Alone
+from irtwin.simulator.play import Stretch, play
+from irtwin.simulator.servos import HOLDS, NAMES, Servos
+
+SMOOTH = tuple(NAMES.index(name) for name in NAMES if name != "holding")  # rows that least squares finds
+_HOLDING = NAMES.index("holding")
+_SETTLED = 0.3  # s after which where a stretch began is forgotten
+_STEP = {"offset": 0.002, "delay": 0.004}  # of a difference quotient; 0.05 of the others, in the chart
+_FARTHEST = {"offset": 0.05, "delay": 0.02}  # that one step goes; 1 of the others
+_LIKELY = {"offset": 0.1, "delay": 0.05, "armature": 0.5}  # standard deviation from the simulator's; 3 of the others
+_TIMES = (1.0, 0.3, 0.1, 0.03, 0.01)  # the simulator's stiffness, where it is begun
+_SETTLES = 0.06  # s, damping over stiffness there
+_STICKS = (0.005, 0.02)  # rad, friction over stiffness there
+_DAMPINGS = (0.2, 1.0, 8.0, 64.0)  # times that of the pass before
+_PASSES, _WORTH = 12, 0.05
+
+
+def _rows(values: dict[str, float], other: float) -> np.ndarray:
+    return np.array([values.get(name, other) for name in NAMES])[:, None]
+
+
+STEP, FARTHEST, LIKELY = _rows(_STEP, 0.05), _rows(_FARTHEST, 1.0), _rows(_LIKELY, 3.0)
+
+
+@dataclass(frozen=True)
+class Played:
+    """What is left of stretches beside numbers (7, n): squares (p, n), rad^2, means over each stretch; `remainders`."""
+
+    at: np.ndarray  # (7, n), in the chart
+    remainders: tuple[np.ndarray, ...]  # a stretch: (N, n), robot less model
+    squares: np.ndarray
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Normal equations of each stretch and joint about numbers: `normal` (p, n, k, k), `right` (p, n, k)."""
+
+    normal: np.ndarray
+    right: np.ndarray
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What numbers are fitted to, and how a misfit counts.
+
+    A stretch counts by the logarithm of its mean square: how much any may be off is not known before. `certainty`
+    (n,): independent samples a stretch has; `floor` (n,), rad: misfits below it are none.
+    """
+
+    alone: Alone
+    floor: np.ndarray
+    certainty: np.ndarray
+    beyond: tuple[np.ndarray, ...] | None = None  # a stretch: (N, n), what the whole model plays beyond single joints
+
+    @property
+    def servos(self) -> Servos:
+        """The simulator's servos."""
+        return self.alone.servos
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """What is played."""
+        return self.alone.stretches
+
+    def played(self, at: np.ndarray) -> Played:
+        """Play numbers (7, n) of the chart."""
+        return self.all_played([at])[0]
+
+    def all_played(self, many: Sequence[np.ndarray]) -> list[Played]:
+        """Play several numbers of the chart."""
+        found = self.alone.play([self.servos.of_chart(at) for at in many])
+        beyond = self.beyond or (0.0,) * len(self.stretches)
+        return [
+            self._left(at, [q + more for q, more in zip(positions, beyond, strict=True)])
+            for at, positions in zip(many, found, strict=True)
+        ]
+
+    def rolled(self, at: np.ndarray) -> Played:
+        """Play numbers (7, n) of the chart by the whole model."""
+        return self._left(at, play(self.servos, [self.servos.of_chart(at)], self.stretches)[0])
+
+    def about(self, at: np.ndarray) -> Fit:
+        """Return the fit that plays as the whole model at numbers (7, n) of the chart, with slopes of single joints."""
+        whole = play(self.servos, [self.servos.of_chart(at)], self.stretches)[0]
+        single = self.alone.play([self.servos.of_chart(at)])[0]
+        return replace(self, beyond=tuple(one - other for one, other in zip(whole, single, strict=True)))
+
+    def _left(self, at: np.ndarray, positions: Sequence[np.ndarray]) -> Played:
+        left = [
+            np.nan_to_num((one.q - q)[one.time >= _SETTLED], nan=1e3, posinf=1e3, neginf=-1e3)
+            for one, q in zip(self.stretches, positions, strict=True)
+        ]
+        return Played(at, tuple(left), np.array([(each**2).mean(axis=0) for each in left]))
+
+    def cost(self, one: Played) -> np.ndarray:
+        """Return how bad numbers are, (n,), as a logarithm of probability: what is left, and how far they are."""
+        return np.asarray(self.misfit(one) + (self.away(one.at) ** 2).sum(axis=0) / 2)
+
+    def misfit(self, one: Played) -> np.ndarray:
+        """Return what is left as a logarithm of probability, (n,)."""
+        return np.asarray(self.certainty / 2 * np.log1p(one.squares / self.floor**2).sum(axis=0))
+
+    def away(self, at: np.ndarray) -> np.ndarray:
+        """Return how far numbers (7, n) are from the simulator's, in standard deviations of what is likely."""
+        off = (at - self.servos.chart(self.servos.numbers)) / LIKELY
+        off[_HOLDING] = 0.0
+        return np.asarray(off)
+
+    def slopes(self, one: Played, rows: Sequence[int] = SMOOTH) -> Slopes:
+        """Return the normal equations of some rows of the numbers, weighted as the misfit counts."""
+        moved = self.all_played([one.at + STEP * (np.arange(len(NAMES)) == row)[:, None] for row in rows])
+        normal, right = [], []
+        for place, left in enumerate(one.remainders):
+            columns = np.stack(
+                [(left - each.remainders[place]) / STEP[row, 0] for row, each in zip(rows, moved, strict=True)], axis=-1
+            )
+            weight = self.certainty / (len(left) * (one.squares[place] + self.floor**2))
+            normal.append(np.einsum("tnk,tnl->nkl", columns, columns) * weight[:, None, None])
+            right.append(np.einsum("tnk,tn->nk", columns, left) * weight[:, None])
+        return Slopes(np.array(normal), np.array(right))
+
+    def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES, tell: Tell | None = None) -> Played:
+        """Return numbers with those that are free (7, n) fitted, by Levenberg's way, each joint with its own damping.
+
+        A joint keeps what it has where nothing better is found.
+        """
+        rows = [row for row in SMOOTH if free[row].any()]
+        damping = np.full(free.shape[1], 1e-2)
+        for number in range(passes if rows else 0):
+            slopes, before = self.slopes(best, rows), self.cost(best)
+            steps = [self._steps(best.at, slopes, rows, free, damping * times) for times in _DAMPINGS]
+            tried = self.all_played([self.servos.chart(self.servos.of_chart(best.at + step)) for step in steps])
+            chosen = np.argmin([self.cost(one) for one in tried], axis=0)
+            best = self.best((best, *tried))
+            damping = np.maximum(damping * np.array(_DAMPINGS)[chosen], 1e-4)
+            if tell:
+                tell(f"  numbers of servos, pass {number + 1}: {1e3 * np.sqrt(best.squares.mean()):.3g} mrad left")
+            if (before - self.cost(best) < _WORTH).all():
+                break
+        return best
+
+    def _steps(
+        self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], free: np.ndarray, damping: np.ndarray
+    ) -> np.ndarray:
+        """Return the step (7, n) of all numbers, none of those that are not free."""
+        likely, steps = LIKELY[rows, 0], np.zeros(at.shape)
+        for joint in range(at.shape[1]):
+            own = np.flatnonzero(free[rows, joint])
+            normal = (slopes.normal[:, joint].sum(axis=0) + np.diag(likely**-2.0))[np.ix_(own, own)]
+            right = (slopes.right[:, joint].sum(axis=0) - self.away(at)[rows, joint] / likely)[own]
+            step = np.linalg.solve(normal + damping[joint] * np.diag(np.diag(normal)), right)
+            some = np.array(rows)[own]
+            steps[some, joint] = step / max(1.0, np.abs(step / FARTHEST[some, 0]).max(initial=0.0))
+        return steps
+
+    def best(self, tried: Sequence[Played]) -> Played:
+        """Return of each joint the numbers that cost least; one joint's play is nothing to another's."""
+        chosen = np.argmin([self.cost(one) for one in tried], axis=0)
+
+        def mixed(parts: Sequence[np.ndarray]) -> np.ndarray:
+            return np.column_stack([parts[one][:, joint] for joint, one in enumerate(chosen)])
+
+        stretches = range(len(self.stretches))
+        return Played(
+            mixed([one.at for one in tried]),
+            tuple(mixed([one.remainders[place] for one in tried]) for place in stretches),
+            mixed([one.squares for one in tried]),
+        )
+
+    def begun(self, tell: Tell | None = None) -> Played:
+        """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
+        own, tried = self.servos.numbers, []
+        free = np.ones(own.shape, dtype=bool)
+        free[[NAMES.index("stiffness"), NAMES.index("holding")]] = False
+        for times in _TIMES:
+            stiffness = own[0] * times
+            ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]
+            grid = [np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways]
+            begun = self.best(self.all_played([self.servos.chart(one) for one in grid]))
+            tried.append(self.solved(begun, free, 3, tell))
+        return self.best(tried)

@@ -1,0 +1,127 @@
+"""Commands of a log, played through a model in MuJoCo."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from irtwin.signals.log import Run
+from irtwin.simulator.servos import NAMES, Servos
+
+_AROUND = 0.1  # s about a beginning, of which position and speed there are taken
+_MOST = 20_000_000  # values of states that are held at a time: 160 MB
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a run that is played by itself: `rows` of it, from `begin` s; it begins as the robot did there."""
+
+    run: Run
+    rows: slice
+    begin: float
+
+    @property
+    def time(self) -> np.ndarray:
+        """The times of its samples (N,), s since its beginning."""
+        return np.asarray(self.run.signals.time[self.rows] - self.begin)
+
+    @property
+    def q(self) -> np.ndarray:
+        """The robot's positions (N, n)."""
+        return np.asarray(self.run.signals.q[self.rows])
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return position and speed (n,) of the robot where it begins."""
+        time, q = self.run.signals.time - self.begin, self.run.signals.q
+        near = np.abs(time) <= _AROUND
+        columns = np.column_stack([np.ones(near.sum()), time[near]])
+        position, speed = np.linalg.lstsq(columns, q[near], rcond=None)[0]
+        return position, speed
+
+    def commands(self, begin: np.ndarray, step: float, numbers: np.ndarray) -> np.ndarray:
+        """Return the commands (N, n) in force, on average, over steps that begin at times (N,), s since its beginning.
+
+        Each command is in force until the next comes; delay and offset of `numbers` (7, n) are in them.
+        """
+        time, told = self.run.signals.time, self.run.signals.command
+        assert told is not None
+        ends = np.concatenate([[time[0] - 1e4], time, [time[-1] + 1e4]])
+        held = np.vstack([told[:1], told])  # before the first sample: the first
+        summed = np.vstack([np.zeros(told.shape[1]), np.cumsum(held * np.diff(ends)[:, None], axis=0)])
+        found = np.empty((len(begin), told.shape[1]))
+        for k in range(told.shape[1]):
+            at = self.begin + begin - numbers[NAMES.index("delay"), k]
+            found[:, k] = (np.interp(at + step, ends, summed[:, k]) - np.interp(at, ends, summed[:, k])) / step
+        return np.asarray(found + numbers[NAMES.index("offset")])
+
+
+def whole(run: Run) -> Stretch:
+    """Return a run as one stretch."""
+    return Stretch(run, slice(None), float(run.signals.time[0]))
+
+
+def each(run: Run, seconds: float, most: int | None = None) -> list[Stretch]:
+    """Return stretches of a run that do not overlap, of `most` at most, evenly spread; at least one."""
+    time = run.signals.time
+    lasts = float(time[-1] - time[0])
+    fit = max(1, int(lasts / seconds))
+    count = min(fit, most or fit)
+    begins = time[0] + np.maximum((np.arange(count) + 0.5) * lasts / count - seconds / 2, 0.0)
+    ends = [np.searchsorted(time, [begin - 1e-9, begin + seconds - 1e-9]) for begin in begins]
+    return [Stretch(run, slice(*rows), float(begin)) for rows, begin in zip(ends, begins, strict=True)]
+
+
+def play(
+    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], step: float | None = None
+) -> list[list[np.ndarray]]:
+    """Return, for each set of numbers (7, n) and each stretch, the positions (N, n) of the model at its samples.
+
+    `step`, s, is that of the simulation, None the model's own. Joints that the robot lacks are told zero.
+    """
+    step = step or servos.model.compiled.opt.timestep
+    steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
+    played = _played(servos, numbers, stretches, steps, step)
+    return [[next(played) for _ in stretches] for _ in numbers]
+
+
+def _played(
+    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], steps: int, step: float
+) -> Iterator[np.ndarray]:
+    import mujoco
+    from mujoco.rollout import rollout
+
+    compiled = servos.model.compiled
+    size = mujoco.mj_stateSize(compiled, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    datas = [mujoco.MjData(compiled) for _ in os.sched_getaffinity(0)]
+    states = [_state(servos, one, size) for one in stretches]
+    models = [servos.compiled(one, step) for one in numbers]
+    pairs = [(one, place) for one in range(len(numbers)) for place in range(len(stretches))]
+    at_once = max(1, _MOST // (steps * size))
+    begin, after = np.arange(steps) * step, np.arange(1, steps + 1) * step
+    for first in range(0, len(pairs), at_once):
+        some = pairs[first : first + at_once]
+        told = np.zeros((len(some), steps, compiled.nu))
+        for row, (one, place) in enumerate(some):
+            told[row][:, servos.actuators] = stretches[place].commands(begin, step, numbers[one])
+        found, _ = rollout([models[one] for one, _ in some], datas, np.array([states[at] for _, at in some]), told)
+        for row, (_, place) in enumerate(some):
+            begun, time = states[place][1 + servos.model.positions], stretches[place].time
+            q = np.vstack([begun, found[row][:, 1 + servos.model.positions]])
+            yield np.column_stack([np.interp(time, np.concatenate([[0.0], after]), values) for values in q.T])
+
+
+def _state(servos: Servos, stretch: Stretch, size: int) -> np.ndarray:
+    """Return the model's state: time, positions, speeds, then what its actuators remember."""
+    compiled = servos.model.compiled
+    state = np.zeros(size)
+    state[1 : 1 + compiled.nq] = compiled.qpos0
+    position, speed = stretch.state()
+    state[1 + servos.model.positions] = position
+    state[1 + compiled.nq + servos.model.speeds] = speed
+    memory = compiled.actuator_actadr[servos.actuators]
+    has = memory >= 0
+    state[1 + compiled.nq + compiled.nv + memory[has]] = position[has]
+    return state

@@ -1,0 +1,179 @@
+"""The position servos of a model, one a joint, and the numbers that say how each follows its commands."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from irtwin.errors import InputError
+from irtwin.simulator.mjcf_file import Tag
+from irtwin.simulator.model import Model
+
+if TYPE_CHECKING:
+    import mujoco
+
+NAMES = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay")
+_IN_JOINT = {"frictionloss": "friction", "armature": "armature"}  # attribute and name
+HOLDS = 0.9999  # impedance of friction that lets a joint at rest creep no more: the most that MuJoCo takes
+_NEAR_ZERO = {
+    "stiffness": 0.01,
+    "damping": 0.1,
+    "friction": 0.1,
+    "armature": 0.01,
+}  # times inertia, s^-2, s^-1, s^-2, 1
+
+
+@dataclass(frozen=True)
+class Servos:
+    """A model's servos in the order of its joints; numbers of them are (7, n), a row a name of NAMES.
+
+    stiffness N m/rad; damping N m s/rad, of servo and joint together; friction N m; holding: the impedance of that
+    friction, 0 to 1; armature kg m^2; offset rad, added to a command; delay s. N and m where a joint slides.
+    """
+
+    model: Model
+    actuators: np.ndarray  # (n,)
+    numbers: np.ndarray  # (7, n), the model's own
+    scale: np.ndarray  # (7, n), below which a number is as good as zero
+
+    def chart(self, numbers: np.ndarray) -> np.ndarray:
+        """Return numbers (..., 7, n) in coordinates in which equal steps matter alike: logarithms, but near zero."""
+        return np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
+
+    def of_chart(self, coordinates: np.ndarray) -> np.ndarray:
+        """Return the numbers of coordinates (..., 7, n); those that cannot be below zero are not."""
+        free = np.isnan(self.scale)
+        free[NAMES.index("delay")] = False
+        held = np.where(free, coordinates, np.maximum(coordinates, 0.0))
+        return np.where(np.isnan(self.scale), held, self.scale * np.expm1(np.where(np.isnan(self.scale), 0.0, held)))
+
+    def compiled(self, numbers: np.ndarray, step: float) -> mujoco.MjModel:
+        """Return the compiled model with numbers (7, n) of its own; offset and delay are the commands' to have."""
+        import mujoco
+
+        one, at, dof = copy.copy(self.model.compiled), self.actuators, self.model.speeds
+        one.opt.timestep = step
+        stiffness, damping, friction, holding, armature, _, _ = numbers
+        in_joint, in_servo = self.dampings(damping)
+        one.actuator_gainprm[at, 0], one.actuator_biasprm[at, 1] = stiffness, -stiffness
+        one.actuator_biasprm[at, 0], one.actuator_biasprm[at, 2] = 0.0, -in_servo
+        one.dof_damping[dof], one.dof_frictionloss[dof], one.dof_armature[dof] = in_joint, friction, armature
+        changed = holding != self.numbers[NAMES.index("holding")]
+        one.dof_solimp[dof, 0] = holding
+        one.dof_solimp[dof, 1] = np.where(changed, holding, one.dof_solimp[dof, 1])
+        mujoco.mj_setConst(one, mujoco.MjData(one))
+        return one
+
+    def dampings(self, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the damping (n,) in joint and in servo: the servo's changes where it has any, the joint's else."""
+        joint = self.model.compiled.dof_damping[self.model.speeds]
+        servo = -self.model.compiled.actuator_biasprm[self.actuators, 2]
+        kept = np.where(servo > 0, np.minimum(joint, damping), damping)
+        return kept, damping - kept
+
+    def written(self, numbers: np.ndarray, differs: np.ndarray) -> bytes:
+        """Return the model's file with those of numbers (7, n) that differ (7, n); all else stays, byte for byte."""
+        changes: dict[Tag, dict[str, float | str | None]] = {}
+        file = self.model.file
+        in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
+        for place, joint in enumerate(self.model.joints):
+            own = dict(zip(NAMES, differs[:, place], strict=True))
+            told = dict(zip(NAMES, map(float, numbers[:, place]), strict=True))
+            of_joint: dict[str, float | str | None] = {}
+            if own["damping"] and in_joint[place] != self.dampings(self.numbers[1])[0][place]:
+                of_joint["damping"] = float(in_joint[place])
+            of_joint |= {key: told[name] for key, name in _IN_JOINT.items() if own[name]}
+            if own["holding"]:
+                of_joint["solimpfriction"] = f"{told['holding']!r} {told['holding']!r}"
+            if of_joint:
+                changes[file.tag(["joint"], "name", joint)] = of_joint
+            if own["stiffness"] or own["damping"] or own["offset"] or own["delay"]:
+                tag = file.tag(["position", "general"], "joint", joint)
+                changes[tag] = self._of_servo(tag, place, told, own, float(in_servo[place]))
+        return file.changed(changes)
+
+    def _of_servo(
+        self, tag: Tag, place: int, told: Mapping[str, float], own: Mapping[str, bool], damping: float
+    ) -> dict[str, float | str | None]:
+        """Return what changes of a servo's tag; only <general> holds an offset of commands."""
+        changed: dict[str, float | str | None] = {}
+        bias = f"{told['stiffness'] * told['offset']!r} {-told['stiffness']!r} {-damping!r}"
+        if tag.element == "general":
+            changed |= {"gainprm": told["stiffness"], "biasprm": bias}
+        elif told["offset"]:
+            kind = {"": "general", "kp": None, "kv": None, "dampratio": None, "inheritrange": None}
+            changed |= {**kind, "gaintype": "fixed", "biastype": "affine"}
+            changed |= {"gainprm": told["stiffness"], "biasprm": bias}
+            compiled, at = self.model.compiled, self.actuators[place]
+            if compiled.actuator_ctrllimited[at] and "ctrlrange" not in tag.attributes:
+                changed["ctrlrange"] = " ".join(map(repr, compiled.actuator_ctrlrange[at].tolist()))
+        else:
+            changed |= {"kp": told["stiffness"]} if own["stiffness"] else {}
+            changed |= {"kv": damping, "dampratio": None} if own["damping"] else {}
+        if own["delay"]:
+            samples = int(np.ceil(told["delay"] / self.model.compiled.opt.timestep)) + 1
+            changed |= {"delay": told["delay"], "nsample": str(samples)}
+        return changed
+
+    def clipped(self, commands: np.ndarray) -> Mapping[str, float]:
+        """Return the share of commands (N, n) that the model's limits clip, by joint; joints with none are left out."""
+        compiled = self.model.compiled
+        lower, upper = compiled.actuator_ctrlrange[self.actuators].T
+        outside = ((commands < lower) | (commands > upper)) & (compiled.actuator_ctrllimited[self.actuators] == 1)
+        shares = zip(self.model.joints, outside.mean(axis=0), strict=True)
+        return {joint: float(share) for joint, share in shares if share > 0}
+
+
+def servos(model: Model) -> Servos:
+    """Return the servos of a model. Raises InputError where a joint is not driven by one position servo."""
+    import mujoco
+
+    compiled = model.compiled
+    found = []
+    for joint in model.joints:
+        place = compiled.joint(joint).id
+        own = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (compiled.actuator_trnid[:, 0] == place)
+        (drives,) = np.nonzero(own)
+        if len(drives) != 1 or not _follows_position(compiled, drives[0]):
+            raise InputError(
+                f"{model.file.path}: joint {joint} is not driven by one position servo; its commands need one to be "
+                f'played: <position joint="{joint}" kp="..."/>'
+            )
+        found.append(drives[0])
+    at, dof = np.array(found), model.speeds
+    stiffness = compiled.actuator_gainprm[at, 0]
+    own = np.array(
+        [
+            stiffness,
+            compiled.dof_damping[dof] - compiled.actuator_biasprm[at, 2],
+            compiled.dof_frictionloss[dof],
+            compiled.dof_solimp[dof, 0],
+            compiled.dof_armature[dof],
+            compiled.actuator_biasprm[at, 0] / stiffness,
+            model.delays[at],
+        ]
+    )
+    data = mujoco.MjData(compiled)
+    mujoco.mj_forward(compiled, data)
+    inertia = np.zeros((compiled.nv, compiled.nv))
+    mujoco.mj_fullM(compiled, data, inertia)
+    near_zero = np.array([_NEAR_ZERO.get(name, np.nan) for name in NAMES])
+    return Servos(model, at, own, near_zero[:, None] * np.diag(inertia)[dof])
+
+
+def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether an actuator pulls its joint to its command, as <position> of gear 1 does."""
+    import mujoco
+
+    gain, bias = compiled.actuator_gainprm[actuator], compiled.actuator_biasprm[actuator]
+    return bool(
+        compiled.actuator_gaintype[actuator] == int(mujoco.mjtGain.mjGAIN_FIXED)
+        and compiled.actuator_biastype[actuator] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        and gain[0] > 0
+        and bias[1] == -gain[0]
+        and compiled.actuator_gear[actuator, 0] == 1
+    )

@@ -1,0 +1,41 @@
+"""Numbers that differ are found and no others; equal models have none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import servo_arm
+
+from irtwin.simulator.alone import alone
+from irtwin.simulator.choice import choose
+from irtwin.simulator.fit import Fit
+from irtwin.simulator.play import each
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    told = {name: servo_arm.swings(6, seed) for name, seed in (("a", 1), ("b", 2))}
+    return servo_arm.read(*servo_arm.write(tmp_path_factory.mktemp("arm"), told))
+
+
+def chosen(arm, numbers):
+    data_set, _, own = arm
+    runs = servo_arm.played(data_set, own, numbers).runs
+    stretches = [one for run in runs for one in each(run, 2.7, 2)]
+    return choose(Fit(alone(own, stretches, 0.01), np.full(2, 1e-2), np.full(2, 3.0)))
+
+
+def test_equal_models_have_no_number_that_differs(arm):
+    assert not chosen(arm, arm[2].numbers).differs.any()
+
+
+def test_the_numbers_that_differ_are_found_with_their_values(arm):
+    true = servo_arm.changed(arm[2], stiffness=(20.0, 10.0), friction=(0.15, 0.05))
+    found = chosen(arm, true)
+    assert (found.differs == (true != arm[2].numbers)).all()
+    assert (((found.interval[0] <= true) & (true <= found.interval[1])) | ~found.differs).all()
+    np.testing.assert_allclose(found.numbers, true, rtol=0.1)
+    left_out = np.array([False, False, True, True])
+    np.testing.assert_allclose(found.without(left_out), true, rtol=0.2)

@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import servo_arm
+
+from irtwin.simulator.alone import alone
+from irtwin.simulator.play import each, play, whole
+
+
+def test_commands_are_held_until_the_next_and_come_late(tmp_path):
+    told = np.zeros((50, 2))
+    told[25:] = 1.0
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": told}))
+    stretch, begin = whole(data_set.runs[0]), np.arange(0.0, 1.0, 0.01)
+    numbers = servo_arm.changed(own, delay=(0.0, 0.1), offset=(0.2, 0.0))
+    found = stretch.commands(begin, 0.01, numbers)
+    np.testing.assert_allclose(found[:, 0], 0.2 + (begin > 0.495), atol=1e-9)
+    np.testing.assert_allclose(found[:, 1], begin > 0.595, atol=1e-9)
+
+
+def test_a_servo_settles_where_its_load_lets_it(tmp_path):
+    text = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"')
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((150, 2))}, text))
+    q = play(own, [own.numbers], [whole(data_set.runs[0])])[0][0][-1]
+    sags = 9.81 * 0.1 * 0.1 * np.cos(q.sum()) / 15
+    assert q[1] == pytest.approx(sags, rel=1e-3)
+
+
+def test_stretches_do_not_overlap_and_are_spread(tmp_path):
+    run = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(10, 1)}))[0].runs[0]
+    assert [round(one.begin, 2) for one in each(run, 2.0, 2)] == [1.5, 6.49]
+    assert len(each(run, 0.5)) == 19
+    assert [len(one.time) for one in each(run, 60.0)] == [500]
+
+
+def test_a_joint_by_itself_plays_nearly_as_the_whole_model(tmp_path):
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(6, 1)}))
+    data_set = servo_arm.played(data_set, own, own.numbers, noise=0.0)
+    numbers = servo_arm.changed(own, stiffness=(22.0, 14.0), friction=(0.1, 0.02), delay=(0.0, 0.02))
+    stretches = each(data_set.runs[0], 2.0, 2)
+    single, whole_ = alone(own, stretches, 0.005).play([numbers])[0], play(own, [numbers], stretches)[0]
+    far = max(np.abs(one.q - own_).max() for one, own_ in zip(stretches, whole_, strict=True))
+    near = max(np.abs(one - other).max() for one, other in zip(single, whole_, strict=True))
+    assert near < 0.02 < far

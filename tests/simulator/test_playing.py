@@ -1,0 +1,141 @@
+"""Logs of commands and positions beside a model, from the command line."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+from tests import servo_arm
+from tests.data_sets import irtwin
+
+from irtwin.document.document import Document
+from irtwin.report.gap.played import line
+
+
+def logs(folder, change=None, text=servo_arm.MODEL, runs=("a", "b"), **numbers):
+    """Write a data set that a robot of some numbers made, and the model."""
+    told = {name: servo_arm.swings(6, seed) for seed, name in enumerate(runs)}
+    data, model = servo_arm.write(folder, told)
+    data_set, _, own = servo_arm.read(data, model)
+    made = servo_arm.played(data_set, own, servo_arm.changed(own, **numbers))
+    for run in made.runs:
+        servo_arm.log(run.file, data_set.robot, run.signals)
+        if change:
+            pa.parquet.write_table(change(pa.parquet.read_table(run.file)), run.file)
+    model.write_text(text, encoding="utf-8")
+    return data, model
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("playing")
+    data, model = logs(folder, stiffness=(20.0, 10.0))
+    new, out = folder / "new.xml", folder / "out.json"
+    said = irtwin("diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out)
+    return said, data, model, new, out
+
+
+@pytest.mark.slow
+def test_the_number_that_differs_is_told_and_written(told):
+    said, data, model, new, _ = told
+    assert said.status == 0, said.err
+    assert "attributed: the simulator misses the robot by" in said.out
+    assert re.search(r"with the robot's servo stiffness it misses it by 0.9\d* mrad", said.out), said.out
+    changed = servo_arm.read(data, new)[2].numbers
+    assert changed[0] == pytest.approx([20.0, 10.0], rel=0.02)
+    assert len(set(model.read_text().splitlines()) - set(new.read_text().splitlines())) == 1
+
+
+@pytest.mark.slow
+def test_the_document_says_simulator_robot_and_change(told):
+    document = Document.from_json(json.loads(told[4].read_text()))
+    (number,) = document.played.numbers
+    assert (number.effect, number.joint, number.simulator, number.unit) == ("servo_stiffness", "elbow", 15.0, "N m/rad")
+    assert number.robot - number.simulator == pytest.approx(number.change)
+    assert number.interval95[0] < 10.0 < number.interval95[1]
+    (cause,) = document.causes
+    assert (cause.id, cause.joints, cause.likely) == ("servo_stiffness@elbow", ("elbow",), True)
+    played = document.played
+    assert played.after < 1.2e-3 < played.before
+    assert played.held_out == pytest.approx(played.after, rel=0.2)
+    assert [one.seconds for one in played.restarted] == [0.1, 0.2, 0.3, 0.4, 0.5]
+    assert all(run.after.flange < run.before.flange for run in played.runs.values())
+
+
+@pytest.mark.slow
+def test_a_simulator_that_is_right_agrees(told):
+    document = Document.from_json(json.loads(told[4].read_text()))
+    right = replace(document, verdict="no_gap", played=replace(document.played, before=1.04e-3, numbers=()))
+    assert line(right) == "no_gap: the simulator agrees with the robot, to 1.04 mrad."
+    wrong = replace(right, verdict="unexplained")
+    assert line(wrong).startswith(
+        "unexplained: the simulator misses the robot by 1.04 mrad, and no number of its servos"
+    )
+
+
+def in_degrees(table):
+    place = table.column_names.index("cmd_lift")
+    return table.set_column(place, "cmd_lift", pa.array(np.degrees(table["cmd_lift"].to_numpy())))
+
+
+def without_commands(table):
+    return table.drop_columns(["cmd_lift", "cmd_elbow"])
+
+
+def refused(folder, *more, change=None, text=servo_arm.MODEL):
+    data, model = logs(folder, change, text)
+    said = irtwin("diagnose", data, "--simulator", model, *more)
+    assert said.status == 2
+    assert said.err.strip().count("\n") <= 3  # the lines of its steps, and one of the error
+    return said.err
+
+
+def test_commands_in_degrees_are_refused(tmp_path):
+    assert "a.parquet: column cmd_lift is in degrees beside positions in rad" in refused(tmp_path, change=in_degrees)
+
+
+def test_logs_without_commands_are_refused(tmp_path):
+    assert "has neither torque nor power; log tau_, i_ or power" in refused(tmp_path, change=without_commands)
+
+
+def test_what_needs_torque_is_refused(tmp_path):
+    said = refused(tmp_path, "--report", tmp_path / "page.html")
+    assert "has commands and no torque: a report is of no use for it; it gives --json and --save-simulator" in said
+
+
+def test_a_model_of_other_joints_is_refused(tmp_path):
+    said = refused(tmp_path, text=servo_arm.MODEL.replace('"elbow"', '"knee"'))
+    assert "has no joint elbow; its joints are lift, knee: give a model whose joints" in said
+
+
+def test_without_a_model_a_log_of_commands_is_told_what_it_is_good_for(tmp_path):
+    data, _ = logs(tmp_path)
+    for command in ("diagnose", "run"):
+        said = irtwin(command, data, *(["--workspace", tmp_path / "w"] if command == "run" else []))
+        assert said.status == 2
+        assert "its commands can be held against a model: irtwin diagnose DATASET --simulator MODEL.xml" in said.err
+
+
+def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
+    def with_size(table):
+        return table.append_column("tau_abs_lift", pa.array(np.ones(len(table))))
+
+    data, _ = logs(tmp_path, with_size)
+    said = irtwin("check", data)
+    assert said.status == 0
+    assert said.err.count("tau_abs_JOINT is torque without its sign") + said.out.count("without its sign") == 1
+
+
+def test_commands_that_the_model_clips_are_said(tmp_path):
+    from irtwin.simulator.playing import _clipped
+
+    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1"))
+    data_set, _, own = servo_arm.read(data, model)
+    lines = _clipped(own, data_set.runs)
+    assert len(lines) == 2
+    assert "of its commands are beyond the model's ctrlrange, which clips them" in lines[0]

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import servo_arm
+
+from irtwin.errors import InputError
+
+SWING = {"a": servo_arm.swings(4, 1)}
+
+
+def arm(folder, text=servo_arm.MODEL):
+    return servo_arm.read(*servo_arm.write(folder, SWING, text))
+
+
+def test_a_models_servos_are_told_by_their_numbers(tmp_path):
+    own = arm(tmp_path)[2]
+    expected = [[20, 15], [0.9, 0.7], [0.05, 0.05], [0.9, 0.9], [0.02, 0.02], [0, 0], [0, 0]]
+    np.testing.assert_allclose(own.numbers, expected)
+    np.testing.assert_allclose(own.of_chart(own.chart(own.numbers)), own.numbers)
+
+
+def test_what_differs_is_written_and_read_back(tmp_path):
+    own = arm(tmp_path)[2]
+    numbers = servo_arm.changed(
+        own, stiffness=(12.5, 15), damping=(0.05, 0.3), friction=(0.05, 0.2), holding=(0.9999, 0.9),
+        armature=(0.02, 0.1), offset=(0, 0.02), delay=(0.033, 0),
+    )  # fmt: skip
+    file = tmp_path / "new.xml"
+    file.write_bytes(own.written(numbers, numbers != own.numbers))
+    again = servo_arm.read(tmp_path / "data", file)[2]
+    np.testing.assert_allclose(again.numbers, numbers, rtol=1e-12, atol=1e-15)
+    text = file.read_text()
+    assert '<joint name="lift" axis="0 1 0" damping="0.05" solimpfriction="0.9999 0.9999"/>' in text
+    assert "<!-- servos as the maker says -->" in text
+    assert '<position joint="lift" kp="12.5" kv="0.0" ctrlrange="-1.5 1.5" forcerange="-5 5" delay=' in text
+    assert '<general joint="elbow" ctrlrange="-1.5 1.5" gaintype="fixed"' in text
+
+
+def test_a_file_with_no_number_changed_is_the_same_bytes(tmp_path):
+    own = arm(tmp_path)[2]
+    assert own.written(own.numbers, np.zeros((7, 2), dtype=bool)) == (tmp_path / "arm.xml").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "servo", ['<motor joint="lift"/>', '<velocity joint="lift" kv="1"/>', '<position joint="lift" kp="20" gear="2"/>']
+)
+def test_an_actuator_that_is_no_position_servo_is_refused(tmp_path, servo):
+    first = servo_arm.MODEL.index('<position joint="lift"')
+    text = servo_arm.MODEL[:first] + servo + servo_arm.MODEL[servo_arm.MODEL.index("/>", first) + 2 :]
+    with pytest.raises(InputError, match="joint lift is not driven by one position servo; its commands need one"):
+        arm(tmp_path, text)
+
+
+def test_commands_beyond_the_models_range_are_counted(tmp_path):
+    own = arm(tmp_path)[2]
+    assert own.clipped(np.array([[0.0, 1.0], [0.0, 1.6], [0.0, -1.7], [1.0, 0.0]])) == {"elbow": 0.5}
