@@ -17,6 +17,7 @@ from irtwin.gap.experiment.next_experiment import Proposal, next_experiment
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.experiment.programmes import programmes
 from irtwin.gap.experiment.separation import fitted, projected, unimitated
+from irtwin.gap.isolation.apart import Apart
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.structure_search import Attribution
@@ -74,7 +75,8 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
     observed = frozenset(m.run for m in motions)
     judged = held_out(system, noise, noise, ())
     closed = np.array([part * judged.before for _ in causes])
-    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, judged, None, nothing)
+    apart = Apart.of(system, system, [one.columns for one in causes])
+    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, apart, judged, judged, None, nothing)
     vars(finding)["closed_squares"] = closed
     return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
 
