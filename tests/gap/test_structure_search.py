@@ -174,7 +174,7 @@ def test_what_few_runs_show_is_found_where_it_is_much():
 
 
 def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
-    system, candidates = system_of(np.eye(8), [0.3, 0.05, *np.zeros(6)])
+    system, candidates = system_of(np.eye(8), [0.3, 0.06, *np.zeros(6)])
     assert [cause.effect for cause in causes(system, candidates)] == ["effect_0"]
     alike = [replace(one, effect="effect", joint=f"joint_{k}") for k, one in enumerate(candidates)]
     (cause,) = causes(system, alike)

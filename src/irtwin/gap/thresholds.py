@@ -61,7 +61,7 @@ class Criterion:
     """How likely a structure of effects is: see `docs/how-it-decides.md`."""
 
     misfit: float = _threshold(
-        0.08, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
+        0.05, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
     )
     misfit_unexplained: float = _threshold(
         0.2, "the same of what is left above the floor", "share of its RMS", "decisions/gap-criterion.md"

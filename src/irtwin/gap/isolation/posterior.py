@@ -26,7 +26,7 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
 
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
-_SIZES = (1.0, 0.3, 0.1, 0.03)  # of an effect, in units of what is expected
+_SIZES = tuple(4.0**-k for k in range(6))  # of an effect, in units of what is expected: down to a thousandth
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
 
 
@@ -171,7 +171,8 @@ class Posterior:
     def _sizes(self, places: np.ndarray, variance: np.ndarray) -> np.ndarray:
         """Return the log of how much room variants' coefficients have, (P,), in units of what the data leave open.
 
-        They are as large as expected, or as `_SIZES` of that, each as likely. Those of one count are solved at once.
+        They are as large as one of `_SIZES`, each as likely: the catalogue expects alike of a base and of a wrist.
+        Variants of one count are solved at once.
         """
         seen, found = self.evidence, np.zeros(len(places))
         counts = np.array([len(seen.values[place]) for place in places], dtype=int)
