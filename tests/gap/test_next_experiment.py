@@ -62,7 +62,7 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
         values = np.array([term.expected for _, term in stack.torque_terms])
         return stack.real_torque(motion, values)
 
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.data.fewest_motions)
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     found = tuple(hypotheses(system.columns, system.base, MISSING))
     noise = np.full(2, NOISE)

@@ -64,7 +64,7 @@ def reduced(noise: float) -> System:
         more = noise * np.random.default_rng(seed).standard_normal(motion.dq.shape)
         logged = low_pass(motion.torque + more * turning(ROBOT, motion.dq), motion.rate, 15.0)
         motions.append(replace(motion, torque=logged))
-    grouping = Grouping({one.run: one.run for one in motions}, frozenset(one.run for one in motions), 4)
+    grouping = Grouping({one.run: one.run for one in motions}, frozenset(one.run for one in motions))
     stack = Stack(ROBOT, ("rigid_body", "rotor_inertia", "coulomb_friction", "torque_offset"))
     return torque_system(stack, motions, grouping, [catalogue()["viscous_friction"]], lambda whole: Predicted(whole.q))
 

@@ -74,7 +74,7 @@ class Case:
     @property
     def grouping(self) -> Grouping:
         """Which runs are left out together: those of one programmed motion."""
-        return Grouping(_labels(self.runs), self.observed, self.thresholds.data.fewest_motions)
+        return Grouping(_labels(self.runs), self.observed)
 
     @property
     def seen(self) -> list[Motion]:

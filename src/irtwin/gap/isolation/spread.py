@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.normal_equations import System, noise_before
 
-_FEWEST = 4  # groups: two in each half
 _DRAWN = 32  # partitions into halves; of five groups there are ten
 
 
@@ -20,7 +20,7 @@ def spread(system: System, floor: np.ndarray) -> float | None:
     equations and halves; None where the groups are fewer than four.
     """
     groups = [int(group) for group in np.flatnonzero(~system.group_observed)]
-    if len(groups) < _FEWEST:
+    if len(groups) < FEWEST_GROUPS:
         return None
     noise = noise_before(system)
 
