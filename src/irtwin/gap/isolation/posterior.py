@@ -125,6 +125,10 @@ class Posterior:
         explained = np.where(self.log_odds > least - _HIDDEN, self.evidence.explained[self.shape], 0.0)
         return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
 
+    def likeliest(self) -> int | None:
+        """Return the place of the likeliest hypothesis; None where none is likelier than nothing."""
+        return int(np.argmax(self.log_odds)) if len(self.log_odds) and self.log_odds.max() > 0 else None
+
     def explained(self, place: int) -> float:
         """Return the squares that a hypothesis explains in its best shape."""
         return float(self.evidence.explained[self.shape[place]])
