@@ -188,7 +188,7 @@ def test_a_mixture_that_comes_first_gives_way_to_the_two_that_it_stands_for():
 
 
 def test_what_explains_most_does_not_hide_what_is_likely():
-    judged = SimpleNamespace(hypotheses=("most", "likely"), variant=str, log_odds=[-9.0, 2.0])
+    judged = SimpleNamespace(hypotheses=("most", "likely"), variant=str, log_odds=[-9.0, 2.0], log_prior=[-5.0, -5.0])
     search = SimpleNamespace(beside=lambda found, noise: judged, left=lambda found, noise: noise)
     judged.likeliest_at = judged.hypotheses.index
     posterior = SimpleNamespace(**{**vars(judged), "first": lambda least: 0, "likeliest": lambda: 1})

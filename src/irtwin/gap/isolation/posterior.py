@@ -102,6 +102,11 @@ class Posterior:
         return np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes])
 
     @cached_property
+    def log_prior(self) -> np.ndarray:
+        """(H,) log odds that a hypothesis is true before the data speak."""
+        return np.array([np.logaddexp.reduce(self.prior[own]) for own in self._shapes])
+
+    @cached_property
     def shape(self) -> np.ndarray:
         """(H,) the index of each hypothesis' variant that explains most, its freedom counted."""
         return np.array([own[np.argmax(self._by_shape[own])] for own in self._shapes], dtype=int)

@@ -152,7 +152,7 @@ class _Search:
         """Return what explains most beside a structure, or is likelier in its place; None below the `least` log odds.
 
         All are judged by what the first leaves: noise that holds its own effect would hide it. Where it is not likely,
-        one that explains less may be.
+        one that explains less may be. What the data speak against is not tried.
         """
         for first in dict.fromkeys((posterior.first(least), posterior.likeliest())):
             if first is None:
@@ -160,7 +160,7 @@ class _Search:
             new = posterior.hypotheses[first], posterior.variant(first)
             judged = self.beside(found, self.left([*found, new], noise))
             place = judged.likeliest_at(new[0])
-            if judged.log_odds[place] > least:
+            if judged.log_odds[place] > max(least, judged.log_prior[place]):
                 return judged.hypotheses[place], judged.variant(place)
         return None
 
