@@ -44,7 +44,7 @@ def of(motions, tried=("stribeck_friction",)):
         return stack.real_torque(motion, values)
 
     effects = [shape for effect in tried for shape in catalogue()[effect].candidates(ROBOT)]
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.data.fewest_motions)
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     case = SimpleNamespace(
         modelled=frozenset((effect, None) for effect in BASELINE),

@@ -11,6 +11,8 @@ from tests.synthetic import arm, as_run, swing
 
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import noise_floor
+from irtwin.gap.isolation.explained import Explained as ExplainedPower
+from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.thresholds import DEFAULT
 
@@ -32,10 +34,11 @@ def case():
     return Case(ROBOT, (), tuple(runs), motions, (ROBOT, motions), DEFAULT)
 
 
-class Explained:
+class Explained(ExplainedTorque):
     """A cause that adds the load to the second run."""
 
-    finding = SimpleNamespace(causes=("load",))
+    def __init__(self):
+        self.finding = SimpleNamespace(causes=("load",))
 
     def added(self, cause, motion, *, real=False):
         return LOAD * np.sin(motion.q) * (motion.run == "run_1")
@@ -50,6 +53,23 @@ def test_what_a_cause_adds_to_one_of_two_repeats_is_taken_off(case):
     left = floor_left(case, floor, Explained(), lambda motion, torque: (2 * torque[:, 0], torque[:, 0]))
     assert left.torque[0] == pytest.approx(NOISE, rel=0.2)
     assert left.power == pytest.approx(NOISE, rel=0.2)
+
+
+class OfPower(ExplainedPower):
+    """A cause of power alone, in the second run."""
+
+    def __init__(self):
+        self.finding = SimpleNamespace(causes=("brakes",))
+
+    def added(self, cause, motion, *, real=False):
+        return 2 * LOAD * np.sin(motion.q[:, 0]) * (motion.run == "run_1")
+
+
+def test_what_a_cause_of_power_adds_to_one_of_two_repeats_is_taken_off(case):
+    floor = noise_floor(case.runs, case.motions, DEFAULT.data)
+    left = floor_left(case, floor, OfPower())
+    assert left.power == pytest.approx(NOISE, rel=0.2)
+    assert left.torque[0] == floor.torque[0]
 
 
 def test_power_that_nobody_measured_keeps_its_floor(case):

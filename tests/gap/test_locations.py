@@ -54,11 +54,11 @@ def on(joint, function):
 
 def labels(*kinds):
     own = {trace.motion.run: trace.motion.run for kind in kinds for trace in kind}
-    return Grouping(own, frozenset(own), DEFAULT.data.fewest_motions)
+    return Grouping(own, frozenset(own))
 
 
 def located(observed, others=(), acting=None, leaving=None):
-    seen, known = joint_maps((observed, others), labels(observed, others), DEFAULT.data.slow)
+    seen, known = joint_maps((observed, others), labels(observed, others), DEFAULT.data.little)
     follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
     level = level_of(FLOOR, seen, known)
     return locate("torque", JOINTS, follows, seen, level, reference=known, acting=acting, leaving=leaving)
@@ -110,7 +110,7 @@ def test_a_cause_of_which_no_place_is_sure_has_those_to_which_it_adds():
     observed = traces(noise=0.3)
     inertia = on(1, lambda m, t: 0.1 * m.ddq[:, 1])
     added = [replace(trace, residual=inertia(trace.motion, trace.torque)) for trace in observed]
-    seen, acts = joint_maps((observed, added), labels(observed, added), DEFAULT.data.slow)
+    seen, acts = joint_maps((observed, added), labels(observed, added), DEFAULT.data.little)
     acting = np.array([False, True, False])
     level = level_of(FLOOR, seen, None)
     places = locate("torque", JOINTS, [None] * 3, seen, level, acting=acting, acts=acts)
@@ -142,7 +142,7 @@ def test_one_run_is_cut_in_time():
 
 
 def test_places_without_a_known_floor_stand_out_of_their_joint():
-    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()), DEFAULT.data.slow)
+    (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()), DEFAULT.data.little)
     places = locate(
         "torque",
         JOINTS,
@@ -155,7 +155,7 @@ def test_places_without_a_known_floor_stand_out_of_their_joint():
 
 
 def test_a_map_has_every_joint_and_regime():
-    (seen,) = joint_maps([traces()], labels(traces()), DEFAULT.data.slow)
+    (seen,) = joint_maps([traces()], labels(traces()), DEFAULT.data.little)
     drawn = heat_map(JOINTS, seen, level_of(FLOOR, seen, None))
     assert drawn.regimes == JOINT_REGIMES
     assert np.array(drawn.excess).shape == (3, len(JOINT_REGIMES))
@@ -167,7 +167,7 @@ def test_power_that_is_given_back_is_located():
     for trace in traces():
         given = np.minimum((trace.torque * trace.motion.dq).sum(axis=1), 0.0)
         observed.append(replace(trace, residual=(trace.residual[:, 0] - given)[:, None]))
-    (seen,) = robot_maps([observed], labels(observed), DEFAULT.data.slow)
+    (seen,) = robot_maps([observed], labels(observed), DEFAULT.data.little)
     first = locate(
         "power",
         (None,),

@@ -17,6 +17,7 @@ from irtwin.gap.experiment.next_experiment import Proposal, next_experiment
 from irtwin.gap.experiment.planned_equations import PlannedEquations
 from irtwin.gap.experiment.programmes import programmes
 from irtwin.gap.experiment.separation import fitted, projected, unimitated
+from irtwin.gap.isolation.apart import Apart
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.structure_search import Attribution
@@ -61,7 +62,7 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
         values = np.array([term.expected for _, term in stack.torque_terms])
         return stack.real_torque(motion, values)
 
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions), DEFAULT.data.fewest_motions)
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     found = tuple(hypotheses(system.columns, system.base, MISSING))
     noise = np.full(2, NOISE)
@@ -74,7 +75,8 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
     observed = frozenset(m.run for m in motions)
     judged = held_out(system, noise, noise, ())
     closed = np.array([part * judged.before for _ in causes])
-    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, judged, None, nothing)
+    apart = Apart.of(system, system, [one.columns for one in causes])
+    finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, apart, judged, judged, None, nothing)
     vars(finding)["closed_squares"] = closed
     return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
 

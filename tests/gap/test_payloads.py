@@ -14,7 +14,6 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.payloads import untold_payload
-from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification import progress
 
 ROBOT = arm(4)
@@ -28,9 +27,7 @@ def search(loaded, observed=range(8), tell=None):
         shown = measure(ROBOT, motion, noise=0.5, seed=seed)
         extra = Payload().contribution(ROBOT, motion, LOAD) if seed in loaded else 0.0
         motions.append(replace(shown, torque=shown.torque + extra))
-    grouping = Grouping(
-        {m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed), DEFAULT.data.fewest_motions
-    )
+    grouping = Grouping({m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed))
     system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
     return untold_payload(ROBOT, system, noise_before(system), tell)
 

@@ -36,7 +36,7 @@ def equations(runs: list[Run], *, told: bool) -> System:
     """The equations of torque with an elastic joint as the candidate; `told` what the noise of positions does."""
     motions = {run.name: condition_for_fit(run, ROBOT, CUTOFF) for run in runs}
     stack = Stack(ROBOT, EXCITED)
-    grouping = Grouping({name: name for name in motions}, frozenset(motions), 4)
+    grouping = Grouping({name: name for name in motions}, frozenset(motions))
     alone: Any = stack, list(motions.values()), grouping
     below = with_load(ROBOT, LeftOut(stack, torque_system(*alone, (), None)).below)
     elastic = [catalogue()["joint_elasticity"]]

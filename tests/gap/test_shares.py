@@ -9,6 +9,7 @@ import pytest
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
+from irtwin.gap.isolation.apart import Apart
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.isolation.structure_search import Attribution
@@ -44,8 +45,12 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
     return system, Attribution(causes, np.array([noise]), (), np.zeros((0, 2)), (), np.zeros(0))
 
 
+def apart(system, attribution):
+    return Apart.of(system, system, [cause.columns for cause in attribution.causes])
+
+
 def shared(system, attribution):
-    return shares(closed_squares(system, attribution, seed=0), system.rows, attribution.noise)
+    return shares(closed_squares(apart(system, attribution), seed=0), system.rows, attribution.noise)
 
 
 def test_independent_causes_share_by_their_squares():
@@ -92,5 +97,5 @@ def test_what_each_closes_adds_up_to_what_all_close():
     system, attribution = system_of([[1.0, 0.0], [0.6, 0.8]], [1.0, 2.0])
     chosen = [k for cause in attribution.causes for k in cause.columns]
     judged = held_out(system, noise_before(system), attribution.noise, chosen)
-    closed = closed_squares(system, attribution, seed=0)
+    closed = closed_squares(apart(system, attribution), seed=0)
     assert closed.sum(axis=0) == pytest.approx(judged.before - judged.after)

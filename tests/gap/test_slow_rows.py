@@ -15,8 +15,11 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
 from irtwin.gap.diagnosis import diagnose
+from irtwin.gap.isolation.apart import Apart
+from irtwin.gap.isolation.shares import closed_squares
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.held_out import left_out
 from irtwin.gap.regression.moments import summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.signals.filter import low_pass
@@ -61,7 +64,7 @@ def reduced(noise: float) -> System:
         more = noise * np.random.default_rng(seed).standard_normal(motion.dq.shape)
         logged = low_pass(motion.torque + more * turning(ROBOT, motion.dq), motion.rate, 15.0)
         motions.append(replace(motion, torque=logged))
-    grouping = Grouping({one.run: one.run for one in motions}, frozenset(one.run for one in motions), 4)
+    grouping = Grouping({one.run: one.run for one in motions}, frozenset(one.run for one in motions))
     stack = Stack(ROBOT, ("rigid_body", "rotor_inertia", "coulomb_friction", "torque_offset"))
     return torque_system(stack, motions, grouping, [catalogue()["viscous_friction"]], lambda whole: Predicted(whole.q))
 
@@ -90,3 +93,37 @@ def test_rows_are_never_less_noisy_where_friction_turns() -> None:
     apart = reduced(noise=0.0).by_speed
     fast, slow = np.split(apart.noise_before, 2)
     assert np.all(slow >= fast)
+
+
+def test_what_is_left_where_friction_turns_is_no_gap() -> None:
+    system, floor = reduced(noise=3.0), np.array([0.02, 0.02])
+    first, second = [system.base], [system.base + 1]
+    apart = Apart.of(system, system, [first, second])
+    before, after = apart.left
+    assert np.all(before > 2 * after)
+    assert np.all(1.5 * after < system.residual_rms(apart.chosen, system.noise_before))
+    np.testing.assert_array_equal(apart.level(floor), floor)
+
+
+def test_what_is_closed_where_friction_turns_counts_by_the_noise_there() -> None:
+    system = reduced(noise=3.0)
+    apart = Apart.of(system, system, [[system.base, system.base + 1]])
+    held_out = apart.held_out()
+    plain = left_out(system, system.moments(system.noise_before), (), np.arange(system.groups))
+    assert np.all(held_out.before.sum(axis=0) < plain.sum(axis=0))
+    np.testing.assert_array_equal(held_out.rows, system.rows)
+    closed = closed_squares(apart, seed=0)
+    np.testing.assert_allclose(closed.sum(axis=0), held_out.before - held_out.after, rtol=1e-6)
+
+
+@pytest.mark.parametrize("changed", [False, True])
+def test_columns_that_nobody_asks_for_can_be_left_out(changed: bool) -> None:
+    system = reduced(noise=0.0)
+    if changed:  # the last run is held against the others
+        system = replace(system, observed=np.array([block.run == system.blocks[-1].run for block in system.blocks]))
+    second = system.base + 1 + 2 * changed
+    kept, places = system.with_columns([second])
+    assert places == [system.base + changed]
+    assert len(kept.columns) == 1
+    noise = np.array([0.05, 0.08])
+    np.testing.assert_allclose(kept.residual_rms(places, noise), system.residual_rms([second], noise), rtol=1e-6)

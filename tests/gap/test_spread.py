@@ -24,7 +24,7 @@ def system(*squares, observed=1):
         return np.sqrt(of_group[list(of)].mean(axis=0))
 
     seen = np.arange(len(of_group)) >= len(of_group) - observed
-    return SimpleNamespace(group_observed=seen, of_group=of_group, rms=rms)
+    return SimpleNamespace(group_observed=seen, of_group=of_group, rms=rms, halves=(slice(of_group.shape[1]),))
 
 
 def test_runs_that_are_alike_leave_nothing_over_one_another():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
-from irtwin.gap.isolation.structure_search import attribute
+from irtwin.gap.isolation.structure_search import _Search, attribute
 from irtwin.gap.regression.evidence import evidence
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Column, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
@@ -174,7 +175,7 @@ def test_what_few_runs_show_is_found_where_it_is_much():
 
 
 def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
-    system, candidates = system_of(np.eye(8), [0.3, 0.05, *np.zeros(6)])
+    system, candidates = system_of(np.eye(8), [0.3, 0.06, *np.zeros(6)])
     assert [cause.effect for cause in causes(system, candidates)] == ["effect_0"]
     alike = [replace(one, effect="effect", joint=f"joint_{k}") for k, one in enumerate(candidates)]
     (cause,) = causes(system, alike)
@@ -184,6 +185,16 @@ def test_an_effect_that_a_joint_has_shown_may_be_smaller_at_another():
 def test_a_mixture_that_comes_first_gives_way_to_the_two_that_it_stands_for():
     mix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.7, 0.7, 0.08]]
     assert sorted(found(mix, [0.3, 0.2, 0.0])) == ["effect_0", "effect_1"]
+
+
+def test_what_explains_most_does_not_hide_what_is_likely():
+    judged = SimpleNamespace(hypotheses=("most", "likely"), variant=str, log_odds=[-9.0, 2.0], log_prior=[-5.0, -5.0])
+    search = SimpleNamespace(beside=lambda found, noise: judged, left=lambda found, noise: noise)
+    judged.likeliest_at = judged.hypotheses.index
+    posterior = SimpleNamespace(**{**vars(judged), "first": lambda least: 0, "likeliest": lambda: 1})
+    assert _Search.likely(search, posterior, [], None) == ("likely", "1")
+    posterior.likeliest = lambda: None
+    assert _Search.likely(search, posterior, [], None) is None
 
 
 def test_effects_that_cannot_be_told_apart_share_the_probability():

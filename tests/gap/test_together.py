@@ -39,7 +39,7 @@ def screened(loaded, touched, still=()):
             extra = extra + ExternalContact(2.0, 3.5).contribution(ROBOT, motion, FORCE)
         motions.append(replace(shown, torque=shown.torque + extra))
     names = frozenset(motion.run for motion in motions)
-    grouping = Grouping({name: name for name in names}, names, DEFAULT.data.fewest_motions)
+    grouping = Grouping({name: name for name in names}, names)
     case = SimpleNamespace(robot=ROBOT, with_torque=motions, observed=names, grouping=grouping, thresholds=DEFAULT)
     stack = Stack(ROBOT, BASELINE)
     system = torque_system(stack, motions, grouping, (), None)

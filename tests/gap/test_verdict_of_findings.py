@@ -36,15 +36,13 @@ CAUSE = SimpleNamespace(rivals=(), scope="missing", joints=("j1",), variants=(VA
 
 def left(before, after, causes=(), closing=MUCH, **more):
     """before, after: RMS of each joint, in floors; `closing`: what the causes close; `more` as left_open."""
-    system = SimpleNamespace(both=False)
     floor = np.ones(len(before))
     finding = SimpleNamespace(
         name="torque",
         places=("j1", "j2")[: len(before)],
         causes=causes,
         floor=floor,
-        system=system,
-        fitted=(np.array(before), np.array(after)),
+        apart=SimpleNamespace(plain=None, left=(np.array(before), np.array(after)), level=lambda floor: floor),
         closing=lambda some: closing,
     )
     return left_open([finding], DEFAULT, **more)

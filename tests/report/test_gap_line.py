@@ -12,7 +12,11 @@ from irtwin.report.gap.headline import line, refused
 @pytest.mark.parametrize(
     ("verdict", "against", "said"),
     [
-        ("no_gap", None, "no_gap: There is no gap: the twin explains the data down to the noise floor."),
+        (
+            "no_gap",
+            None,
+            "no_gap: There is no gap: the twin explains the data down to the noise floor, reversals aside.",
+        ),
         (
             "unexplained",
             "reference",

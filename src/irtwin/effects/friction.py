@@ -56,7 +56,7 @@ def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:
 
 def turning(robot: Robot, dq: np.ndarray) -> np.ndarray:
     """Return (N, n), by speeds, where a joint is so slow that its dry friction turns: its law there is its own."""
-    widths = np.array([joint.friction_width or _SHARP for joint in robot.joints])
+    widths = np.array([joint.friction_widest or joint.friction_width or _SHARP for joint in robot.joints])
     return np.asarray(np.abs(dq) < _TURNED * widths)
 
 

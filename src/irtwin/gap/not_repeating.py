@@ -32,11 +32,12 @@ def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
     judged, own = finding.held_out, [one for one in taken if one.disturbance.channel == finding.name]
     if not own:
         return finding
-    before = judged.before + sum(_squares(finding, one) for one in own)
+    squares = sum(_squares(finding, one) for one in own)
     closed = float(np.sum((judged.before - judged.after) / _level(finding)))
-    more = float(np.sum((before - judged.before) / _level(finding)))
+    more = float(np.sum(squares / _level(finding)))
     part = max(closed, 0.0) / max(max(closed, 0.0) + more, 1e-300)
-    return replace(finding, held_out=replace(judged, before=before), part=part)
+    held_out, counted = (replace(each, before=each.before + squares) for each in (judged, finding.counted))
+    return replace(finding, held_out=held_out, counted=counted, part=part)
 
 
 def _level(finding: Finding) -> np.ndarray:
@@ -164,7 +165,7 @@ class NotRepeating:
     def _closing(self, one: Removed) -> Closing:
         finding = self._finding(one)
         squares = _squares(finding, one)
-        return closing(squares, squares.sum(axis=1) > 0, finding.held_out, finding.floor, finding.attribution.noise)
+        return closing(squares, squares.sum(axis=1) > 0, finding.counted, finding.floor, finding.attribution.noise)
 
     def shrink(self, shrink: document.Shrink, seed: int) -> document.Shrink:
         """Return how far the gap shrinks, with what was taken out."""

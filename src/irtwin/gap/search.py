@@ -84,7 +84,7 @@ def torque_causes(
 
     def alone(without: Set[Without]) -> tuple[Finding, Floor]:
         first = find("torque", case, system, floor.torque, seed, without, tell=tell)
-        left = floor_left(case, floor, ExplainedTorque(stack, first, below), None) if first.causes else floor
+        left = floor_left(case, floor, ExplainedTorque(stack, first, below)) if first.causes else floor
         return replace(first, floor=left.torque), left
 
     return find_possible(case, alone, unknown)
@@ -109,7 +109,9 @@ def power_causes(
     plain = before().system if before else None
 
     def search(without: Set[Without]) -> tuple[Finding, Floor]:
-        return find("power", case, system, level, seed, without, plain, tell), floor
+        found = find("power", case, system, level, seed, without, plain, tell)
+        left = floor_left(case, floor, explained_power(stack, found, torque, power_of)) if found.causes else floor
+        return replace(found, floor=None if left.power is None else np.array([left.power])), left
 
     finding, _, refusals = find_possible(case, search, unknown)
     return explained_power(stack, finding, torque, power_of), refusals

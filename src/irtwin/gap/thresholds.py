@@ -25,14 +25,11 @@ class Data:
     """What runs of one robot, logged well, may differ by."""
 
     shortest: float = _threshold(1.0, "observed runs last so long together", "s", "judgement")
-    fewest_motions: int = _threshold(
-        4, "fewer programmed motions are few: stretches of time stand for runs", "motions", "two in each half"
-    )
-    repeated: float = _threshold(
-        0.1, "repeats of a motion differ in position by no more", "share of its standard deviation", "judgement"
-    )
-    slow: float = _threshold(
-        0.1, "a joint is slow below, its speed steady", "share of its largest speed, acceleration", "judgement"
+    little: float = _threshold(
+        0.1,
+        "of a joint: slow beside its largest speed, steady beside its largest acceleration, a repeat beside its spread",
+        "share",
+        "judgement",
     )
     smoothed: float = _threshold(
         5.0,
@@ -61,7 +58,7 @@ class Criterion:
     """How likely a structure of effects is: see `docs/how-it-decides.md`."""
 
     misfit: float = _threshold(
-        0.08, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
+        0.05, "what no effect names, along any effect", "share of the RMS that is left", "decisions/gap-criterion.md"
     )
     misfit_unexplained: float = _threshold(
         0.2, "the same of what is left above the floor", "share of its RMS", "decisions/gap-criterion.md"

@@ -17,7 +17,7 @@ class Joint:
 
     `rotor_inertia` (kg m^2), `torque_constant` (N m/A) are reflected to the joint; `winding_resistance` in ohm.
     `friction_width` (rad/s or m/s) and `friction_exponent`: over which speed, and how, dry friction turns at zero
-    (`effects.friction.turn`); None: at once.
+    (`effects.friction.turn`); None: at once. `friction_widest`: the wider of two such widths, where runs show two.
     """
 
     name: str
@@ -33,6 +33,7 @@ class Joint:
     winding_resistance: float | None = None
     friction_width: float | None = None
     friction_exponent: float | None = None
+    friction_widest: float | None = field(default=None, compare=False)  # no number of a twin
 
     @property
     def unit(self) -> str:

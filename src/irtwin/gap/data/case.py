@@ -23,7 +23,7 @@ from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.progress import Tell
 from irtwin.identification.torque_constants import torque_constants
-from irtwin.robot.description import Robot
+from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
@@ -74,7 +74,7 @@ class Case:
     @property
     def grouping(self) -> Grouping:
         """Which runs are left out together: those of one programmed motion."""
-        return Grouping(_labels(self.runs), self.observed, self.thresholds.data.fewest_motions)
+        return Grouping(_labels(self.runs), self.observed)
 
     @property
     def seen(self) -> list[Motion]:
@@ -136,14 +136,14 @@ class Case:
         """Return the case with the turn of each joint's dry friction.
 
         It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
+        Where it turns over another speed in these, both turns are nobody's.
         """
         found = self.robot
         for motions in (self.seen, self.others):
             if motions:
                 turned = with_friction_near_zero(self.robot, motions, self.effects, tell)
                 both = zip(found.joints, turned.joints, strict=True)
-                joints = (own if one.friction_width is None else one for own, one in both)
-                found = replace(found, joints=tuple(joints))
+                found = replace(found, joints=tuple(_turned(own, one) for own, one in both))
         return replace(self, robot=found)
 
     def shows(self, signal: str) -> bool:
@@ -179,6 +179,13 @@ def case_of(
         cutoff,
     )
     return case.with_friction_near_zero(tell)
+
+
+def _turned(before: Joint, joint: Joint) -> Joint:
+    """Return a joint as one side's runs show its turn, where they do, and the wider one of it and the turn before."""
+    if joint.friction_width is None:
+        return before
+    return replace(joint, friction_widest=max(before.friction_width or 0.0, joint.friction_width))
 
 
 def _stated(data_set: DataSet) -> Stated:

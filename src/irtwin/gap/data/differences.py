@@ -72,7 +72,7 @@ def _laid(first: Motion, second: Motion, limits: Data) -> Pair | None:
     if inside.sum() < _FEWEST:
         return None
     q = make_interp_spline(second.time + shift, second.q)(first.time[inside])
-    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.repeated * max(float(first.q.std()), 1e-3):
+    if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.little * max(float(first.q.std()), 1e-3):
         return None
     return Pair(first, second, shift, inside)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from irtwin.effects.effect import Predicted
@@ -11,6 +13,7 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import PowerOf
+from irtwin.gap.regression.residuals import as_filtered
 from irtwin.signals.motion import Motion
 
 
@@ -40,6 +43,19 @@ class Explained:
                     total += self._column(columns, k) * self.finding.estimate.values[self._places[k]]
         return total
 
+    def off(self, motion: Motion, power_of: PowerOf | None = None) -> Motion:
+        """Return a run without what the causes add to its signal, and without what that takes of power, `power_of`.
+
+        None: of power nothing is taken off for causes of torque.
+        """
+        if motion.power is None:
+            return motion
+        return replace(motion, power=motion.power - as_filtered(motion, self._all(motion)))
+
+    def _all(self, whole: Motion, *, real: bool = False) -> np.ndarray:
+        """Return what all causes add over a whole run, as `added` does."""
+        return np.asarray(sum(self.added(cause, whole, real=real) for cause in self.finding.causes))
+
     def _column(self, columns: np.ndarray, k: int) -> np.ndarray:
         """Return the candidate column k of an effect's columns (..., m)."""
         system = self.finding.system
@@ -66,6 +82,15 @@ class ExplainedTorque(Explained):
                 torque = torque + self.added(cause, whole, real=True)
             self._held = whole.run, torque
         return self._held[1][motion.start : motion.start + len(motion.time)]
+
+    def off(self, motion: Motion, power_of: PowerOf | None = None) -> Motion:
+        """Return a run without the causes, as above."""
+        torque = None if motion.torque is None else motion.torque - as_filtered(motion, self._all(motion))
+        if power_of is None or motion.power is None:
+            return replace(motion, torque=torque)
+        whole = self(motion)
+        taken = power_of(motion, whole)[0] - power_of(motion, whole - self._all(motion, real=True))[0]
+        return replace(motion, torque=torque, power=motion.power - as_filtered(motion, taken))
 
 
 def explained_power(stack: Stack, finding: Finding, torque: Torque, power_of: PowerOf) -> Explained:

@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.data.case import Case
+from irtwin.gap.isolation.apart import Apart
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
@@ -32,7 +33,8 @@ class Finding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
-    W, None where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is
+    W, None where unknown; `held_out`: what is left of groups left out, `counted` the same as `apart` counts it;
+    `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is
     closed theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where
     `system` stands on torque that causes explain; `beside`: power's, if both were fitted. `seed` draws orders of many
     causes; `tell` is told how far that has come.
@@ -43,7 +45,9 @@ class Finding:
     observed: frozenset[str]
     system: System
     attribution: Attribution
+    apart: Apart
     held_out: HeldOut
+    counted: HeldOut
     floor: np.ndarray | None
     estimate: Estimate
     part: float = 1.0
@@ -55,7 +59,7 @@ class Finding:
     @cached_property
     def closed_squares(self) -> np.ndarray:
         """(C, G, g) what each cause closes of the squares of each group left out and equation."""
-        return closed_squares(self.system, self.attribution, self.seed, self.tell)
+        return closed_squares(self.apart, self.seed, self.tell)
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -66,7 +70,7 @@ class Finding:
     def shares(self) -> tuple[float, ...]:
         """Each cause's part of what they close together, none where they close nothing."""
         level = self.attribution.noise if self.floor is None else self.floor
-        own = shares(self.closed_squares, self.held_out.rows, level)
+        own = shares(self.closed_squares, self.counted.rows, level)
         return tuple(self.part * share for share in own)
 
     def share(self, cause: Cause) -> float | None:
@@ -78,7 +82,7 @@ class Finding:
         closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
         acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
-        return closing(closed, acting, self.held_out, self.floor, self.attribution.noise)
+        return closing(closed, acting, self.counted, self.floor, self.attribution.noise)
 
     @property
     def chosen(self) -> list[int]:
@@ -166,9 +170,23 @@ def finding_of(
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
     judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain, tell)
+    apart = Apart.of(plain or system, system, [cause.columns for cause in found.causes])
     fitted = estimate_of(system, chosen, tell) if beside is None else beside.estimate(chosen, tell)
     return Finding(
-        name, places, observed, system, found, judged, floor, fitted, plain=plain, beside=beside, seed=seed, tell=tell
+        name,
+        places,
+        observed,
+        system,
+        found,
+        apart,
+        judged,
+        apart.held_out(tell),
+        floor,
+        fitted,
+        plain=plain,
+        beside=beside,
+        seed=seed,
+        tell=tell,
     )
 
 

@@ -26,7 +26,7 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
 
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
-_SIZES = (1.0, 0.3, 0.1, 0.03)  # of an effect, in units of what is expected
+_SIZES = tuple(4.0**-k for k in range(6))  # of an effect, in units of what is expected: down to a thousandth
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
 
 
@@ -102,6 +102,11 @@ class Posterior:
         return np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes])
 
     @cached_property
+    def log_prior(self) -> np.ndarray:
+        """(H,) log odds that a hypothesis is true before the data speak."""
+        return np.array([np.logaddexp.reduce(self.prior[own]) for own in self._shapes])
+
+    @cached_property
     def shape(self) -> np.ndarray:
         """(H,) the index of each hypothesis' variant that explains most, its freedom counted."""
         return np.array([own[np.argmax(self._by_shape[own])] for own in self._shapes], dtype=int)
@@ -124,6 +129,10 @@ class Posterior:
         """
         explained = np.where(self.log_odds > least - _HIDDEN, self.evidence.explained[self.shape], 0.0)
         return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
+
+    def likeliest(self) -> int | None:
+        """Return the place of the likeliest hypothesis; None where none is likelier than nothing."""
+        return int(np.argmax(self.log_odds)) if len(self.log_odds) and self.log_odds.max() > 0 else None
 
     def explained(self, place: int) -> float:
         """Return the squares that a hypothesis explains in its best shape."""
@@ -171,7 +180,8 @@ class Posterior:
     def _sizes(self, places: np.ndarray, variance: np.ndarray) -> np.ndarray:
         """Return the log of how much room variants' coefficients have, (P,), in units of what the data leave open.
 
-        They are as large as expected, or as `_SIZES` of that, each as likely. Those of one count are solved at once.
+        They are as large as one of `_SIZES`, each as likely: the catalogue expects alike of a base and of a wrist.
+        Variants of one count are solved at once.
         """
         seen, found = self.evidence, np.zeros(len(places))
         counts = np.array([len(seen.values[place]) for place in places], dtype=int)

@@ -9,24 +9,24 @@ from math import factorial
 
 import numpy as np
 
-from irtwin.gap.isolation.structure_search import Attribution
+from irtwin.gap.isolation.apart import Apart
 from irtwin.gap.regression.moments import summed
-from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.identification.progress import Tell, paced
 
 _EXACT = 8  # causes: 256 subsets
 _ORDERS = 40  # drawn, and each reversed, where there are more
 
 
-def closed_squares(system: System, found: Attribution, seed: int, tell: Tell | None = None) -> np.ndarray:
-    """Return what each cause closes of the squares of each observed group left out and equation, (C, G, g).
+def closed_squares(apart: Apart, seed: int, tell: Tell | None = None) -> np.ndarray:
+    """Return what each cause closes of the squares of each observed group left out and equation, (C, G, g), as counted.
 
     Its Shapley value: everything is refitted with every set of causes, up to eight causes exactly, beyond from random
     orders, each beside its reverse. They add up to what all causes close.
     """
-    players = [cause.columns for cause in found.causes]
+    system, players = apart.system, apart.players
     judged = np.flatnonzero(system.group_observed)
-    weighed = {True: system.moments(found.noise), False: system.moments(noise_before(system))}
+    weighed = {True: system.moments(apart.noise), False: system.moments(noise_before(system))}
     told = paced(tell)
     totals = {some: summed(moments) for some, moments in weighed.items()}
 
@@ -44,7 +44,7 @@ def closed_squares(system: System, found: Attribution, seed: int, tell: Tell | N
     values = np.zeros((count, len(judged), len(system.pattern)))
     for player, before, weight in _exact(count) if count <= _EXACT else _drawn(count, seed):
         values[player] += weight * (left(before) - left(before | {player}))
-    return values
+    return apart.counted(values)
 
 
 def shares(closed: np.ndarray, rows: np.ndarray, level: np.ndarray) -> tuple[float, ...]:

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.normal_equations import System, noise_before
 
-_FEWEST = 4  # groups: two in each half
 _DRAWN = 32  # partitions into halves; of five groups there are ten
 
 
@@ -16,19 +16,21 @@ def spread(system: System, floor: np.ndarray) -> float | None:
     """Return the largest excess, in floors squared, of a half of the reference groups over the other half.
 
     Each half in turn plays the observed runs: what a fit to both leaves in it is held against what a fit to the other
-    half leaves there, or the floor (g,) RMS if that is more. The largest of all equations and halves; None where the
-    groups are fewer than four.
+    half leaves there, or the floor (g,) RMS if that is more, in rows in which no dry friction turns. The largest of all
+    equations and halves; None where the groups are fewer than four.
     """
-    groups = np.flatnonzero(~system.group_observed)
-    if len(groups) < _FEWEST:
+    groups = [int(group) for group in np.flatnonzero(~system.group_observed)]
+    if len(groups) < FEWEST_GROUPS:
         return None
     noise = noise_before(system)
 
-    def excess(played: Sequence[int], others: Sequence[int]) -> float:
-        level = np.maximum(floor, system.rms((), noise, others, others))
-        return float(np.max((system.rms((), noise, groups, played) / level) ** 2 - 1))
+    def left(fitted: Sequence[int], of: Sequence[int]) -> np.ndarray:
+        return system.rms((), noise, fitted, of)[system.halves[0]]
 
-    return max(excess(*halves) for halves in _halves([int(group) for group in groups]))
+    def excess(played: Sequence[int], others: Sequence[int]) -> float:
+        return float(np.max((left(groups, played) / np.maximum(floor, left(others, others))) ** 2 - 1))
+
+    return max(excess(*halves) for halves in _halves(groups))
 
 
 def _halves(groups: list[int]) -> Iterator[tuple[list[int], list[int]]]:

@@ -151,15 +151,18 @@ class _Search:
     ) -> Found | None:
         """Return what explains most beside a structure, or is likelier in its place; None below the `least` log odds.
 
-        All are judged by what the first leaves: noise that holds its own effect would hide it.
+        All are judged by what the first leaves: noise that holds its own effect would hide it. Where it is not likely,
+        one that explains less may be. What the data speak against is not tried.
         """
-        first = posterior.first(least)
-        if first is None:
-            return None
-        new = posterior.hypotheses[first], posterior.variant(first)
-        judged = self.beside(found, self.left([*found, new], noise))
-        place = judged.likeliest_at(new[0])
-        return (judged.hypotheses[place], judged.variant(place)) if judged.log_odds[place] > least else None
+        for first in dict.fromkeys((posterior.first(least), posterior.likeliest())):
+            if first is None:
+                continue
+            new = posterior.hypotheses[first], posterior.variant(first)
+            judged = self.beside(found, self.left([*found, new], noise))
+            place = judged.likeliest_at(new[0])
+            if judged.log_odds[place] > max(least, judged.log_prior[place]):
+                return judged.hypotheses[place], judged.variant(place)
+        return None
 
     def pruned(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Drop what is less likely than nothing beside the others, the least likely first."""

@@ -14,7 +14,6 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.spread import spread
-from irtwin.gap.regression.normal_equations import System, noise_before, reference_rms
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.thresholds import Thresholds
 
@@ -57,7 +56,7 @@ def left_open(
 def most_left(findings: Sequence[Finding]) -> tuple[str, int]:
     """Return the channel and the place in it with the largest excess that causes leave, over floor and references."""
     left = {
-        (finding.name, place): float(((finding.fitted[1] / _level(finding.system, finding.floor)) ** 2)[place])
+        (finding.name, place): float(((finding.apart.left[1] / finding.apart.level(finding.floor)) ** 2)[place])
         for finding in findings
         if finding.floor is not None
         for place in range(len(finding.places))
@@ -96,7 +95,7 @@ def _classes(finding: document.Finding) -> list[list[float]]:
 
 def _spread(findings: Sequence[Finding], unknown: float) -> float:
     """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
-    known = [spread(one.system, one.floor) for one in findings if one.floor is not None]
+    known = [spread(one.apart.plain, one.floor) for one in findings if one.floor is not None]
     return max((unknown if one is None else one for one in known), default=unknown)
 
 
@@ -110,15 +109,10 @@ def _largest(
     """
     if finding.floor is None:
         return 0.0, 0.0, 0.0
-    level = _level(finding.system, finding.floor)
-    before, after = ((rms / level) ** 2 - 1 for rms in finding.fitted)
+    level = finding.apart.level(finding.floor)
+    before, after = ((rms / level) ** 2 - 1 for rms in finding.apart.left)
     before = before + _excess(explained, finding, level)
     return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
-
-
-def _level(system: System, floor: np.ndarray) -> np.ndarray:
-    """Return (g,) RMS: the floor, or what the reference runs show, if that is more."""
-    return np.maximum(floor, reference_rms(system, noise_before(system))) if system.both else floor
 
 
 def _excess(some: Sequence[Disturbance], finding: Finding, level: np.ndarray) -> np.ndarray:

@@ -79,7 +79,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque, tell: Tel
         acting = [_of(trace, sum(parts)) for trace, *parts in zip(before, *added, strict=True)]
         plain = traces(case.seen, lambda run: explained.values)
         after = [replace(t, residual=t.residual - sum(parts)) for t, *parts in zip(plain, *added, strict=True)]
-    slow = case.thresholds.data.slow
+    slow = case.thresholds.data.little
     seen, acts, known = (robot_maps if power else joint_maps)((before, acting, others), case.grouping, slow)
     assert seen is not None
     return ChannelResidual(

@@ -16,7 +16,7 @@ from irtwin.gap.localisation.regimes import (
     joint_regimes,
     robot_regimes,
 )
-from irtwin.gap.regression.groups import Grouping
+from irtwin.gap.regression.groups import FEWEST_GROUPS, Grouping
 from irtwin.gap.regression.residuals import Trace
 from irtwin.signals.motion import Motion
 
@@ -103,7 +103,7 @@ def _sums(
     """Return squares and counts (U, g, R) by the programmed motion; few of them are cut in time."""
     labels = [grouping.label[trace.motion.run] for trace in traces]
     order = list(dict.fromkeys(labels))
-    pieces = 1 if len(order) >= grouping.fewest else -(-_STRETCHES // len(order))
+    pieces = 1 if len(order) >= FEWEST_GROUPS else -(-_STRETCHES // len(order))
     squares, counts = np.zeros((2, len(order) * pieces, len(masks), masks[0][0].shape[1]))
     for k, (trace, label) in enumerate(zip(traces, labels, strict=True)):
         known = np.isfinite(trace.residual)

@@ -9,6 +9,7 @@ import numpy as np
 
 from irtwin.identification.accumulate import Block
 
+FEWEST_GROUPS = 4  # groups, two in each half
 _GROUPS = 8  # of time, where the runs are fewer
 
 
@@ -16,16 +17,15 @@ _GROUPS = 8  # of time, where the runs are fewer
 class Grouping:
     """Which runs are left out together: `label` of each run's programmed motion; `observed` runs' names.
 
-    Fewer programmed motions than `fewest` are cut in time.
+    Programmed motions are cut in time where they are fewer than `FEWEST_GROUPS`.
     """
 
     label: dict[str, str]
     observed: frozenset[str]
-    fewest: int
 
     def few(self, runs: Iterable[str]) -> bool:
         """Return whether the programmed motions of these runs are too few to leave each out in turn."""
-        return len({self.label[run] for run in runs if run in self.observed}) < self.fewest
+        return len({self.label[run] for run in runs if run in self.observed}) < FEWEST_GROUPS
 
     def of(self, blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray]:
         """Return (B,) each block's group and whether it is observed; few runs are cut into stretches of time."""

@@ -88,6 +88,26 @@ class System:
             apart=True,
         )
 
+    def with_columns(self, chosen: Sequence[int]) -> tuple[System, list[int]]:
+        """Return the system with the twin's terms and the chosen columns alone, and the indices of these in it."""
+        own = [k - len(self.columns) if k >= self.changed else k for k in chosen]
+        kept = sorted(set(own))
+        inside = np.isin(np.arange(self.pattern.shape[1]), [*range(self.base), *kept])
+        held = [np.append(inside[row], True) for row in self.pattern]
+        blocks = (
+            replace(block, factors=tuple(f[:, some] for f, some in zip(block.factors, held, strict=True)))
+            for block in self.blocks
+        )
+        found = replace(
+            self,
+            columns=tuple(self.column(k) for k in kept),
+            pattern=self.pattern[:, inside],
+            blocks=tuple(blocks),
+            shaken=None,
+        )
+        places = [self.base + kept.index(k) for k in own]
+        return found, [p + len(kept) * (k >= self.changed) for p, k in zip(places, chosen, strict=True)]
+
     @property
     def halves(self) -> tuple[slice, ...]:
         """The equations of rows alike: all, or those of fast rows and those of slow ones."""
