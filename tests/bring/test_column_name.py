@@ -20,6 +20,7 @@ from irtwin.bring.column_name import said_by
         ("vel_deg_per_s_1", "dq", "deg/s", (1,)),
         ("Drehzahl A3 [U/min]", "dq", "rpm", (3,)),
         ("J1 [deg/s]", "dq", "deg/s", (1,)),
+        ("abs_encoder_angle_2", "q", None, (2,)),
         ("current_position_1", "q", None, (1,)),
         ("current_torque_1 [Nm]", "torque", "N m", (1,)),
         ("motorCurrent5_mA", "current", "mA", (5,)),
@@ -46,6 +47,7 @@ def test_a_name_says_channel_unit_and_number(name: str, field: str, unit: str | 
         ("Sollposition_A1 soll", "what was wanted"),
         ("tool_force_x", "of no joint"),
         ("digital_in_7", "no channel"),
+        ("tau_abs_elbow", "a magnitude, without its sign"),
     ],
 )
 def test_what_was_not_measured_is_not_used(name: str, why: str) -> None:

@@ -73,6 +73,7 @@ _ELSEWHERE = frozenset(
         "nsecs",
     ]
 )
+_MAGNITUDE = frozenset(["abs", "absolute", "magnitude"])
 _MOTOR = frozenset(["motor", "mot", "motors", "drive", "rotor", "antrieb", "encoder", "enc"])
 _LONGEST = 12  # parts of a name that may write a unit, and what joins them: rad per s 2 has seven
 _TOKEN = re.compile(r"[^\W\d_]+|\d+")
@@ -126,6 +127,8 @@ def _unused(words: tuple[str, ...], field: str | None) -> str:
         return f'"{wanted}": what was wanted, not what was measured'
     if other := next((word for word in words if word in _ELSEWHERE), None):
         return f'"{other}": of no joint and no meter'
+    if field in ("torque", "current") and (size := next((word for word in words if word in _MAGNITUDE), None)):
+        return f'"{size}": a magnitude, without its sign'
     return "" if field else "its name says no channel"
 
 
