@@ -16,7 +16,7 @@ from tests.bring.dialects import NAME, good, per_joint, robot, signals, write_te
 from tests.data_sets import irtwin
 from tests.live.controller import Controller
 
-from irtwin.bring.bring import Options, bring, init
+from irtwin.bring.bring import Options, bring, found_in, init
 from irtwin.bring.doubt import Answer, DoubtError
 from irtwin.bring.robot_library import robot_of, robots, with_fixed
 from irtwin.check.check import check
@@ -457,6 +457,15 @@ def test_a_joint_that_mimics_another_is_held_already(tmp_path: Path) -> None:
     mimic = '<mimic joint="joint_a6"/></joint></robot>'
     described = parse_urdf(robot().urdf.replace("</robot>", finger + mimic))
     assert with_fixed(described, ("finger*",)).joint_names == robot().joint_names
+
+
+def test_commands_without_torque_are_for_a_simulators_model(tmp_path: Path) -> None:
+    commands = {f"cmd_joint_a{k}": good()[f"q_joint_a{k}"] + 0.01 for k in range(1, 7)}
+    columns = {name: values for name, values in good().items() if name[:2] in ("ti", "q_")} | commands
+    bring([write_text(tmp_path / "run.csv", columns)], tmp_path / "set", NAME, Options())
+    assert found_in(tmp_path / "set")[1] == f"irtwin diagnose {tmp_path / 'set'} --simulator MODEL.xml"
+    bring([plain(tmp_path)], tmp_path / "other", NAME, Options())
+    assert found_in(tmp_path / "other")[1] == f"irtwin run {tmp_path / 'other'}"
 
 
 def test_a_log_without_names_is_given_some(tmp_path: Path) -> None:

@@ -210,18 +210,23 @@ def _name(path: Path, taken: Mapping[Path, tuple[RunText, TakenRun]]) -> str:
     return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(files) + 3))) if one not in files)
 
 
-def found_in(folder: Path) -> tuple[tuple[str, ...], bool]:
-    """Return what reading and checking say of a data set that was written, and whether it can be used as it is."""
+def found_in(folder: Path) -> tuple[tuple[str, ...], str | None]:
+    """Return what reading and checking say of a data set that was written, and the command that uses it as it is.
+
+    None where something must be cured first.
+    """
     try:
-        data_set = read_data_set(folder)
+        data_set = read_data_set(folder, commanded=True)
     except InputError as error:
-        return (f"to do: {error}",), False
+        return (f"to do: {error}",), None
     lines = [f"note: {line}" for line in data_set.repairs]
     checked = check(data_set)
     for finding in checked.findings:
         state = "cure first" if finding.stops else "mended when it is read" if finding.mended else "to be looked at"
         lines.append(f"{finding.fault} ({state}): {finding.say}")
-    return tuple(dict.fromkeys(lines)), checked.sound
+    measured = any(run.signals.torque is not None or run.signals.power is not None for run in data_set.runs)
+    command = f"irtwin run {folder}" if measured else f"irtwin diagnose {folder} --simulator MODEL.xml"
+    return tuple(dict.fromkeys(lines)), command if checked.sound else None
 
 
 def _check_place(out: Path) -> None:

@@ -78,14 +78,14 @@ def import_(
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)
-    found, sound = found_in(out)
+    found, command = found_in(out)
     for line in (*brought.said, *found):
         say(f"irtwin: {line}")
-    if not sound:
+    if command is None:
         say(f"Written: {out}, but it cannot be used yet. Cure what is said above, or import again into a new folder.")
         say(f"Then: irtwin check {out}")
         sys.exit(2)
-    say(f"Written: {out}. Read its dataset.toml; then: irtwin run {out}")
+    say(f"Written: {out}. Read its dataset.toml; then: {command}")
 
 
 @click.command()
