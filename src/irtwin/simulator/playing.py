@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from irtwin.document import document as said
 from irtwin.document.cause_ids import cause_ids
 from irtwin.document.played import Added, Horizon, Number, Played, PlayedRun, Tracking
+from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
 from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Robot
@@ -32,15 +34,20 @@ _AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number diffe
 _POSES = 500  # of a run, of which the flange's place is told
 _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
 
-_EFFECTS = {  # of each number: effect, family, unit of a joint that turns, of one that slides
-    "stiffness": ("servo_stiffness", "drive", "N m/rad", "N/m"),
-    "damping": ("viscous_friction", "friction", "N m s/rad", "N s/m"),
-    "friction": ("coulomb_friction", "friction", "N m", "N"),
-    "holding": ("friction_creep", "friction", "1", "1"),
-    "armature": ("rotor_inertia", "bodies", "kg m^2", "kg"),
-    "offset": ("command_offset", "sensing", "rad", "m"),
-    "delay": ("command_delay", "sensing", "s", "s"),
-}
+
+@cache
+def _effects() -> dict[str, tuple[str, str, str, str]]:
+    """Return effect, family, unit of a joint that turns, and of one that slides, of each number."""
+    known = {number: effect.id for effect in catalogue().values() for number in effect.in_mjcf.values()}
+    return {
+        "stiffness": ("servo_stiffness", "drive", "N m/rad", "N/m"),
+        "damping": (known["damping"], "friction", "N m s/rad", "N s/m"),
+        "friction": (known["frictionloss"], "friction", "N m", "N"),
+        "holding": ("friction_creep", "friction", "1", "1"),
+        "armature": (known["armature"], "bodies", "kg m^2", "kg"),
+        "offset": ("command_offset", "sensing", "rad", "m"),
+        "delay": ("command_delay", "sensing", "s", "s"),
+    }
 
 
 @dataclass(frozen=True)
@@ -170,7 +177,7 @@ def _because(played: Played) -> str | None:
 def _numbers(robot: Robot, own: Servos, chosen: Choice) -> tuple[Number, ...]:
     found = []
     for row, name in enumerate(NAMES):
-        effect, _, turning, sliding = _EFFECTS[name]
+        effect, _, turning, sliding = _effects()[name]
         for place in np.flatnonzero(chosen.differs[row]):
             lower, upper = chosen.interval[:, row, place]
             simulator, number = own.numbers[row, place], chosen.numbers[row, place]
@@ -237,7 +244,7 @@ def _added(chosen: Choice, ranked: Sequence[str]) -> tuple[Added, ...]:
         at.append(np.where(np.array(NAMES)[:, None] == name, chosen.played.at, at[-1]))
     left = [float(np.sqrt(chosen.fit.rolled(one).squares.mean())) for one in at]
     return tuple(
-        Added(effect=_EFFECTS[name][0], before=before, after=after)
+        Added(effect=_effects()[name][0], before=before, after=after)
         for name, before, after in zip(ranked, left, left[1:], strict=False)
     )
 
@@ -253,7 +260,7 @@ def _parameter(one: Number) -> said.Parameter:
 
 
 def _finding(cause: said.Cause, played: Played) -> said.Finding:
-    family = next(family for effect, family, *_ in _EFFECTS.values() if effect == cause.effect)
+    family = next(family for effect, family, *_ in _effects().values() if effect == cause.effect)
     share = _shares(played)[cause.effect]
     return said.Finding(
         id=cause.id,

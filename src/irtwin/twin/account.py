@@ -86,7 +86,7 @@ def ledger_covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry])
 def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[list[int]]:
     """Return the places of shares by entry: what is not told goes with what makes their sum surest."""
     groups = [[k] for k in range(len(energies))]
-    while True:
+    while len(groups) > 1:
         join = np.array([[k in group for k in range(len(energies))] for group in groups], dtype=float)
         own, sums = join @ covariance @ join.T, np.abs(join @ energies)
         variance = np.diag(own)
@@ -97,9 +97,10 @@ def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[
         gain = np.where(open_ones[:, None], variance[:, None] - together, -np.inf)
         one, other = np.unravel_index(int(np.argmax(gain)), gain.shape)
         if gain[one, other] <= 0:
-            return groups
+            break
         groups[one] = sorted(groups[one] + groups[other])
         del groups[other]
+    return groups
 
 
 def _deviation(covariance: np.ndarray, places: Sequence[int]) -> float:
