@@ -239,4 +239,14 @@ def test_what_data_do_not_part_is_one_entry_with_a_range_of_each_part(graph: Kno
         ("Coulomb friction", 15.0, 45.0),
     ]
     assert {(row["entry_j"], row["entry_lower_j"], row["entry_upper_j"]) for row in friction} == {(80.0, 77.0, 83.0)}
-    assert sum(entry[0]["entry_j"] for entry in entries) == sum(row["energy_j"] for row in answers["ledger"].rows)
+    sizes = [entry[0]["entry_j"] for entry in entries]
+    assert sum(sizes) == sum(row["energy_j"] for row in answers["ledger"].rows)
+    assert sizes == sorted(sizes, key=abs, reverse=True)
+
+
+def test_what_is_next_to_nothing_is_counted_alone(graph: KnowledgeGraph) -> None:
+    answers = ask(graph, page.questions("run"), {"run": f"{ID}run/Arm_A.fit_1"})
+    rows = answers["ledger"].rows
+    tiny = {**rows[0], "entry": "tiny", "entry_j": 1e-9}
+    found = robot.of_run({**answers, "ledger": replace(answers["ledger"], rows=(*rows, tiny))})
+    assert [entry for entry in found["entries"] if entry not in found["told"]] == [[tiny]]

@@ -12,6 +12,7 @@ from irtwin.report.plant.overview import PLANT_TREND, states
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Question, Row
 
+_LITTLE = 1e-4  # of all energies of a run's ledger, by size: less is not shown by itself
 MOST_RUNS = 5000  # that runs.rq answers
 _OF_THE_PLANT = ("energy", "days", "standstill", "live", "made")  # its questions, asked of one robot
 _RUNS = {  # columns of a table by what the question calls them
@@ -61,9 +62,12 @@ def of_run(answers: Answers) -> dict[str, Any]:
     entries: dict[str, list[Row]] = {}  # what the data do not part is one
     for row in answers["ledger"].rows:
         entries.setdefault(row["entry"], []).append(row)
+    ranked = sorted(entries.values(), key=lambda entry: -abs(entry[0]["entry_j"]))
+    least = _LITTLE * sum(abs(entry[0]["entry_j"]) for entry in ranked)
     return {
         "of": kind(run["energy_from"]) if run["energy_j"] is not None else None,
-        "entries": list(entries.values()),
+        "entries": ranked,
+        "told": [entry for entry in ranked if abs(entry[0]["entry_j"]) >= least],
     }
 
 
