@@ -56,7 +56,9 @@ def content(workspace: Path) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("robot", ["Good", pytest.param("Bad", marks=pytest.mark.nightly)])
-@pytest.mark.parametrize("kind", POISONS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.nightly if kind == "standby alone" else ()) for kind in POISONS]
+)
 def test_what_cannot_be_worked_out_changes_nothing(folder: Path, robot: str, kind: str) -> None:
     poison = data_set(folder / "poison", robot, seed=5, **POISONS[kind])
     before = content(folder / "workspace")
