@@ -60,7 +60,7 @@ def work(
     def tell(one: Batch) -> None:
         announce(f"{one.folder.name}, {next(ended)} of {len(batches)}: {_line(status_of([one]).counts)}")
 
-    with told_meanwhile(lambda: announce(f"{_line(status_of(batches).counts)} of {kind}")):
+    with told_meanwhile(lambda: announce(f"  {_line(status_of(batches).counts)}")):
         if scheduler is None:
             work_here(batches, workers, tell)
         else:
