@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from irtwin.bring.recording import BAGS, SHEETS
 from irtwin.errors import InputError
-from irtwin.input_file import read_input
+from irtwin.input_file import check_file
 from irtwin.storage.database import Workspace
 from irtwin.toml_text import read_toml
 
-_LOGS = (".csv", ".tsv", ".txt", ".parquet", ".xlsx", ".bag", ".mcap", ".db3")
+_LOGS = (".csv", ".tsv", ".txt", ".parquet", *SHEETS, *BAGS)
 _GRAPHS = (".ttl", ".owl", ".rdf", ".nt", ".nq", ".trig", ".jsonld")
 _HEAD = 4096  # bytes that tell a URDF from a model of MuJoCo
-_MOST = 1 << 30  # bytes of a file of which the head is read
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,10 @@ def _data_set(document: dict[str, Any]) -> str:
 
 
 def _model(path: Path, shown: str) -> FileKind:
-    if b"<mujoco" in read_input(path, _MOST)[:_HEAD]:
+    check_file(path)
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    if b"<mujoco" in head:
         return FileKind(
             "a model of MuJoCo",
             (
