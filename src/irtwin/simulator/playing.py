@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.special import expit
 
 from irtwin.document import document as said
 from irtwin.document.cause_ids import cause_ids
 from irtwin.document.played import Added, Horizon, Number, Played, PlayedRun, Tracking
 from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
+from irtwin.gap.thresholds import Criterion
 from irtwin.identification.progress import Tell, paced
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
@@ -221,7 +223,7 @@ def _causes(robot: Robot, numbers: Sequence[Number], ranked: Sequence[str], play
             effect=some[0].effect,
             joints=on,
             scope="changed",
-            confidence=float(min(1.0, max(1 / (1 + np.exp(-min(one.log_odds, 500.0))) for one in some))),
+            confidence=float((1 - Criterion().unknown) * max(expit(one.log_odds) for one in some)),
             parameters=tuple(_parameter(one) for one in some),
             indistinguishable_from=(),
             evidence=said.Evidence(
