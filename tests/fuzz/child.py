@@ -7,6 +7,7 @@ import resource
 import select
 import signal
 import sys
+import tempfile
 import traceback
 import warnings
 from collections.abc import Callable
@@ -33,33 +34,38 @@ def in_child(work: Callable[[], None], folder: Path, stdin: Path | None = None, 
 
     The folder is its home too: what is trusted is written there. What it has started ends with it.
     """
-    out, err = folder / "stdout", folder / "stderr"
-    child = os.fork()
-    if child == 0:
-        os.setpgid(0, 0)
-        _child(work, folder, stdin or Path(os.devnull), out, err)
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:  # where no spoilt link leads
+        child = os.fork()
+        if child == 0:
+            os.setpgid(0, 0)
+            _child(work, folder, stdin or Path(os.devnull), out.fileno(), err.fileno())
+        status = _ended(child, patience)
+        said = (os.pread(file.fileno(), 1 << 30, 0).decode(errors="replace") for file in (out, err))
+        return Done(os.waitstatus_to_exitcode(status), *said)
+
+
+def _ended(child: int, patience: float | None) -> int:
+    """Return the status with which a child ended, or was made to end."""
     end = os.pidfd_open(child)
     try:
         if patience is not None and not select.select([end], [], [], patience)[0]:
             os.kill(child, signal.SIGINT)
         if not select.select([end], [], [], _PATIENCE)[0]:
             os.kill(child, signal.SIGKILL)
-        _, status = os.waitpid(child, 0)
+        return os.waitpid(child, 0)[1]
     finally:
         os.close(end)
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(child, signal.SIGKILL)
-    said = (file.read_bytes().decode(errors="replace") for file in (out, err))
-    return Done(os.waitstatus_to_exitcode(status), *said)
 
 
-def _child(work: Callable[[], None], home: Path, stdin: Path, out: Path, err: Path) -> None:
+def _child(work: Callable[[], None], home: Path, stdin: Path, out: int, err: int) -> None:
     status = 1
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # which a session in the background has not
         os.environ |= {"HOME": str(home), "XDG_CONFIG_HOME": str(home / "config")}
-        for number, file, flags in ((0, stdin, os.O_RDONLY), (1, out, os.O_WRONLY), (2, err, os.O_WRONLY)):
-            os.dup2(os.open(file, flags | (os.O_CREAT | os.O_TRUNC if flags else 0), 0o600), number)
+        for number, file in ((0, os.open(stdin, os.O_RDONLY)), (1, out), (2, err)):
+            os.dup2(file, number)
         sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w")  # noqa: SIM115
         warnings.resetwarnings()
         for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from irtwin.errors import InputError
 from irtwin.packing import pack
 from irtwin.report.energy.sampling import Samples, extremes
 from irtwin.report.questions import Answers, Row
@@ -39,6 +40,8 @@ class Columns:
         return cls({name: column.to_numpy().astype(float) for name, column in named})
 
     def __getitem__(self, name: str) -> Samples:
+        if name not in self.samples:
+            raise InputError(f"the series of a run has no column {name!r}; run the robot's data set again")
         return self.samples[name]
 
     def get(self, name: str) -> Samples | None:

@@ -124,7 +124,8 @@ class Workspace:
     @classmethod
     def is_there(cls, folder: Path, url: str | None = None) -> bool:
         """Whether a folder has a workspace, or one may be in the database of a URL."""
-        return url is not None or (folder / _DATABASE).is_file()
+        file = folder / _DATABASE
+        return url is not None or file.is_file() or file.is_symlink()  # opening says where a link leads
 
     @classmethod
     def existing(cls, folder: Path, url: str | None = None) -> Self:
