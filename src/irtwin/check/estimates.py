@@ -1,7 +1,7 @@
 """How late a torque is, what its scale is, and where a position's zero is: estimated beside bodies and friction.
 
 Each is a number of one channel that the data give with its deviation. It is said where it is large and sure; where the
-motions do not show it, it is not sure, and nothing is said. The thresholds' origin: docs/decisions/logs-faults.md.
+motions do not show it, it is not sure, and nothing is said. The thresholds' origin: docs/decisions/log-format.md.
 """
 
 from __future__ import annotations

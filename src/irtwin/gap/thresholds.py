@@ -35,20 +35,20 @@ class Data:
         5.0,
         "a spectrum that falls faster up to half the sampling rate was smoothed: it tells no noise",
         "power of the frequency",
-        "decisions/gap-smoothed-logs.md",
+        "decisions/gap-regression.md",
     )
     moved: float = _threshold(
         0.2,
         "a number of a twin that is given may have moved so far since, one standard deviation",
         "share of the number and half of the catalogue's spread",
-        "decisions/gap-a-twin-goes-in.md",
+        "decisions/simulator.md",
     )
     foreign: Mapping[str, float] = field(
         default_factory=lambda: {"reference": 0.06, "simulated": 0.3},
         metadata={
             "meaning": "bodies fitted to the other runs leave more in joints of another robot, by the runs' role",
             "unit": "share of the joint's mean square",
-            "source": "decisions/gap-thresholds.md",
+            "source": "decisions/gap-criterion.md",
         },
     )
 
@@ -67,7 +67,7 @@ class Criterion:
         3.5,
         "what is left beyond is no noise, whatever the floor missed, and a gap without a cause",
         "floor squared",
-        "decisions/gap-unexplained-verdict.md",
+        "decisions/gap-verdict.md",
     )
     certainty: float = _threshold(
         12.0, "how well that share is known", "looks at other robots, effectively", "decisions/gap-criterion.md"
@@ -90,11 +90,9 @@ class ScaleOfTorque:
     """How far logged torque may be off on all joints alike; half a 95 % interval each."""
 
     assumed: float = _threshold(
-        0.1, "torque of drives, where the data set states nothing", "share", "decisions/gap-scale-of-torque.md"
+        0.1, "torque of drives, where the data set states nothing", "share", "decisions/gap-regression.md"
     )
-    sensor: float = _threshold(
-        0.02, "torque of sensors, and power of a meter", "share", "decisions/gap-scale-of-torque.md"
-    )
+    sensor: float = _threshold(0.02, "torque of sensors, and power of a meter", "share", "decisions/gap-regression.md")
 
 
 @dataclass(frozen=True)
@@ -102,19 +100,19 @@ class Matters:
     """What is worth a word to a person, and when a question is answered."""
 
     share: float = _threshold(
-        0.02, "least that a cause closes", "share of its channel's gap", "decisions/gap-causes-that-matter.md"
+        0.02, "least that a cause closes", "share of its channel's gap", "decisions/gap-verdict.md"
     )
     floors: float = _threshold(
         0.5,
         "least that is more than noise, RMS: what a cause closes, what differs between repeats, a gap, a run",
         "floors",
-        "decisions/gap-causes-that-matter.md",
+        "decisions/gap-verdict.md",
     )
     closed: float = _threshold(
-        0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-unexplained-verdict.md"
+        0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-verdict.md"
     )
     apart: float = _threshold(
-        5.0, "separation that answers a question of an experiment", "standard deviations", "decisions/gap-thresholds.md"
+        5.0, "separation that answers a question of an experiment", "standard deviations", "decisions/gap-criterion.md"
     )
 
 

@@ -2,7 +2,7 @@
 
 A keyword is told from the same word in a string, IRI, comment or name by one changed letter: `SERVICE` as a clause
 is a syntax error when it is spelt `SERAICE`, and anywhere else it is as good a word as before. So no lexer of ours
-has to agree with Oxigraph's; see `docs/decisions/endpoint-keywords.md`.
+has to agree with Oxigraph's; see `docs/decisions/security.md`.
 """
 
 from __future__ import annotations
