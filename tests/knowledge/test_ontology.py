@@ -99,7 +99,7 @@ def test_effects_are_linked_to_effects(ontology: rdflib.Graph) -> None:
 
 # Two masses and a spring stand for these, not the contract's shorter formula: see `irtwin.effects.compliance`.
 FITTED_OTHERWISE = {"backlash", "joint_elasticity"}
-# Beyond the contract: docs/decisions/gap-repeats.md.
+# Beyond the contract: what does not repeat is a gap too, and has effects of its own.
 OWN_EFFECTS = {"periodic_disturbance", "switching_load", "local_wear", "joint_limit_spring"}
 
 

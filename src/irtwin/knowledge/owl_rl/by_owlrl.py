@@ -15,7 +15,7 @@ from irtwin.knowledge.owl_rl.closure import Contradiction, says_something
 from irtwin.knowledge.owl_rl.terms import Node
 
 MOST_TRIPLES = 300_000
-SECONDS_PER_TRIPLE = 1e-3  # measured from 4,000 to 80,000 triples: docs/findings/reasoning.md
+SECONDS_PER_TRIPLE = 1e-3  # measured from 4,000 to 80,000 triples
 
 _ERRORS = rdflib.Namespace("http://www.daml.org/2002/03/agents/agent-ont#")
 _ILL_TYPED = "Lexical value of the literal"  # owlrl says so of every zero that is a double

@@ -1,7 +1,7 @@
 """Sums over whatever a graph says of many individuals, in columns: a property's subjects and objects side by side.
 
 Oxigraph looks every triple of a sum up by itself. Here a property is read once, in the order in which it is stored,
-and DuckDB joins and groups it; the groups stay as long as the graph does. See `docs/decisions/series.md`.
+and DuckDB joins and groups it; the groups stay as long as the graph does.
 """
 
 from __future__ import annotations

@@ -1,0 +1,57 @@
+"""What documents and comments lead to is there: files, sections, and the files of code that records name."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("bench", "docs", "examples", "mappings", "ontology", "reports", "rules", "src", "tests")
+READ = {".md", ".py", ".ttl", ".rq", ".jinja", ".toml"}
+DOCUMENTS = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+
+
+@cache
+def files() -> list[Path]:
+    """All files of the project that a text may name."""
+    below = (path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if "__pycache__" not in path.parts)
+    return [path for path in [*below, *ROOT.glob("*")] if path.is_file()]
+
+
+def sections(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize(
+    "page", [path for path in files() if path.suffix == ".md"], ids=lambda page: str(page.relative_to(ROOT))
+)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        path, _, section = target.partition("#")
+        if ":" in path:
+            continue  # another site
+        to = page.parent / path if path else page
+        assert to.exists(), target
+        assert not section or section in sections(to), target
+
+
+def test_documents_that_a_text_names_are_there():
+    named = re.compile(r"docs/[\w/-]+\.md")
+    missing = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in files()
+        if path.suffix in READ and path != Path(__file__)
+        for name in named.findall(path.read_text(encoding="utf-8", errors="replace"))
+        if not (ROOT / name).is_file()
+    }
+    assert not missing
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_of_code_that_a_document_names_are_there(page):
+    named = re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|rq|ttl|toml))`", page.read_text(encoding="utf-8"))
+    known = [path.as_posix() for path in files()]
+    assert not [name for name in named if not any(path.endswith(f"/{name}") for path in known)]
