@@ -55,3 +55,13 @@ def test_files_of_code_that_a_document_names_are_there(page):
     named = re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|rq|ttl|toml))`", page.read_text(encoding="utf-8"))
     known = [path.as_posix() for path in files()]
     assert not [name for name in named if not any(path.endswith(f"/{name}") for path in known)]
+
+
+def test_the_architecture_names_every_room():
+    page = (ROOT / "docs" / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    rooms = [
+        f"{path.name}/" if path.is_dir() else path.name
+        for path in (ROOT / "src" / "irtwin").iterdir()
+        if path.name[0] not in "_." and (path.is_dir() or path.suffix == ".py")
+    ]
+    assert not [room for room in rooms if not re.search(rf"[`/ ]{re.escape(room)}", page)]
