@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import irtwin
+
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("bench", "docs", "examples", "mappings", "ontology", "reports", "rules", "src", "tests")
 READ = {".md", ".py", ".ttl", ".rq", ".jinja", ".toml"}
@@ -65,3 +67,9 @@ def test_the_architecture_names_every_room():
         if path.name[0] not in "_." and (path.is_dir() or path.suffix == ".py")
     ]
     assert not [room for room in rooms if not re.search(rf"[`/ ]{re.escape(room)}", page)]
+
+
+def test_papers_of_a_release_say_its_version():
+    newest = re.search(r"^## ([\d.]+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert newest and cited and newest[1] == cited[1] == irtwin.__version__
