@@ -1,11 +1,10 @@
-"""The worked examples of CONTRIBUTING.md do what it says; those of channels and log formats are held in `tests/signals`."""
+"""The worked examples of CONTRIBUTING.md do what it says; `tests/signals` holds those of channels and log formats."""
 
 import re
 import shutil
 from pathlib import Path
 
 import pytest
-from tests.effects.test_known_truth import ROBOT, Case, measured, only
 
 from irtwin.effects import load
 from irtwin.effects.catalogue import BASELINE
@@ -14,6 +13,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.plant import page
 from irtwin.report.questions import ask
 from irtwin.twin.identify import identify
+from tests.effects.test_known_truth import ROBOT, Case, measured, only
 
 TEXT = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
