@@ -62,23 +62,21 @@ def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Faul
             if port is not None:
                 _tell(folder / "workspace", port)
             for place, command in enumerate(case.commands):
-                done = _try(case, command, folder, port, tried)
-                kind = done if isinstance(done, str) else None
+                kind, said, follows = _try(case, command, folder, port, tried)
                 if kind is None and (changed := outside.changed()) is not None:
                     kind = f"{Path(changed).name} outside was changed"
                 if kind is not None:
-                    said = (folder / "stderr").read_bytes().decode(errors="replace")
                     return Fault(f"{place + 1}: {command}", f"{command}: {kind}", said[-6000:])
-                if not done and "workspace" not in case.sound:
+                if not follows and "workspace" not in case.sound:
                     break
     return None
 
 
-def _try(case: Case, command: str, folder: Path, port: int | None, tried: Counter[str]) -> str | bool:
-    """Try a command; return the kind of its fault, else whether others may follow."""
+def _try(case: Case, command: str, folder: Path, port: int | None, tried: Counter[str]) -> tuple[str | None, str, bool]:
+    """Try a command; return the kind of its fault, what it printed as an error, and whether others may follow."""
     arguments, writes = _arguments(case, command, folder, port)
     if arguments is None:
-        return True
+        return None, "", True
     stdin = folder / "stdin"
     stdin.write_bytes(_stream(case, folder) if command == "live" else b"")
     for file in filter(Path.is_file, writes):
@@ -87,14 +85,12 @@ def _try(case: Case, command: str, folder: Path, port: int | None, tried: Counte
     done = in_child(partial(run_irtwin, arguments), folder, stdin, patience)
     tried[f"{command}: {'refused' if done.status else 'answered'}"] += 1
     if patience is not None and done.status == _STOPPED:
-        return True
+        return None, done.err, True
     checks, tells = command.startswith(_CHECKING), command.startswith(_TELLING)
     kind = fault_of(done, writes, checks=checks, tells=tells)
-    if kind is not None:
-        return kind
-    if any(SECRET in text for text in (done.out, done.err, *(_text(file) for file in writes))):
-        return "tells what a file outside says"
-    return not done.status or done.status == SET_ASIDE or "Written: " in done.err
+    if kind is None and any(SECRET in text for text in (done.out, done.err, *(_text(file) for file in writes))):
+        kind = "tells what a file outside says"
+    return kind, done.err, not done.status or done.status == SET_ASIDE or "Written: " in done.err
 
 
 def _text(file: Path) -> str:
