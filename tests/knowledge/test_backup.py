@@ -267,6 +267,7 @@ def test_contents_that_are_not_those_of_the_list(archive: Path) -> None:
     ("name", "data", "message"),
     [
         ("graph.nq", b"<a", "its graph is damaged"),
+        ("graph.nq", b'<a:a> <a:b> "' + b"x" * (17 << 20), "its graph is damaged: Reached the buffer maximal size"),
         ("rows/robot.jsonl", b"{}\n", "table robot was made by another irtwin version"),
         ("rows/robot.jsonl", b"[\n", "rows of table robot do not fit"),
         ("rows/joint.jsonl", None, "has no table joint"),

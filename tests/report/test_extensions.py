@@ -38,6 +38,7 @@ def put(place: Path, name: str, text: str) -> Path:
         ("energy/mine.rq", ADDED.replace("bind: robot", "bind: diagnosis"), "take of robot, twin"),
         ("energy/runs.rq", ADDED, "does not select .*, which the page takes"),
         ("energy/page.html.jinja", "{% block main %}\n{{ 1 + }}", "line 2: "),
+        ("energy/page.html.jinja", f"{{{{ {'(' * 3000} }}}}", "is nested too deep; write it flatter"),
         ("weather/mine.rq", ADDED, "there is no report weather; there are energy, gap, layout"),
     ],
 )

@@ -62,3 +62,5 @@ def _check_template(file: Resource, resources: Resources) -> None:
         environment(resources).parse(read_text(file.path, MOST_BYTES))
     except jinja2.TemplateSyntaxError as error:
         raise InputError(f"{file.path}, line {error.lineno}: {error.message}") from error
+    except RecursionError:
+        raise InputError(f"{file.path}: is nested too deep; write it flatter") from None

@@ -252,5 +252,5 @@ def _read_quads(archive: Path, file: Path) -> Iterator[Quad]:
         for quad in parse(path=str(file), format=RdfFormat.N_QUADS):
             if isinstance(quad.graph_name, NamedNode):
                 yield quad
-    except SyntaxError as error:
-        raise InputError(f"{archive}: its graph is damaged: {error.msg}; use another backup") from None
+    except (SyntaxError, MemoryError) as error:  # the parser holds 16 MB of a line
+        raise InputError(f"{archive}: its graph is damaged: {error}; use another backup") from None
