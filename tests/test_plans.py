@@ -344,14 +344,22 @@ def test_a_planned_motion_that_the_robot_cannot_make_stores_nothing(tmp_path: Pa
         assert session.scalars(select(schema.Run)).all() == []
 
 
-def test_a_slower_motion_says_what_it_saves(performed: Path) -> None:
-    said = irtwin("slow", "arm_2", "done", "--times", 1.5, "--workspace", performed)
+def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> None:
+    out = tmp_path / "slower.csv"
+    here = ("--workspace", performed, "--out", out, "--run", "slower")
+    said = irtwin("optimise", "arm_2", "done", "--cycle", 6, *here)
     assert said.status == 0, said.err
-    (row,) = asking.ask("slower_motions", performed)
-    assert (row["run"], row["plan"], row["times_longer"]) == ("done", "done_1.5_slower", 1.5)
+    *others, last = said.out.splitlines()
+    (row,) = asking.ask("retimed_motions", performed)
+    assert (row["run"], row["plan"]) == ("done", "slower")
     assert row["lower_J"] < row["saving_J"] < row["upper_J"]
-    assert f": takes {abs(row['saving_J']):.3g} +- " in said.out
-    assert f" J {'less' if row['saving_J'] >= 0 else 'more'} than done followed by waiting" in said.out
+    assert f'{out} and planned run "slower" of arm_2: 6.00 s: ' in last
+    printed = float(last.partition(" J, ")[2].partition(" ")[0])
+    assert printed == pytest.approx(abs(row["saving_J"]), rel=0.01)
+    assert f" J {'less' if row['saving_J'] >= 0 else 'more'} than done " in last
+    assert any(line.startswith("move from ") and line.endswith(" times as long") for line in others)
+    times = np.loadtxt(out, delimiter=",", skiprows=1)[:, 0]
+    assert times[-1] - times[0] == pytest.approx(6.0, abs=0.01)
     energies = {
         one["run"]: one
         for one in asking.ask(
@@ -361,26 +369,28 @@ def test_a_slower_motion_says_what_it_saves(performed: Path) -> None:
             performed,
         )
     }
-    quick, slower = energies["done"], energies["done_1.5_slower"]
-    assert slower["s"] == pytest.approx(1.5 * quick["s"], rel=1e-3)
+    quick, slower = energies["done"], energies["slower"]
+    assert row["times_longer"] == pytest.approx(slower["s"] / quick["s"], rel=1e-3)
     twin = plans.robot_twin("arm_2", performed)
     q = np.repeat([[1.0, -1.0]], 50, axis=0)  # where the motion ends
     held = Motion(np.linspace(0, 1, 50), q, 0 * q, 0 * q, run="held")
     waiting = float(np.mean(twin.power(held))) * (slower["s"] - quick["s"])
     assert row["saving_J"] == pytest.approx(quick["j"] + waiting - slower["j"], abs=0.02 * quick["j"])
     page = (performed / "reports" / "arm_2.html").read_text(encoding="utf-8")
-    assert ("Made 1.5 times longer, done would save" in page) is (row["lower_J"] > 0)
+    assert ("Timed as slower, in " in page) is (row["lower_J"] > 0)
 
 
 @pytest.mark.parametrize(
     ("run", "more", "message"),
     [
-        ("swing_1", (), 'run "swing_1" does not begin and end at rest; cut it there'),
+        ("swing_1", (), 'run "swing_1" has no move from rest to rest; name a run that has one'),
         ("dome", (), 'the robot has no measured run "dome"; the nearest is "done"'),
         ("done", ("--run", "reach"), 'the robot has a run "reach" already; choose another name'),
+        ("done", ("--cycle", "0.5"), 'run "done" cannot be done in 0.5 s; the fastest'),
+        ("done", ("--out", "x.txt"), "a plan is written as .csv or .parquet"),
     ],
 )
-def test_what_cannot_be_made_slower(performed: Path, run: str, more: tuple[str, ...], message: str) -> None:
-    said = irtwin("slow", "arm_2", run, "--times", 1.5, "--workspace", performed, *more)
+def test_what_cannot_be_timed_otherwise(performed: Path, run: str, more: tuple[str, ...], message: str) -> None:
+    said = irtwin("optimise", "arm_2", run, "--workspace", performed, *more)
     assert said.status == 2
     assert message in said.err

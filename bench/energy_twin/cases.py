@@ -6,7 +6,7 @@ a controller in MuJoCo, whose laws of iron, inverter, friction and brakes are ot
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -37,13 +37,17 @@ MORE = ("holding_brakes", "stribeck_friction", "load_dependent_friction")
 
 @dataclass(frozen=True)
 class Case:
-    """A data set and its truth: the `effects` beyond the baseline, `standby` W, energy of copper a run, J."""
+    """A data set and its truth: the `effects` beyond the baseline, `standby` W, energy of copper a run, J.
+
+    `plant`: what a motion takes when it is executed, (N,) W each `STEP`, before any sensor.
+    """
 
     name: str
     data_set: DataSet
     effects: tuple[str, ...]
     standby: float
     copper: dict[str, float]
+    plant: Callable[[Motion], np.ndarray]
 
 
 def cases(seeds: int, only: str = "") -> Iterator[Case]:
@@ -64,13 +68,18 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
         for kind in LAYOUT
     ]
     effects = _effects(machine, len(motions), more)
-    traces = _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng)
-    released = _released(traces) if more else np.ones(traces.torque.shape[:2])
-    driven = replace(traces, torque=traces.torque * released[:, :, None])  # closed brakes carry the links
-    copper = (machine.drive.resistance * (driven.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
-    drawn = (
-        _power(machine, driven, copper) + BRAKES * released * more if exact else meter(driven, machine, effects, STEP)
-    )
+
+    def executed(motions: list[Motion]) -> tuple[Traces, np.ndarray, np.ndarray]:
+        """Return what motions do, their power and that of copper, (T, R) W."""
+        traces = _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng)
+        released = _released(traces) if more else np.ones(traces.torque.shape[:2])
+        driven = replace(traces, torque=traces.torque * released[:, :, None])  # closed brakes carry the links
+        copper = (machine.drive.resistance * (driven.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
+        if not exact:
+            return traces, meter(driven, machine, effects, STEP), copper
+        return traces, _power(machine, driven, copper) + BRAKES * released * more, copper
+
+    traces, drawn, copper = executed(motions)
     sensed = shown(traces, machine, (), STEP)[::STRIDE]
     sensors, cut = drawings.sensors, slice(None, None, STRIDE)
     noise = np.random.default_rng([9, seed])
@@ -85,7 +94,7 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     listed = (*SUPPLY, *(MORE if more else ()))
     known = DataSet(Path(robot), _described(machine), tuple(runs), None, None, "dc_bus", True, {})
     heat = {run.name: float(np.trapezoid(copper[:, k], dx=STEP)) for k, run in enumerate(runs)}
-    return Case(name, known, listed, drawings.supply.standby, heat)
+    return Case(name, known, listed, drawings.supply.standby, heat, lambda motion: executed([motion])[1][:, 0])
 
 
 def _run(name: str, signals: Signals) -> Run:

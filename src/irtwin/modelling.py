@@ -181,7 +181,7 @@ def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, r
         check_plan_file(Path(out))
     found = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
     if out is not None:
-        write_plan(found, Path(out))
+        write_motion(found.motion, found.joint_names, Path(out))
     return found
 
 
@@ -192,15 +192,12 @@ def check_plan_file(out: Path) -> None:
         raise InputError(f"{out}: a plan is written as .csv or .parquet; name such a file")
 
 
-def write_plan(made: Plan, out: Path) -> None:
-    """Write a plan as a log, CSV or Parquet by its ending."""
-    write(out, _as_log(made.motion, made.joint_names, csv=out.suffix.lower() == ".csv"))
-
-
-def _as_log(motion: Motion, joints: Sequence[str], *, csv: bool) -> bytes:
+def write_motion(motion: Motion, joints: Sequence[str], out: Path) -> None:
+    """Write a planned motion as a log, CSV or Parquet by its ending."""
     signals = Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq)
-    if csv:
-        return csv_text(signals, joints).encode()
+    if out.suffix.lower() == ".csv":
+        write(out, csv_text(signals, joints).encode())
+        return
     buffer = io.BytesIO()
     pa.parquet.write_table(pa.table(columns_of(signals, joints)), buffer)
-    return buffer.getvalue()
+    write(out, buffer.getvalue())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -10,12 +10,13 @@ from typing import TypeVar
 from irtwin import modelling
 from irtwin.errors import InputError
 from irtwin.modelling import Expectation
+from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.plan import Plan, Task
-from irtwin.providers.energy import stored_price, stored_saving
+from irtwin.planning.programme import Programme, programme_of
+from irtwin.providers.energy import stored_price
 from irtwin.providers.records import (
     check_run_name,
     find_measured,
-    find_plan,
     find_robot,
     keep_run,
     load_run,
@@ -24,11 +25,10 @@ from irtwin.providers.records import (
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan
-from irtwin.signals.motion import standstill
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
-from irtwin.twin.price import Figure, Price
+from irtwin.twin.price import Price
 from irtwin.twin.twin import Twin
 from irtwin.workflow import Announce, conclude, map_rows, populate_apart, rewriting, write_report
 
@@ -85,7 +85,7 @@ def plan(
         modelling.check_plan_file(out)
     made, kept = _keep(robot, name, make, Path(workspace), database, graph_url, announce)
     if out is not None:
-        modelling.write_plan(made, out)
+        modelling.write_motion(made.motion, made.joint_names, out)
     return made, kept
 
 
@@ -121,46 +121,58 @@ def predict(
     return expected, kept
 
 
-def slow(
+@dataclass(frozen=True)
+class Timings:
+    """The timing of a programme that takes least in the cycle that was asked for, and those of other cycle times."""
+
+    joint_names: tuple[str, ...]
+    programme: Programme
+    best: Cycle
+    curve: Sequence[Cycle]
+
+
+def optimise(
     robot: str,
     run: str,
-    times: float,
     workspace: Path | str,
     *,
     name: str,
+    cycle: float | None = None,
+    least_pause: float | None = None,
+    out: Path | None = None,
     database: str | None = None,
     graph_url: str | None = None,
     announce: Announce = lambda line: None,
-) -> tuple[Figure, Kept]:
-    """Make a measured run of a robot so many `times` slower, and keep it as a planned run called `name`.
+) -> tuple[Timings, Kept]:
+    """Time the moves of a robot's measured run so that it takes least energy, and keep that as a planned run `name`.
 
-    Returns what it saves, J, against the run as it was with standing still after it. Raises InputError, and keeps
-    nothing, where there is no such run or name, the run does not begin and end at rest, or the twin knows no power.
+    `cycle`: how long it may take, s, as long as the run if None; `least_pause`: see `CycleTimes`; `out`: a file of the
+    motion, as of `plan`. Raises InputError, and keeps nothing, where there is no such run or name, the run has no whole
+    move, the robot cannot be so fast, or its twin knows no power.
     """
     place_of = Path(workspace)
+    if out is not None:
+        modelling.check_plan_file(out)
     with Workspace.existing(place_of, database) as place:
         robot_id = find_robot(place, robot)
         run_id = find_measured(place, robot_id, run).run_id
 
-    def make(twin: Twin) -> tuple[None, Run]:
+    def make(twin: Twin) -> tuple[Timings, Run]:
         if not twin.knows_power:
-            raise InputError(
-                f"{place_of}: the robot's twin has seen no power, so it cannot say what slower motions save"
-            )
+            raise InputError(f"{place_of}: the robot's twin has seen no power, so it cannot say what a timing saves")
         with Workspace.existing(place_of, database) as place:
             known = load_run(place, twin.robot, run_id)
-        motion = condition(known, twin.robot, twin.cutoff)
-        still = standstill(motion)
-        if not (still[0] and still[-1]):
-            raise InputError(f'{place_of}: run "{known.name}" does not begin and end at rest; cut it there')
-        time = (motion.time - motion.time[0]) * times
-        signals = Signals(time, motion.q, dq=motion.dq / times, ddq=motion.ddq / times**2)
-        made = _run(name, signals, known.payload_mass, known.payload_com)
-        return None, replace(made, time_scaling_of=known.name, time_scale=times)
+        programme = programme_of(condition(known, twin.robot, twin.cutoff), str(place_of))
+        times, was = CycleTimes(twin, programme, least_pause), float(programme.seconds.sum())
+        best = times.in_time(cycle or was)
+        made = _run(name, best.motion, known.payload_mass, known.payload_com)
+        made = replace(made, time_scaling_of=known.name, time_scale=best.seconds / was)
+        return Timings(twin.robot.joint_names, programme, best, times.curve()), made
 
-    _, kept = _keep(robot, name, make, place_of, database, graph_url, announce)
-    with Workspace.existing(place_of, database) as place:
-        return stored_saving(place, find_plan(place, kept.robot, kept.run).run_id), kept
+    found, kept = _keep(robot, name, make, place_of, database, graph_url, announce)
+    if out is not None:
+        modelling.write_motion(found.best.motion, found.joint_names, out)
+    return found, kept
 
 
 def _keep(

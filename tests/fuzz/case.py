@@ -67,7 +67,7 @@ _ASKING += (
     "live replay",
     "fleet run",
 )
-_CHANGING = ("repair", "adopt", "drop", "drop a run", "reason into workspace", "run", "improve", "live", "slow")
+_CHANGING = ("repair", "adopt", "drop", "drop a run", "reason into workspace", "run", "improve", "live", "optimise")
 _CHANGING += ("diagnose into workspace", "alarms follow", "serve", "live controller", "map", "plan into workspace")
 _HERE = ("workspace", "data")
 KINDS = (

@@ -200,7 +200,7 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "questions": (["query", *here], []),
         "docs": (["docs", "--out", out["docs.html"], "--questions", out["asked.html"], *here], [out["docs.html"]]),
         "reason into workspace": (["reason", *here], []),
-        "slow": (["slow", _robot(folder), run.stem, "--times", "1.5", *here], []),
+        "optimise": (["optimise", _robot(folder), run.stem, "--cycle", "20", *here], []),
         "plan into workspace": (["plan", _robot(folder), *_ends(case), "--search", "2", *here], []),
         "alarms follow": (["alarms", "--follow", *here], []),
         "live controller": (["live", "--rtde", f"127.0.0.1:{port or 1}", "--robot", _robot(folder), *here], []),

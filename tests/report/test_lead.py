@@ -57,7 +57,7 @@ def test_switching_off_while_waiting_has_an_interval_or_is_not_said(graph: Knowl
     assert lead.could_save(answers(graph, factory.into(graph))) is None
 
 
-def test_the_slower_motion_that_saves_most_is_said(graph: KnowledgeGraph) -> None:
+def test_the_timing_that_saves_most_is_said(graph: KnowledgeGraph) -> None:
     factory = six_axis(graph)
     run = next(iter(answers(graph, factory)["modelled_series"].rows))
     for name, times, low, high in (("a", 1.25, 900.0, 1100.0), ("b", 1.5, 1700.0, 1900.0), ("c", 2.0, -10.0, 9000.0)):
@@ -68,10 +68,10 @@ def test_the_slower_motion_that_saves_most_is_said(graph: KnowledgeGraph) -> Non
             f" irt:Planned_Saving {(low + high) / 2}e0 ; irt:Planned_Saving_Lower {low}e0 ;"
             f" irt:Planned_Saving_Upper {high}e0 . <{factory.iri}> irt:has_RunProcess {plan} ."
         )
-    said = plain(lead.slower(answers(graph, factory.into(graph))))
+    said = plain(lead.retimed(answers(graph, factory.into(graph))))
     assert said == (
-        f"Made 1.5 times longer, {run['run_name']} would save 1.80 kJ each time (95 % interval 1.70 to 1.90 kJ), "
-        "20 % of what it takes, where the robot waits after it anyway."
+        f"Timed as b, in 1.5 times its time, {run['run_name']} would save 1.80 kJ each time (95 % interval 1.70 to "
+        "1.90 kJ), 20 % of what it takes, where the robot waits after it anyway."
     )
 
 
@@ -80,7 +80,7 @@ def test_what_a_piece_took(graph: KnowledgeGraph) -> None:
     runs = answers(graph, factory)["energy_per_run"].rows
     factory.say(f"<{runs[0]['run']}> irt:Product 'bracket' ; irt:Piece_Count 10 ; irt:Cycle_Count 1 .")
     each = runs[0]["measured_j"] / 10
-    assert lead.slower(answers(graph, factory)) is None
+    assert lead.retimed(answers(graph, factory)) is None
     piece, cycle = map(plain, lead.made(answers(graph, factory.into(graph))))
     assert piece == (
         f"Each bracket took {each:.0f} J, measured: the mean of 10 pieces, waiting within the runs included."

@@ -79,7 +79,7 @@ def _check_system() -> None:
         "Bring a log": (bring.import_, bring.init, twin.check, robot.robot),
         "Build the twin": (twin.demo, twin.run, twin.improve, twin.adopt, twin.case_study, fleet.fleet),
         "Find the gap": (twin.diagnose, motion.excite),
-        "Plan and save": (motion.plan, motion.predict, motion.slow),
+        "Plan and save": (motion.plan, motion.predict, motion.optimise),
         "Ask": (graph.query, graph.explain, graph.docs, graph.export, graph.reason, graph.map_database),
         "Watch": (service.serve, service.live, alarms.alarms),
         "Keep": (*(upkeep.status, upkeep.trust, upkeep.backup, upkeep.restore), *(upkeep.repair, upkeep.drop)),

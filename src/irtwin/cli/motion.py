@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,8 @@ from irtwin.cli.options import (
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
-    from irtwin.plans import Kept
+    from irtwin.planning.cycle import Cycle
+    from irtwin.plans import Kept, Timings
 
 _LONG = 30.0  # s: of less nothing is said before
 _PLAN = "plan"  # name of a planned run that was given none
@@ -186,40 +188,60 @@ def predict(
 @click.command()
 @click.argument("robot")
 @click.argument("run")
+@click.option("--cycle", type=Number(0.0, DAY, min_open=True), help="Cycle time, s. Default: as long as the run.")
 @click.option(
-    "--times",
-    type=Number(1.0, 10.0, min_open=True),
-    required=True,
-    help="How many times longer the motion is to take: 1.25 is four fifths of its speed.",
+    "--pause",
+    type=Number(0.0, DAY),
+    help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV or Parquet file to write.")
 @workspace_option
-@click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_TIMES_slower.")
+@click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
 @database_option
 @graph_option
-def slow(
-    robot: str, run: str, times: float, workspace: Path, name: str | None, database: str | None, graph_url: str | None
+def optimise(
+    robot: str,
+    run: str,
+    cycle: float | None,
+    pause: float | None,
+    out: Path | None,
+    workspace: Path,
+    name: str | None,
+    database: str | None,
+    graph_url: str | None,
 ) -> None:
-    """Say what a run of a robot would save if it were slower, by the robot's twin.
+    """Time the moves of a run so that it takes least energy, by the robot's twin.
 
-    The motion keeps its way and takes longer. What it takes is held against the motion as it was, with waiting after it
-    until the slower one is done: where a robot waits anyway, that is what slowing down saves. It is kept as a planned
-    run, and the robot's report says it.
+    The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
+    and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
+    that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
+    torque. The motion is kept as a planned run, and the robot's report says what it saves.
     """
     from irtwin import plans
 
-    saved, kept = plans.slow(
-        robot,
-        run,
-        times,
-        workspace,
-        name=name or f"{run}_{times:g}_slower",
-        database=database,
-        graph_url=graph_url,
-        announce=say,
-    )
-    by = "" if saved.half_width is None else f" +- {saved.half_width:.2g}"
-    said = f"takes {abs(saved.value):.3g}{by} J {'less' if saved.value >= 0 else 'more'}"
-    click.echo(f"{_where(None, kept)}: {said} than {run} followed by waiting (95 % interval)")
+    found, kept = plans.optimise(
+        robot, run, workspace, name=name or f"{run}_optimised", cycle=cycle, least_pause=pause, out=out,
+        database=database, graph_url=graph_url, announce=say,
+    )  # fmt: skip
+    for line in _curve_lines(found):
+        click.echo(line)
+    click.echo(f"{_where(out, kept)}: {_cycle_text(found.best)} than {run} (95 % interval)")
+
+
+def _curve_lines(found: Timings) -> Iterator[str]:
+    """Yield the energy of each cycle time, and how much longer each move takes in the one that was chosen."""
+    for one in found.curve:
+        yield _cycle_text(one)
+    programme = found.programme
+    time = programme.motion.time
+    for section, factor in zip(programme.sections, found.best.factors, strict=True):
+        if section.kind == "move":
+            yield f"move from {time[section.first]:.2f} to {time[section.last]:.2f} s: {factor:.2f} times as long"
+
+
+def _cycle_text(cycle: Cycle) -> str:
+    saved = replace(cycle.saved, value=abs(cycle.saved.value))
+    return f"{cycle.seconds:.2f} s: {cycle.energy} J, {saved} J {'less' if cycle.saved.value >= 0 else 'more'}"
 
 
 @click.command()

@@ -135,17 +135,7 @@ def _saving(workspace: Workspace, scaled: str, twin: Twin, motion: Motion) -> Fi
     if not twin.knows_power:
         return None
     quick = condition(load_run(workspace, twin.robot, scaled), twin.robot, twin.cutoff)
-    return saving(twin, motion, [quick, standing(quick, float(motion.time[-1] - motion.time[0]))])
-
-
-def standing(motion: Motion, until: float) -> Motion:
-    """Return standing still where a motion ends, from then until so many s after it began."""
-    step = float(np.median(np.diff(motion.time)))
-    first, last = float(motion.time[-1]), float(motion.time[0]) + until
-    time = np.linspace(first, last, max(2, round((last - first) / step) + 1))
-    q = np.repeat(motion.q[-1:], len(time), axis=0)
-    rest = np.zeros_like(q)
-    return Motion(time, q, rest, rest, run=motion.run, payload_mass=motion.payload_mass, payload_com=motion.payload_com)
+    return saving(twin, motion, quick)
 
 
 def _figure(name: str, unit: str, figure: Figure) -> dict[str, float | None]:
@@ -172,14 +162,6 @@ def stored_price(workspace: Workspace, run_id: str) -> Price | None:
         peak=figure(row.peak_power_w, row.peak_power_upper_w),
         mean=figure(row.mean_power_w, row.mean_power_upper_w),
     )
-
-
-def stored_saving(workspace: Workspace, run_id: str) -> Figure:
-    """Return what a time scaling saves, J, as it was stored."""
-    with workspace.reading() as session:
-        row = session.get_one(schema.RunPrice, run_id)
-    assert row.saving_j is not None
-    return Figure(row.saving_j, None if row.saving_upper_j is None else row.saving_upper_j - row.saving_j)
 
 
 def held_out(role: schema.TwinRun, motion: Motion) -> np.ndarray:

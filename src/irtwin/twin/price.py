@@ -24,6 +24,10 @@ class Figure:
     value: float
     half_width: float | None
 
+    def __str__(self) -> str:
+        by = "" if self.half_width is None else f" +- {self.half_width:.2g}"
+        return f"{self.value:.4g}{by}"
+
 
 @dataclass(frozen=True)
 class Price:
@@ -40,9 +44,9 @@ class Price:
     def __str__(self) -> str:
         hours = Figure(self.energy.value / _WATT_HOUR, _scaled(self.energy.half_width, 1 / _WATT_HOUR))
         parts = (
-            f"energy {_shown(self.energy)} J ({_shown(hours)} Wh)",
-            f"peak power {_shown(self.peak)} W",
-            f"mean power {_shown(self.mean)} W",
+            f"energy {self.energy} J ({hours} Wh)",
+            f"peak power {self.peak} W",
+            f"mean power {self.mean} W",
         )
         known = self.energy.half_width is not None
         return ", ".join(parts) + ("; +- 95 % interval" if known else "; intervals not known")
@@ -91,21 +95,36 @@ def mean_power(twin: Twin, motion: Motion, where: np.ndarray) -> Figure:
     return Figure(value, _half_width(twin, _slope(twin, motion, weights) / seconds, *left))
 
 
-def saving(twin: Twin, motion: Motion, instead: Sequence[Motion]) -> Figure:
-    """Return the electrical energy, J, that a motion saves where it takes the place of others; negative if it costs.
+def saving(twin: Twin, motion: Motion, was: Motion) -> Figure:
+    """Return the electrical energy, J, that a motion saves in place of one that was; negative if it costs.
 
-    The interval is that of the difference: what is unsure in both alike, as the standby power, drops out. What effects
-    leave of power does not.
+    Where it lasts longer, standing still after the one that was is counted too. The interval is that of the difference:
+    what is unsure in both alike, as the standby power, drops out. What effects leave of power does not.
     """
-    less = [energy(one.time, twin.power(one)) for one in instead]
-    saved = sum(less) - energy(motion.time, twin.power(motion))
+    instead = _with_standing(was, _seconds(motion))
+    saved = twin.energy(instead) - twin.energy(motion)
     if twin.covariance is None:
         return Figure(saved, None)
-    slope = -_slope(twin, motion, trapezoid(motion.time))
-    for one in instead:
-        slope = slope + _slope(twin, one, trapezoid(one.time))
-    left = [twin.remainder.energy(_seconds(one)) for one in (motion, *instead) if twin.remainder]
+    slope = _slope(twin, instead, trapezoid(instead.time)) - _slope(twin, motion, trapezoid(motion.time))
+    left = [twin.remainder.energy(_seconds(one)) for one in (motion, instead) if twin.remainder]
     return Figure(saved, _half_width(twin, slope, *left))
+
+
+def _with_standing(motion: Motion, seconds: float) -> Motion:
+    """Return a motion, and standing still where it ends until so many seconds after it began."""
+    more = round((seconds - _seconds(motion)) * motion.rate)
+    if more < 1:
+        return motion
+    rest = np.zeros((more, motion.q.shape[1]))
+    return Motion(
+        np.append(motion.time, motion.time[-1] + np.arange(1, more + 1) / motion.rate),
+        np.vstack([motion.q, rest + motion.q[-1]]),
+        np.vstack([motion.dq, rest]),
+        np.vstack([motion.ddq, rest]),
+        run=motion.run,
+        payload_mass=motion.payload_mass,
+        payload_com=motion.payload_com,
+    )
 
 
 def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
@@ -151,9 +170,3 @@ def trapezoid(time: np.ndarray) -> np.ndarray:
 
 def _scaled(width: float | None, factor: float) -> float | None:
     return None if width is None else width * factor
-
-
-def _shown(figure: Figure) -> str:
-    if figure.half_width is None:
-        return f"{figure.value:.4g}"
-    return f"{figure.value:.4g} +- {figure.half_width:.2g}"

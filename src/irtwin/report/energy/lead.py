@@ -84,9 +84,9 @@ def could_save(answers: Answers) -> str | None:
     )
 
 
-def slower(answers: Answers) -> str | None:
-    """Return in words what the slower motion that saves most would save; None where none is known to save."""
-    rows = [row for row in answers["slower"].rows if 0 < row["lower_j"] <= row["upper_j"]]
+def retimed(answers: Answers) -> str | None:
+    """Return in words what the other timing that saves most would save; None where none is known to save."""
+    rows = [row for row in answers["retimed"].rows if 0 < row["lower_j"] <= row["upper_j"]]
     if not rows:
         return None
     row = max(rows, key=lambda row: float(row["saving_j"]))
@@ -94,9 +94,12 @@ def slower(answers: Answers) -> str | None:
     value, interval = wording.interval(row["saving_j"] / size, row["lower_j"] / size, row["upper_j"] / size)
     share = row["saving_j"] / row["modelled_j"] if row["modelled_j"] else None
     of_it = "" if share is None else f", {wording.part(share)} of what it takes"
+    longer = row["times"] > 1 + 1e-9
+    how = f"in {wording.given(row['times'])} times its time" if longer else "in the same time"
+    waiting = ", where the robot waits after it anyway" if longer else ""
     return (
-        f"Made {wording.given(row['times'])} times longer, {row['run_name']} would save {value} {unit} each time "
-        f"(95 % interval {interval.replace(' … ', ' to ')} {unit}){of_it}, where the robot waits after it anyway."
+        f"Timed as {row['plan_name']}, {how}, {row['run_name']} would save {value} {unit} each time (95 % interval "
+        f"{interval.replace(' … ', ' to ')} {unit}){of_it}{waiting}."
     )
 
 

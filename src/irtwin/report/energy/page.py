@@ -79,7 +79,7 @@ def _page(
         taken=lead.taken(answers),
         could_save=lead.could_save(answers),
         saving=lead.saving(answers),
-        slower=lead.slower(answers),
+        retimed=lead.retimed(answers),
         made=lead.made(answers),
         trust=lead.trust(answers),
         constant=lead.constant_power(answers),

@@ -1,0 +1,89 @@
+"""A programme: a measured motion as moves from rest to rest and the pauses between them; each may be retimed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from irtwin.errors import InputError
+from irtwin.signals.motion import Motion, standstill
+
+_BRIEF = 0.05  # s: where all joints turn at once they stand that long, and do not pause
+
+
+@dataclass(frozen=True)
+class Section:
+    """Samples `first` to `last` of a motion: a "move", a "pause", or "cut": a move that the log has not whole."""
+
+    first: int
+    last: int
+    kind: str
+
+
+@dataclass(frozen=True)
+class Programme:
+    """A motion and its sections in order; they share their ends."""
+
+    motion: Motion
+    sections: tuple[Section, ...]
+
+    @cached_property
+    def seconds(self) -> np.ndarray:
+        """How long each section takes, (S,) s."""
+        time = self.motion.time
+        return np.array([time[section.last] - time[section.first] for section in self.sections])
+
+    def are(self, kind: str) -> np.ndarray:
+        """Return which sections are of a kind, (S,) bool."""
+        return np.array([section.kind == kind for section in self.sections])
+
+    def alone(self, number: int, factor: float = 1.0) -> Motion:
+        """Return a section alone, `factor` times as long."""
+        section = self.sections[number]
+        motion = self.motion.part(section.first, section.last + 1)
+        return Programme(motion, (Section(0, len(motion.time) - 1, section.kind),)).retimed(np.array([factor]))
+
+    def retimed(self, factors: np.ndarray) -> Motion:
+        """Return the motion with each section (S,) times as long, at the log's rate; by a factor of zero left out."""
+        old = self.motion.time[[self.sections[0].first, *(section.last for section in self.sections)]]
+        new = np.concatenate([[0.0], np.cumsum(self.seconds * factors)])
+        count = max(2, round(new[-1] * self.motion.rate) + 1)
+        time = np.linspace(0.0, new[-1], count)
+        own = np.clip(np.searchsorted(new, time, side="right") - 1, 0, len(factors) - 1)
+        while (gone := factors[own] == 0.0).any():  # the last sample may lie at the end of what is left out
+            own[gone] -= 1
+        at = old[own] + (time - new[own]) / factors[own]
+        q, dq, ddq = (
+            np.column_stack([np.interp(at, self.motion.time, column) for column in values.T])
+            for values in (self.motion.q, self.motion.dq, self.motion.ddq)
+        )
+        pace = factors[own][:, None]
+        return Motion(
+            time, q, dq / pace, ddq / pace**2,
+            run=self.motion.run, payload_mass=self.motion.payload_mass, payload_com=self.motion.payload_com,
+        )  # fmt: skip
+
+
+def programme_of(motion: Motion, place: str) -> Programme:
+    """Return a motion's moves and pauses. Raises InputError by `place` where it has no whole move."""
+    still = standstill(motion)
+    bounds = _bounds(still)
+    for first, last in pairwise(bounds[1:-1]):
+        if still[first] and motion.time[last] - motion.time[first] < _BRIEF:
+            still[first:last] = False
+    bounds = _bounds(still)
+    kinds = ["pause" if still[first] else "move" for first in bounds[:-1]]
+    for end in (0, -1):
+        kinds[end] = "pause" if still[end] else "cut"
+    if "move" not in kinds:
+        raise InputError(f'{place}: run "{motion.run}" has no move from rest to rest; name a run that has one')
+    sections = zip(pairwise(bounds.tolist()), kinds, strict=True)
+    return Programme(motion, tuple(Section(*ends, kind) for ends, kind in sections))
+
+
+def _bounds(still: np.ndarray) -> np.ndarray:
+    """Return the samples at which standing and moving begin, and the last one."""
+    return np.unique([0, *(np.flatnonzero(still[1:] != still[:-1]) + 1), len(still) - 1])
