@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test suite compiled nightly check fuzz lint mappings wheel ontology lock clean
+.PHONY: demo test suite compiled nightly check fuzz lint mappings guide wheel ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -42,6 +42,10 @@ lint: $(VENV)/test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# docs/ as a site with a search, in build/guide; it opens without a server.
+guide: $(VENV)/test
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 # dist/irtwin-VERSION-py3-none-any.whl: tests/system/test_wheel.py tries it in an environment of its own.
 wheel: $(VENV)/demo

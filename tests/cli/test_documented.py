@@ -13,12 +13,17 @@ from irtwin.cli.command_line import cli
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", "docs/USING.md", "docs/LOG_FORMAT.md", "docs/ALARMS.md", "CONTRIBUTING.md")
+PAGES += tuple(f"docs/tutorials/{file.name}" for file in sorted((ROOT / "docs" / "tutorials").glob("*.md")))
 
 
 def lines(page: str) -> list[str]:
     """The commands of a page, in its blocks and in its sentences, without comments."""
     text = (ROOT / page).read_text(encoding="utf-8")
-    blocks = [line for block in re.findall(r"^```sh\n(.*?)^```", text, re.S | re.M) for line in block.splitlines()]
+    blocks = [
+        line
+        for block in re.findall(r"^```sh\n(.*?)^```", text.replace("\\\n", ""), re.S | re.M)
+        for line in block.splitlines()
+    ]
     within = re.findall(r"`(irtwin [^`]+)`", text.replace("\n", " "))
     commands = [part.strip() for line in blocks + within for part in re.split(r"\s#\s|&&|\s#$", line)[0:2]]
     return sorted({one for one in commands if one.startswith("irtwin ")})

@@ -1,0 +1,44 @@
+"""The guide: it builds, with every page in its place, and what its tutorials say is what happens."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TUTORIALS = ("first-log", "simulator", "energy", "ask", "cheaper-motion")
+
+pytestmark = [pytest.mark.slow, pytest.mark.system]
+
+
+def test_it_builds_with_a_reference_of_commands_and_python(tmp_path: Path) -> None:
+    built = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", tmp_path],
+        cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert built.returncode == 0, built.stderr
+    commands = (tmp_path / "reference" / "commands.html").read_text(encoding="utf-8")
+    assert 'id="diagnose"' in commands and "--save-simulator" in commands
+    assert "Bring a log" in (tmp_path / "USING.html").read_text(encoding="utf-8")
+    assert 'id="irtwin.modelling.identify"' in (tmp_path / "reference" / "python.html").read_text(encoding="utf-8")
+    for name in TUTORIALS:
+        assert (tmp_path / "tutorials" / f"{name}.html").is_file()
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(3600)
+def test_each_step_of_the_tutorials_can_be_done(tmp_path: Path) -> None:
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    for name in TUTORIALS:
+        text = (ROOT / "docs" / "tutorials" / f"{name}.md").read_text(encoding="utf-8")
+        for language, block in re.findall(r"^```(sh|python)\n(.*?)^```", text, re.S | re.M):
+            command = ["bash", "-ec", block] if language == "sh" else [sys.executable, "-c", block]
+            done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, f"{name}: {block}\n{done.stderr}"
+    assert "<html" in (tmp_path / "gap.html").read_text(encoding="utf-8")
+    assert (tmp_path / "better.xml").read_text() != (tmp_path / "faulty.xml").read_text()
