@@ -104,7 +104,7 @@ def dahl(state, d=0.05, fc=TRUE["Fc"][1]):
 
 
 def behind_a_spring(state, stiffness, damping, play=0.0):
-    """The torque that passes a spring with play between motor and link, less what a stiff gear passes (Radau)."""
+    """The torque that passes a spring with play between motor and link, less what a stiff gear passes."""
     time, load = state.motion.time, state.rigid[:, 1]
     inertia = np.array([pin.crba(ROBOT.model, ROBOT.model.createData(), q)[1, 1] for q in state.motion.q])
     pushed, moved = make_interp_spline(time, load, k=1), make_interp_spline(time, inertia, k=1)
@@ -117,7 +117,7 @@ def behind_a_spring(state, stiffness, damping, play=0.0):
         return lead_and_speed[1], (pushed(now) - passed(*lead_and_speed)) / moved(now)
 
     start = (load[0] / stiffness + np.sign(load[0]) * play / 2, 0.0)
-    done = solve_ivp(motion, time[[0, -1]], start, t_eval=time, method="Radau", max_step=2e-3, rtol=1e-5, atol=1e-8)
+    done = solve_ivp(motion, time[[0, -1]], start, t_eval=time, method="LSODA", max_step=2e-3, rtol=1e-5, atol=1e-8)
     return only(np.array([passed(*each) for each in done.y.T]) - load)
 
 
