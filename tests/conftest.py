@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import itertools
 import os
 import shutil
@@ -46,6 +47,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         quick = [of for of in modules.values() if of not in slow]
         dealt = [[*slow[at::processes], *quick[at::processes]] for at in range(processes)]
         items[:] = [item for share in dealt for module in share for item in module]
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the `data` of a robot "Arm" and the `workspace` that `irtwin run` made of it; who writes, copies.
+
+    It takes seconds, so that one process makes it for all.
+    """
+    from tests.data_sets import irtwin  # which brings physics: few tests need it
+    from tests.small_robots import data_set
+
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    with (shared / "small_run.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (shared / "small_run").exists():
+            folder = Path(tempfile.mkdtemp(dir=base))
+            done = irtwin("run", data_set(folder / "data", "Arm"), "--workspace", folder / "workspace")
+            assert done.status == 0, done.err
+            folder.rename(shared / "small_run")
+    return shared / "small_run"
 
 
 def _server_programs() -> Path | None:

@@ -16,21 +16,12 @@ from tests.small_robots import data_set
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made")
-    done = irtwin("run", data_set(folder / "first", "First"), "--workspace", folder / "workspace")
-    assert done.status == 0, done.err
-    data_set(folder / "second", "Second", seed=5)
-    return folder
-
-
 @pytest.mark.parametrize("size", [1, 40, *(pytest.param(size, marks=pytest.mark.nightly) for size in (8, 200, 1000))])
 @pytest.mark.parametrize("command", ["run", "backup"])
-def test_a_full_disk_is_one_line(made: Path, tmp_path: Path, command: str, size: int) -> None:
+def test_a_full_disk_is_one_line(small_run: Path, tmp_path: Path, command: str, size: int) -> None:
     """size: kB that the longest file may have, so that each step of the way is met by one."""
-    workspace = shutil.copytree(made / "workspace", tmp_path / "workspace")
-    what = made / "second" if command == "run" else tmp_path / "kept.zip"
+    workspace = shutil.copytree(small_run / "workspace", tmp_path / "workspace")
+    what = data_set(tmp_path / "second", "Second", seed=5) if command == "run" else tmp_path / "kept.zip"
     asked = ("query", "energy_per_run", "--workspace", workspace, "--format", "csv")
     before = irtwin(*asked).out
     done = subprocess.run(

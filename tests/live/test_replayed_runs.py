@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from tests.data_sets import irtwin
-from tests.small_robots import data_set
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
@@ -19,23 +18,15 @@ CONSUMPTION = ("fleet_totals", "energy_per_robot", "energy_per_day", "energy_per
                "energy_per_joint", "busiest_days", "fleet_ranking", "standstill_waste")  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made")
-    done = irtwin("run", data_set(folder / "data", "Arm"), "--workspace", folder / "workspace")
-    assert done.status == 0, done.err
-    return folder
-
-
 def totals(workspace: Path) -> dict[str, str]:
     return {name: irtwin("query", name, "--workspace", workspace, "--format", "csv").out for name in CONSUMPTION}
 
 
-def test_a_replay_changes_no_total_and_is_said_to_be_one(made: Path, tmp_path: Path) -> None:
-    workspace = Path(shutil.copytree(made / "workspace", tmp_path / "workspace"))
+def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_path: Path) -> None:
+    workspace = Path(shutil.copytree(small_run / "workspace", tmp_path / "workspace"))
     before = totals(workspace)
     assert all(len(answer.splitlines()) > 1 for answer in before.values())
-    log = next((made / "data" / "runs").iterdir())
+    log = next((small_run / "data" / "runs").iterdir())
     live = irtwin("live", "--replay", log, "--robot", "Arm", "--speed", "100", "--workspace", workspace)
     assert live.status == 0, live.err
     assert totals(workspace) == before
@@ -48,12 +39,12 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(made: Path, tmp_path: P
         )
         assert run["took"] is None and run["modelled"] is not None
     assert "1 replayed" in irtwin("status", "--workspace", workspace).out
-    assert irtwin("run", made / "data", "--workspace", workspace).status == 0  # which keeps it
+    assert irtwin("run", small_run / "data", "--workspace", workspace).status == 0  # which keeps it
     assert "1 replayed" in irtwin("status", "--workspace", workspace).out
 
 
-def test_what_a_simulator_wrote_is_no_consumption(made: Path, tmp_path: Path) -> None:
-    data = Path(shutil.copytree(made / "data", tmp_path / "data"))
+def test_what_a_simulator_wrote_is_no_consumption(small_run: Path, tmp_path: Path) -> None:
+    data = Path(shutil.copytree(small_run / "data", tmp_path / "data"))
     text = (data / "dataset.toml").read_text(encoding="utf-8")
     head, *runs = text.split("[[run]]")
     simulated = [re.sub('role = "[a-z]+"', 'role = "simulated"', run) for run in runs]

@@ -44,16 +44,9 @@ ENERGY = """SELECT ?energy ?power ?modelled ?from ?part { ?run a irt:Live_Run ; 
   OPTIONAL { ?run irt:Modelled_Energy ?modelled ; irt:Part_In_Twin ?part } }"""
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("live_energy")
-    run_all(small_robots.data_set(folder / "data", "arm"), folder / "w", announce=lambda line: None)
-    return folder / "w"
-
-
 @pytest.fixture
-def place(made: Path, tmp_path: Path) -> Iterator[Workspace]:
-    shutil.copytree(made, tmp_path / "w")
+def place(small_run: Path, tmp_path: Path) -> Iterator[Workspace]:
+    shutil.copytree(small_run / "workspace", tmp_path / "w")
     with Workspace(tmp_path / "w") as place:
         yield place
 
@@ -79,7 +72,7 @@ def states(run: LoggedRun, torque: Callable[[float], float] = lambda at: 0.0, po
             else:
                 more = np.array([0.0, torque(at)]) if field == "torque" else 0.0
                 values.append(tuple((np.atleast_1d(said[row]) + more).tolist()))
-        yield State("arm", NOON + float(at), tuple(values))
+        yield State("Arm", NOON + float(at), tuple(values))
 
 
 def wait_for(condition: Callable[[], object]) -> None:
@@ -194,7 +187,7 @@ def test_power_that_is_not_measured_is_modelled(place: Workspace, graph: Knowled
 
 def test_what_a_crash_left_gets_its_energy_too(place: Workspace, graph: KnowledgeGraph) -> None:
     said = list(states(log()))
-    header = Header("arm.live_20260301T120000000000", "arm", 0.0, columns(ROBOT.joint_names))
+    header = Header("Arm.live_20260301T120000000000", "Arm", 0.0, columns(ROBOT.joint_names))
     journal = Journal(place.folder / "live", header)
     journal.append(journal_rows(said))
     journal.close()
@@ -211,8 +204,8 @@ def test_a_new_twin_gives_live_runs_their_energy_anew(place: Workspace, tmp_path
             twin.receive(state)
     with place.reading() as session:
         old = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
-    run_all(small_robots.data_set(tmp_path / "data", "arm"), place.folder)  # the same once more
-    run_all(small_robots.data_set(tmp_path / "other", "arm", seed=4), place.folder)
+    run_all(small_robots.data_set(tmp_path / "data", "Arm"), place.folder)  # the same once more
+    run_all(small_robots.data_set(tmp_path / "other", "Arm", seed=4), place.folder)
     with place.reading() as session:
         new = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
     assert new.twin_id != old.twin_id
@@ -243,13 +236,13 @@ def test_a_stream_that_stops_is_marked_and_its_last_state_kept(
         step = said[1].time - said[0].time
         q, _, *others = said[100].values
         for number in range(1, 401):  # times go on, values do not, though a speed is said
-            twin.receive(State("arm", said[100].time + number * step, (q, (0.5, 0.5), *others)))
+            twin.receive(State("Arm", said[100].time + number * step, (q, (0.5, 0.5), *others)))
         wait_for(lambda: graph.query(stale))
         assert graph.query(stale)[0]["why"].endswith("though the speed that is said is not zero")
         twin.receive(replace(said[101], time=said[100].time + 401 * step))
         wait_for(lambda: not graph.query(stale))
     assert twin.stored == 101 + 400 + 1
-    assert lines[0].startswith("arm: stale: no state came for")
-    assert lines[2].startswith("arm: stale: every value has been the same for 3 s")
+    assert lines[0].startswith("Arm: stale: no state came for")
+    assert lines[2].startswith("Arm: stale: every value has been the same for 3 s")
     assert lines[2].endswith("; its states are stored")
-    assert lines[1] == lines[3] == "arm: the stream flows again"
+    assert lines[1] == lines[3] == "Arm: the stream flows again"

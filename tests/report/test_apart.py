@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from tests.data_sets import irtwin
-from tests.small_robots import data_set
 from tests.trusting import trust_all
 
 from irtwin.errors import InputError
@@ -59,10 +58,8 @@ def test_a_bug_of_the_process_keeps_its_traceback(tmp_path: Path, monkeypatch: p
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Iterator[Path]:
-    place = tmp_path / "workspace"
-    assert irtwin("run", data_set(tmp_path / "data", "Arm"), "--workspace", place).status == 0
-    yield place
+def workspace(small_run: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(small_run, tmp_path, dirs_exist_ok=True)) / "workspace"
 
 
 def test_a_page_is_made_while_others_write(workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import time
@@ -11,30 +12,27 @@ from typing import Any
 
 import httpx
 import pytest
-from tests import small_robots
 from tests.endpoint import Server, serving
 from tests.screens import faults, narrow_and_dark
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.workflow import run as run_all
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("live_page")
+def folder(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(shutil.copytree(small_run, tmp_path_factory.mktemp("live_page"), dirs_exist_ok=True))
 
 
 @pytest.fixture(scope="module")
 def robot(folder: Path) -> Iterator[Server]:
     """A server of a workspace in which a small robot has a twin."""
-    run_all(small_robots.data_set(folder / "data", "arm"), folder / "w")
-    with serving(folder / "w" / "graph", token=None) as running:
+    with serving(folder / "workspace" / "graph", token=None) as running:
         yield running
 
 
-@pytest.mark.parametrize("path", ["/live", "/live/arm"])
+@pytest.mark.parametrize("path", ["/live", "/live/Arm"])
 def test_pages_take_everything_from_here(robot: Server, path: str) -> None:
     page = httpx.get(robot.url + path)
     assert page.status_code == 200
@@ -45,8 +43,8 @@ def test_pages_take_everything_from_here(robot: Server, path: str) -> None:
 
 
 def test_the_robot_is_made_of_the_graph(robot: Server) -> None:
-    said = httpx.get(f"{robot.url}/live/arm/robot.json", timeout=60).json()
-    assert said["name"] == "arm"
+    said = httpx.get(f"{robot.url}/live/Arm/robot.json", timeout=60).json()
+    assert said["name"] == "Arm"
     assert len(said["joints"]) == 2
     assert said["parts"]
 
@@ -58,7 +56,7 @@ def test_a_robot_that_is_not_there(robot: Server, name: str) -> None:
 
 def test_too_many_pages_are_refused_and_those_that_leave_make_room(robot: Server) -> None:
     with httpx.Client(timeout=30) as client:
-        streams = [client.stream("GET", f"{robot.url}/live/arm/events") for _ in range(17)]
+        streams = [client.stream("GET", f"{robot.url}/live/Arm/events") for _ in range(17)]
         answers = [stream.__enter__() for stream in streams]
         assert [answer.status_code for answer in answers] == [200] * 16 + [503]
         assert answers[0].headers["Content-Type"].startswith("text/event-stream")
@@ -66,7 +64,7 @@ def test_too_many_pages_are_refused_and_those_that_leave_make_room(robot: Server
             stream.__exit__(None, None, None)
 
         def there_is_room() -> bool:
-            with client.stream("GET", f"{robot.url}/live/arm/events") as answer:
+            with client.stream("GET", f"{robot.url}/live/Arm/events") as answer:
                 return bool(answer.status_code == 200)
 
         wait_for(there_is_room)
@@ -87,10 +85,11 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     page.on(
         "request", lambda it: None if it.url.startswith((robot.url, "data:", "blob:")) else complaints.append(it.url)
     )
-    page.goto(f"{robot.url}/live/arm")
+    page.goto(f"{robot.url}/live/Arm")
     wait_for(lambda: page.inner_text("#stream") == "not watched yet")
     log = next((folder / "data").rglob("*.parquet"))
-    command = [sys.executable, "-m", "irtwin", "live", "--workspace", folder / "w", "--replay", log, "--robot", "arm"]
+    command = [sys.executable, "-m", "irtwin", "live", "--replay", log, "--robot", "Arm"]
+    command += ["--workspace", folder / "workspace"]
     with subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True) as live:
         wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
         wait_for(lambda: page.inner_text("#stream") == "flowing")
@@ -100,7 +99,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     assert "800 samples stored" in said or "801 samples stored" in said, said
     wait_for(lambda: page.inner_text("#stream") == "run ended")
     assert page.evaluate("irtwinLive.states") > 400
-    with KnowledgeGraph.as_it_stands(folder / "w" / "graph") as graph:
+    with KnowledgeGraph.as_it_stands(folder / "workspace" / "graph") as graph:
         (row,) = graph.query(
             "SELECT (COALESCE(?measured, ?modelled) AS ?energy) { ?run a irt:Replayed_Run "
             "OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }"
@@ -110,9 +109,9 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     assert page.locator("#gaps .bar").count() == 3
     page.goto(f"{robot.url}/live")
     wait_for(lambda: page.locator("#robots tr").count() == 1)
-    assert page.inner_text("#robots a") == "arm"
+    assert page.inner_text("#robots a") == "Arm"
     page.click("#robots a")
-    wait_for(lambda: page.inner_text("#name") == "arm")
+    wait_for(lambda: page.inner_text("#name") == "Arm")
     wait_for(lambda: page.locator("#by-joint .bar").count() == 2)
     assert faults(page) == []
     assert narrow_and_dark(page) == []
