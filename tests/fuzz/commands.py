@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import tempfile
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -33,14 +31,6 @@ WRITTEN = (
 
 class Unmade(Exception):
     """The harness cannot make what a case has: a fault of its own."""
-
-
-def try_case_apart(case: Case, sound: Path) -> Fault | None:
-    """Try a case from a process that has opened no store: a fork lacks RocksDB's threads, and waits for them."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__])
-    with ProcessPoolExecutor(1, mp_context=context) as apart:
-        return apart.submit(try_case, case, sound).result()
 
 
 def try_case(case: Case, sound: Path, tried: Counter[str] | None = None) -> Fault | None:

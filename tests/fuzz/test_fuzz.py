@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
+from tests.fuzz.apart import try_case_apart
 from tests.fuzz.case import OF_DATA, Case, cases, read_case
 from tests.fuzz.child import in_child
-from tests.fuzz.commands import try_case_apart
 from tests.fuzz.fault import fault_of
 
 FEW = settings(max_examples=12, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.fuzz.apart import try_case_apart
 from tests.fuzz.case import read_case
-from tests.fuzz.commands import try_case_apart
 
 pytestmark = pytest.mark.slow
 
