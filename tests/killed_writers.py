@@ -1,4 +1,4 @@
-"""A process that rewrites a workspace and is killed at one of its writes, in a module that it imports once."""
+"""What processes do that write to a workspace or a graph until they are killed, in a module that they import once."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import Engine, event
 
 from irtwin.knowledge.mapping.remembered import RememberedRows
+from irtwin.knowledge.store import graph as store
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.storage import database, files
 from irtwin.storage.database import Workspace
 from irtwin.workflow import conclude, map_rows, rewriting
+from tests import rows
 from tests.turn_takers import data_set
 
 
@@ -65,3 +70,62 @@ def killed(moment: int, *taken_in: Any) -> None:
     KnowledgeGraph._writing = writing  # type: ignore[method-assign,assignment]
     RememberedRows.__exit__ = remember  # type: ignore[method-assign,assignment]
     take_in(*taken_in)
+
+
+def killed_while_ingesting(point: str, folder: Path, url: str | None) -> None:
+    """Take in a changed data set, and be killed at a step of it."""
+
+    def kill(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    put, calls = files.put_in_place, itertools.count(1)
+    workspace = Workspace(folder, url)
+    if point == "first file":
+        files.put_in_place = kill
+    elif point == "second file":
+        files.put_in_place = lambda *arguments: kill() if next(calls) == 2 else put(*arguments)
+    elif point == "rows dropped":
+        database.insert_rows = kill
+    elif point == "rows written":
+        event.listen(workspace.engine, "commit", kill)
+    elif point == "committed":
+        Workspace.remove_orphans = kill  # type: ignore[method-assign]
+    robot, joints, runs, series = rows.data_set()
+    for number, run in enumerate(runs):
+        run.sha256 = "4" * 64
+        series[run.run_id] = rows.samples(20 + number)
+    workspace.ingest(robot, joints, runs, series)
+
+
+def ingest_five_times(digit: int, folder: Path, url: str | None) -> None:
+    """Take in five data sets of a robot, one after the other."""
+    for number in range(5):
+        robot, joints, runs, series = rows.data_set()
+        runs[0].sha256 = f"{digit}" * 64
+        series[runs[0].run_id] = rows.samples(number + digit)
+        Workspace(folder, url).ingest(robot, joints, runs, series)
+
+
+def write_without_end(folder: Path, way: str, telling: Connection) -> None:
+    """Write a graph step by step, and tell which is done.
+
+    Each step makes a new graph of 50 facts, or lets one of three graphs count on. The way "many": 50 facts are so many
+    that they go into files of their own.
+    """
+    if way == "many":
+        store._MANY = 50
+    graph, counted = KnowledgeGraph(folder), dict[str, set[Quad]]()
+    for number in itertools.count():
+        name = f"new{number}" if way in ("first", "many") else f"count{number % 3}"
+        facts = _facts(name, number)
+        if way in ("replace", "first"):
+            graph.replace(facts, f"https://example.org/g/{name}")
+        else:
+            graph.change(counted.get(name, ()) if way == "change" else (), facts)
+        counted[name] = facts
+        telling.send(number)
+
+
+def _facts(name: str, number: int) -> set[Quad]:
+    graph, value = NamedNode(f"https://example.org/g/{name}"), NamedNode("https://example.org/value")
+    return {Quad(NamedNode(f"https://example.org/{name}/{fact}"), value, Literal(number), graph) for fact in range(50)}

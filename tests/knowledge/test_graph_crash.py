@@ -3,60 +3,34 @@
 from __future__ import annotations
 
 import random
-import subprocess
-import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from tests.forks import FORKS
+from tests.killed_writers import write_without_end
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
 pytestmark = pytest.mark.slow
 
-# Writes without end: each step makes a new graph of 50 facts, or lets one of three graphs count on; says which is done.
-# With "many" 50 facts are so many that they go into files of their own.
-WRITER = """
-import itertools, sys
-from pathlib import Path
-from pyoxigraph import Literal, NamedNode, Quad
-from irtwin.knowledge.store import graph as store
-from irtwin.knowledge.store.graph import KnowledgeGraph
-
-def quads(graph, number):
-    name, value = NamedNode(f"https://example.org/g/{graph}"), NamedNode("https://example.org/value")
-    return {Quad(NamedNode(f"https://example.org/{graph}/{fact}"), value, Literal(number), name) for fact in range(50)}
-
-if sys.argv[2] == "many":
-    store._MANY = 50
-graph = KnowledgeGraph(Path(sys.argv[1]))
-print("open", flush=True)
-counted = {}
-for number in itertools.count():
-    which = f"new{number}" if sys.argv[2] in ("first", "many") else f"count{number % 3}"
-    if sys.argv[2] == "change":
-        graph.change(counted.get(which, ()), quads(which, number))
-        counted[which] = quads(which, number)
-    elif sys.argv[2] == "many":
-        graph.change((), quads(which, number))
-    else:
-        graph.replace(quads(which, number), f"https://example.org/g/{which}")
-    print(number, flush=True)
-"""
-
 
 def killed_after(seconds: float, folder: Path, way: str) -> int:
     """Return the last step that the writer said to be done."""
-    command = [sys.executable, "-c", WRITER, str(folder), way]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        said = [int(process.stdout.readline())]
-        time.sleep(seconds)
-        process.kill()
-        said += [int(line) for line in process.stdout.read().split()]
-    assert process.returncode == -9
-    return max(said)
+    told, telling = FORKS.Pipe(duplex=False)
+    process = FORKS.Process(target=write_without_end, args=(folder, way, telling))
+    process.start()
+    telling.close()
+    last = told.recv()
+    time.sleep(seconds)
+    process.kill()
+    with suppress(EOFError, OSError):  # it was killed, maybe in the middle of a word
+        while True:
+            last = told.recv()
+    process.join()
+    assert process.exitcode == -9
+    return int(last)
 
 
 def facts(graph: KnowledgeGraph) -> dict[str, list[int]]:

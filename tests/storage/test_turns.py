@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import text
-from tests import rows, turn_takers
+from tests import rows
+from tests.forks import FORKS
 from tests.turn_takers import NAMES, hold, taken_in
 
 from irtwin.errors import InputError
@@ -21,9 +22,6 @@ from irtwin.storage.schema import Base
 from irtwin.workflow import map_rows, rewriting
 
 pytestmark = pytest.mark.slow
-
-FORKS = multiprocessing.get_context("forkserver")  # a fork of this process would lack the threads of its store
-FORKS.set_forkserver_preload([turn_takers.__name__])
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
