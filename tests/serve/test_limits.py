@@ -72,6 +72,13 @@ def test_a_query_that_takes_too_much_memory_is_ended(strict) -> None:
     assert strict.ask("ASK {}").json()["boolean"] is True
 
 
+def test_an_update_that_takes_too_long_changes_nothing(strict) -> None:
+    before = strict.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content
+    response = strict.update("INSERT { ?a ?b ?i } WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }")
+    assert (response.status_code, response.text[:24]) == (503, "the update was cancelled"), response.text
+    assert strict.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
+
+
 def test_a_client_that_leaves_ends_its_query_and_others_are_answered_meanwhile(server) -> None:
     """The time limit of this server is half a minute: it is not what ends the query."""
     with ThreadPoolExecutor(1) as threads:

@@ -99,7 +99,7 @@ def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_th
     for thread in threads:
         thread.start()
     try:
-        found, until = [], time.monotonic() + 8  # some four times all workers of the greedy are ended and replaced
+        found, until = [], time.monotonic() + 5  # twice all workers of the greedy are ended and replaced
         with asking(OTHER) as http:
             while time.monotonic() < until:
                 found.append(http.get(shared.sparql, params={"query": "ASK {}"}).status_code)

@@ -109,14 +109,6 @@ def test_a_dataset_that_cannot_be_is_refused(writable, text: str, graph: str, me
     assert (response.status_code, message in response.text) == (400, True), response.text
 
 
-def test_an_update_that_takes_too_long_changes_nothing(new_graph: Callable[[], Path], start) -> None:
-    with start(new_graph(), "--timeout", 3) as running:
-        before = running.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content
-        response = running.update("INSERT { ?a ?b ?i } WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }")
-        assert (response.status_code, response.text[:24]) == (503, "the update was cancelled"), response.text
-        assert running.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
-
-
 def test_rdflib_writes_through_it(writable) -> None:
     store = SPARQLUpdateStore(
         writable.sparql, writable.sparql, headers={"Authorization": "Bearer a-token-for-tests"}, context_aware=False
