@@ -28,20 +28,12 @@ POISONS: dict[str, dict[str, Any]] = {  # what of `data_set` is other than of a 
     "standby alone": {"tail": '[twin]\neffects = ["standby_power"]'},
     "one joint at rest": {"joints": 1, "change": with_signals(q=0.0)},
 }
-
-
-@pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workspace with a robot `Good`, worked out from the data set beside it."""
-    folder = tmp_path_factory.mktemp("good")
-    done = irtwin("run", data_set(folder / "data", "Good"), "--workspace", folder / "workspace")
-    assert done.status == 0, done.err
-    return folder
+AT_NIGHT = ("no power", "standby alone", "one joint at rest")  # a run without power is in test_improvement, too
 
 
 @pytest.fixture
-def folder(good: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(good, tmp_path / "copy"))
+def folder(small_run: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(small_run, tmp_path / "copy"))
 
 
 def content(workspace: Path) -> dict[str, object]:
@@ -55,9 +47,9 @@ def content(workspace: Path) -> dict[str, object]:
         return {**files, "rows": dump, "graph": graph.triples()}
 
 
-@pytest.mark.parametrize("robot", ["Good", pytest.param("Bad", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("robot", ["Arm", pytest.param("Bad", marks=pytest.mark.nightly)])
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.nightly if kind == "standby alone" else ()) for kind in POISONS]
+    "kind", [pytest.param(kind, marks=pytest.mark.nightly if kind in AT_NIGHT else ()) for kind in POISONS]
 )
 def test_what_cannot_be_worked_out_changes_nothing(folder: Path, robot: str, kind: str) -> None:
     poison = data_set(folder / "poison", robot, seed=5, **POISONS[kind])
@@ -91,7 +83,7 @@ def test_a_bug_in_a_provider_changes_nothing(folder: Path, monkeypatch: pytest.M
     before = content(folder / "workspace")
     monkeypatch.setattr(planner, "load_provider", lambda name: buggy if name == "energy" else load_provider(name))
     with pytest.raises(ZeroDivisionError, match="a bug"):
-        irtwin("run", data_set(folder / "other", "Good", seed=5), "--workspace", folder / "workspace")
+        irtwin("run", data_set(folder / "other", "Arm", seed=5), "--workspace", folder / "workspace")
     assert content(folder / "workspace") == before
 
 
@@ -116,4 +108,4 @@ def test_two_names_in_other_scripts_are_two_robots(folder: Path) -> None:
         assert done.status == 0, done.err
         assert Path(done.out.strip()).is_file()
     names = irtwin("query", "SELECT ?name { ?r irt:IR_Name ?name }", "--workspace", folder / "workspace").out
-    assert all(name in names for name in ("机器人", "人器机", "R 1", "R_1", "Good"))
+    assert all(name in names for name in ("机器人", "人器机", "R 1", "R_1", "Arm"))
