@@ -10,6 +10,7 @@ import irtwin
 import irtwin.errors
 from irtwin import modelling
 from irtwin.workflow import unpack_demo
+from tests.small_robots import data_set
 
 
 @pytest.fixture(scope="module")
@@ -43,9 +44,10 @@ def test_effects_go_by_name():
 
 
 @pytest.mark.slow
-def test_a_prediction_can_be_kept(demo, tmp_path):
-    twin = irtwin.identify(irtwin.read_data_set(demo), effects=["rigid_body", "coulomb_friction", "viscous_friction"])
-    run = demo / "runs" / "exciting_1.parquet"
+def test_a_prediction_can_be_kept(tmp_path):
+    data = data_set(tmp_path / "data", "Arm")
+    twin = irtwin.identify(irtwin.read_data_set(data), effects=["rigid_body", "coulomb_friction", "viscous_friction"])
+    run = data / "runs" / "swing_1.parquet"
     table = irtwin.predict(twin, run, tmp_path / "out.parquet")
     assert pq.read_table(tmp_path / "out.parquet").equals(table)
     assert "power" not in table.column_names
