@@ -59,7 +59,9 @@ def open_page(
     path = folder / "scene.html"
     fragment = scene_html(robot, [run(robot), *more], title=title, meshes=meshes)
     path.write_text(PAGE.format(content_policy(fragment.scripts)) + fragment.html, encoding="utf-8")
-    page = browser.new_page(viewport={"width": 1366, "height": 768})
+    for earlier in browser.contexts:
+        earlier.close()  # which would draw on
+    page = browser.new_page(viewport={"width": 960, "height": 540})
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
     page.on("pageerror", lambda error: complaints.append(str(error)))
