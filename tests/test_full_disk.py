@@ -14,10 +14,17 @@ from tests.data_sets import irtwin
 from tests.small_robots import data_set
 
 pytestmark = pytest.mark.slow
+BY_DAY = (("run", 1), ("run", 40), ("backup", 40))
 
 
-@pytest.mark.parametrize("size", [1, 40, *(pytest.param(size, marks=pytest.mark.nightly) for size in (8, 200, 1000))])
-@pytest.mark.parametrize("command", ["run", "backup"])
+@pytest.mark.parametrize(
+    ("command", "size"),
+    [
+        pytest.param(command, size, marks=() if (command, size) in BY_DAY else pytest.mark.nightly)
+        for command in ("run", "backup")
+        for size in (1, 8, 40, 200, 1000)
+    ],
+)
 def test_a_full_disk_is_one_line(small_run: Path, tmp_path: Path, command: str, size: int) -> None:
     """size: kB that the longest file may have, so that each step of the way is met by one."""
     workspace = shutil.copytree(small_run / "workspace", tmp_path / "workspace")
