@@ -219,9 +219,9 @@ def test_a_users_mistake_exits_with_2(tmp_path, monkeypatch, arguments, message)
 
 
 def test_queries_cannot_reach_other_servers(workspace):
-    done = process("query", "SELECT * { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "--workspace", workspace)
-    assert done.returncode == 2
-    assert "SERVICE asks another server" in done.stderr
+    done = irtwin("query", "SELECT * { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "--workspace", workspace)
+    assert done.status == 2
+    assert "SERVICE asks another server" in done.err
 
 
 def test_the_map_command_writes_quads(workspace, tmp_path):
@@ -303,7 +303,8 @@ def test_each_command_on_a_workspace_says_where_rows_and_graph_are():
             assert options & {"--database", "--graph"} == HAS.get(name, {"--database", "--graph"}), name
 
 
-def test_a_graph_that_is_no_url_is_refused(tmp_path):
-    done = process("query", "ASK {}", "--graph", "somewhere", folder=tmp_path)
-    assert (done.returncode, "give the URL of a SPARQL server" in done.stderr) == (2, True), done.stderr
+def test_a_graph_that_is_no_url_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = irtwin("query", "ASK {}", "--graph", "somewhere")
+    assert (done.status, "give the URL of a SPARQL server" in done.err) == (2, True), done.err
     assert not list(tmp_path.iterdir())
