@@ -121,3 +121,15 @@ def test_a_damaged_list_of_sets_says_what_to_do(tmp_path: Path, text: str) -> No
 def test_folders_of_one_name_have_files_of_their_own() -> None:
     assert key("/plant/a/robot 1") != key("/plant/b/robot 1")
     assert key("/plant/a/robot 1").startswith("robot_1-")
+
+
+@pytest.mark.parametrize("name", ["records", "diagnoses"])
+def test_a_link_out_of_the_batch_is_told_and_not_followed(name: str, tmp_path: Path, asked: list[str]) -> None:
+    batch = _batch(tmp_path, "good")
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (batch.folder / name).symlink_to(outside)
+    with pytest.raises(InputError, match=f"the path '{name}/good-.*' leads outside"):
+        batch.work()
+        raise InputError(batch.records().__next__().said)
+    assert list(outside.iterdir()) == []

@@ -280,7 +280,7 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     checks_itself = CollisionModel(robot).checks_itself
     expected = excitation.expected_seconds(len(robot.joints), seconds)
     if expected > _LONG:
-        announce(f"{len(robot.joints)} joints: about {10 * round(expected / 10)} s of processor")
+        announce(f"  {len(robot.joints)} joints: about {10 * round(expected / 10)} s of processor")
     motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
     motion.write_csv(out)
     _say_unchecked(checks_itself)

@@ -18,7 +18,7 @@ from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.data_sets import at_hand, checksum
 from irtwin.input_file import read_input
 from irtwin.json_text import parse_json
-from irtwin.storage.files import write
+from irtwin.storage.files import InsidePath, inside, write
 
 RUN, DIAGNOSE = "run", "diagnose"
 BEGUN, DONE, REFUSED, FAILED = "begun", "done", "refused", "failed"
@@ -92,7 +92,7 @@ class Batch:
         return None if found is None else str(found)
 
     def _sets(self) -> dict[str, Any]:
-        file = self.folder / _SETS
+        file = self._inside(_SETS)
         try:
             found = parse_json(read_input(file, _MOST_BYTES))
             sound = isinstance(found, dict) and isinstance(found.get("data_sets"), list)
@@ -106,8 +106,9 @@ class Batch:
 
     def record(self, place: str) -> Record | None:
         """Return what is known of a data set; None where it was never begun, or its record is damaged."""
+        file = self._record_file(place)
         try:
-            found = Record(**parse_json(read_input(self._record_file(place), _MOST_BYTES)))
+            found = Record(**parse_json(read_input(file, _MOST_BYTES)))
         except (InputError, ValueError, TypeError):
             return None  # it is tried again
         sound = all(isinstance(own, type(usual)) for own, usual in zip(astuple(found), astuple(_USUAL), strict=True))
@@ -117,8 +118,12 @@ class Batch:
         """Yield the record of each data set."""
         yield from map(self.record, self.places)
 
-    def _record_file(self, place: str) -> Path:
-        return self.folder / "records" / f"{key(place)}.json"
+    def _inside(self, path: str) -> InsidePath:
+        """Return a file of the batch. Raises InputError where a link leads out of it."""
+        return inside(self.folder, path)
+
+    def _record_file(self, place: str) -> InsidePath:
+        return self._inside(f"records/{key(place)}.json")
 
     def _write(self, record: Record) -> None:
         write(self._record_file(record.data_set), json.dumps(asdict(record), indent=1).encode())
@@ -136,7 +141,7 @@ class Batch:
     @contextmanager
     def _alone(self) -> Iterator[None]:
         try:
-            lock = (self.folder / "lock").open("w")
+            lock = self._inside("lock").open("w")
         except OSError as error:
             raise InputError(f"{self.folder / 'lock'}: cannot be written ({error.strerror}); remove it") from error
         with lock:
@@ -166,13 +171,13 @@ class Batch:
         """Return the state that a data set has come to, and what is to be said of it."""
         from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
 
-        trace = self.folder / "records" / f"{key(place)}.traceback.txt"
+        trace = self._inside(f"records/{key(place)}.traceback.txt")
         trace.unlink(missing_ok=True)
         try:
             if kind == RUN:
-                workflow.run(data_set, self.folder / "workspace", base=self.base, series_url=self.series_url)
+                workflow.run(data_set, self._inside("workspace"), base=self.base, series_url=self.series_url)
             else:
-                results = self.folder / "diagnoses" / key(place)
+                results = self._inside(f"diagnoses/{key(place)}")
                 workflow.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
         except WorkspaceFault as error:  # no fault of the data set: the next call tries again
             return FAILED, str(error)

@@ -17,6 +17,7 @@ from irtwin.fleet.batch import DONE, FAILED, REFUSED, Batch, Record
 from irtwin.fleet.data_sets import find_data_sets
 from irtwin.fleet.schedule import work_here, work_on_cluster
 from irtwin.storage import base_iri
+from irtwin.storage.files import inside
 from irtwin.storage.object_storage import checked_url
 from irtwin.storage.series_place import look
 
@@ -136,7 +137,7 @@ def _plan(
 
 def batches_of(folder: Path) -> list[Batch]:
     """Return the batches in a fleet's folder."""
-    return [Batch(file.parent) for file in sorted(folder.glob("*/sets.json"))]
+    return [Batch(inside(folder, file.parent.name)) for file in sorted(folder.glob("*/sets.json"))]
 
 
 def status_of(batches: Sequence[Batch]) -> Status:
