@@ -6,7 +6,7 @@ from base64 import b64decode
 import numpy as np
 import pytest
 
-from irtwin.packing import embedded_json, pack, packed_scripts
+from irtwin.packing import embedded_json, extremes, pack, packed_scripts
 from tests.virtual.scene_data import HOSTILE, unpack
 
 
@@ -40,3 +40,22 @@ def test_json_cannot_break_out_of_its_element():
     text = embedded_json({HOSTILE: "\u2028&"})
     assert not set(text) & set("<>&\u2028")
     assert json.loads(text) == {HOSTILE: "\u2028&"}
+
+
+def test_a_spike_of_one_sample_survives_in_either_signal():
+    measured, modelled = np.zeros(100_000), np.zeros(100_000)
+    measured[31_415], modelled[27_182] = 1.0, -1.0
+    kept = extremes([measured, modelled], 500)
+    assert len(kept) <= 500
+    assert {31_415, 27_182, 0, 99_999} <= set(kept)
+    assert np.all(np.diff(kept) > 0)
+
+
+def test_few_samples_are_all_kept():
+    assert extremes([np.arange(10.0)], 10).tolist() == list(range(10))
+
+
+@pytest.mark.parametrize("count", [11, 999, 1001, 4_999])
+def test_indices_stay_inside_whatever_the_count(count: int):
+    kept = extremes([np.sin(np.arange(count)), np.full(count, np.nan)], 10)
+    assert kept[0] == 0 and kept[-1] == count - 1 and len(kept) <= 10

@@ -3,33 +3,9 @@
 (function () {
   const page = JSON.parse(document.getElementById("page-data").textContent);
   const COLOURS = page.colours;
-  const DARK = matchMedia("(prefers-color-scheme: dark)"), root = getComputedStyle(document.documentElement);
-  const LIGHT = { ink: "#1c2733", soft: "#56636f", line: "#e3e8ec", axis: "#9aa5af", paper: "#ffffff" };
-  let theme = LIGHT;
-  const FONT = getComputedStyle(document.body).fontFamily;
+  const { DARK, CONFIG, base, chooseTheme, plain } = window.irtwinPlotting;
   const PAPER_WIDTH = 680; // CSS pixels between the margins of an A4 page
-  // A chart leaves the page as a picture that its reader saves, and in no other way.
-  const BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]];
-  const CONFIG = { displaylogo: false, responsive: true, showSendToCloud: false, showEditInChartStudio: false, modeBarButtons: BUTTONS };
-
-  function chooseTheme(forPaper) {
-    const of = (name) => root.getPropertyValue("--" + name).trim();
-    theme = forPaper || !DARK.matches ? LIGHT : { ink: of("ink"), soft: of("soft"), line: of("line"), axis: of("faint"), paper: of("paper") };
-  }
-
-  function base(extra) {
-    const axis = { gridcolor: theme.line, zerolinecolor: theme.axis, linecolor: theme.axis, automargin: true, title: { standoff: 8 } };
-    const layout = {
-      font: { family: FONT, size: 12, color: theme.ink }, paper_bgcolor: theme.paper, plot_bgcolor: theme.paper,
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.axis, activecolor: theme.ink },
-      margin: { l: 56, r: 12, t: 30, b: 40 }, hovermode: "x unified",
-      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", xanchor: "left", font: { color: theme.soft } },
-    };
-    Object.assign(layout, extra);
-    layout.xaxis = Object.assign({ type: "category" }, axis, { gridcolor: theme.paper }, extra.xaxis);
-    layout.yaxis = Object.assign({}, axis, extra.yaxis);
-    return layout;
-  }
+  let theme = chooseTheme(false);
 
   function values(packed) {
     const text = atob(packed.data), count = text.length / 2, result = new Array(count);
@@ -84,15 +60,11 @@
       });
       heldOut.forEach((span) => layout.shapes.push({
         type: "rect", xref: "x" + suffix, yref: "y" + suffix + " domain", x0: span[0], x1: span[1], y0: 0, y1: 1,
-        fillcolor: COLOURS.held_out, opacity: theme === LIGHT ? 0.07 : 0.18, line: { width: 0 }, layer: "below",
+        fillcolor: COLOURS.held_out, opacity: DARK.matches ? 0.18 : 0.07, line: { width: 0 }, layer: "below",
       }));
       data.push.apply(data, curves(chart, chart.unit, suffix, index === 0));
     });
     return { data: data, layout: layout };
-  }
-
-  function plain(text) {
-    return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
   }
 
   const PARTS = { planned: "planned: what the twin expects of it", held_out: "held out: no sample of it was fitted", both: "fitted in part, the rest held out", fit: "took part in the fit" };
@@ -165,7 +137,7 @@
   }
 
   function drawAll(forPaper) {
-    chooseTheme(forPaper);
+    theme = chooseTheme(forPaper);
     for (const holder of document.querySelectorAll("[data-figure]")) {
       const figure = page.figures[holder.dataset.figure];
       const several = figure.data.length > 1, bars = new Set(figure.data.flatMap((trace) => trace.x)).size;

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from tests.endpoint import Server, make_graph, serving
 from tests.plants import make_plant
@@ -35,12 +38,23 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("plant")
     graph = make_plant(folder)
     (folder / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\n', encoding="utf-8")
+    for run in ("fit_1", "check_1"):
+        write_samples(folder / "series" / f"Arm_A.{run}")
     (folder / "reports").mkdir()
     (folder / "reports/Arm_A.html").write_text(REPORT, encoding="utf-8")
     (folder / "reports/Arm_A.gap.html").write_text(REPORT, encoding="utf-8")
     (folder / "reports/out.html").symlink_to("/etc/hostname")
     with serving(graph, token=None) as running:
         yield running
+
+
+def write_samples(path: Path) -> None:
+    """Write a run's samples, more than a curve holds: they begin at 5 s, and power has a peak of 900 W at 12.345 s."""
+    time = 5.0 + np.arange(10_000) / 1000
+    power = np.where(np.arange(10_000) == 7345, 900.0, 300.0)
+    path.parent.mkdir(exist_ok=True)
+    pq.write_table(pa.table({"time": time, "q_j1": np.sin(time), "power": power}), f"{path}.parquet")
+    pq.write_table(pa.table({"time": time, "power_model": power - 20.0}), f"{path}.model.parquet")
 
 
 REPORT = """<!DOCTYPE html><title>Arm_A</title><p id="said">nothing</p><script>

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -47,14 +48,25 @@ class Elements(HTMLParser):
 
 
 @pytest.mark.parametrize("path", PAGES)
-def test_a_page_has_no_script_and_no_style_within(plant: Server, path: str) -> None:
+def test_a_page_has_no_style_within_and_no_script_but_those_that_draw_runs(plant: Server, path: str) -> None:
     response = CLIENT.get(plant.url + path, headers=BROWSER)
     assert (response.status_code, response.headers["content-type"]) == (200, "text/html; charset=utf-8")
-    assert "script-src" not in response.headers["content-security-policy"]
-    assert "default-src 'none'" in response.headers["content-security-policy"]
-    elements = Elements(response.text)
-    assert "script" not in elements.names and "style" not in elements.names | elements.attributes
+    policy, elements = response.headers["content-security-policy"], Elements(response.text)
+    assert "default-src 'none'" in policy
+    draws = path.startswith("/run/") or "by=run" in path
+    assert ("script-src 'self';" in policy) is ("script-src" in policy) is draws
+    assert re.findall("<script[^>]*>[^<]*", response.text) == [
+        f'<script src="/assets/{name}.js">' for name in ("plotly", "plotting", "curves") if draws
+    ]
+    assert "style" not in elements.names | elements.attributes
     assert not [name for name in elements.attributes if name.startswith("on")]
+
+
+def test_curves_are_answered_by_a_worker(plant: Server) -> None:
+    query = "SELECT (series:curve(id:run\\/Arm_A.fit_1, 'power', 0, 1e9) AS ?curve) { }"
+    (row,) = plant.ask(query, Accept="application/sparql-results+json").json()["results"]["bindings"]
+    curve = json.loads(row["curve"]["value"])
+    assert 600 < len(curve) <= 2000 and [12.345, 900.0] in [[round(at, 6), value] for at, value in curve]
 
 
 @pytest.mark.parametrize("path", ["/", "/robot/Arm_D", "/run/Arm_D.first", "/irtwin/id/robot/Arm_D/information"])

@@ -42,6 +42,18 @@ def series(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
         return SeriesWindows(folder / write_series(folder, table).path), power
 
 
+def test_a_curve_is_all_samples_or_the_extremes_of_them(tmp_path: Path) -> None:
+    time, spike = np.arange(50_000) / 100, np.zeros(50_000)
+    spike[31_415] = 1 / 3
+    file = SeriesWindows(tmp_path / write_series(tmp_path, pa.table({"time": time, "x": spike, "on": spike > 0})).path)
+    curve = file.curve("x", 0, 1e9)
+    assert len(curve) <= windows.MOST_DRAWN and (314.15, 0.3333333) in curve and curve == sorted(curve)
+    assert file.curve("on", 314.13, 314.15) == [(314.13, 0.0), (314.14, 0.0), (314.15, 1.0)]
+    assert file.curve("x", 1e6, 1e9) == []
+    with pytest.raises(InputError, match="no channel 'y'"):
+        file.curve("y", 0, 1)
+
+
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(one=MOMENT, other=MOMENT)
 def test_mean_and_extremes_are_those_of_the_samples(series: Known, one: float, other: float) -> None:

@@ -16,7 +16,7 @@ from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs, load_run, load_twin, twin_iri
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.signals.conditioning import condition
-from irtwin.signals.motion import Motion
+from irtwin.signals.motion import Motion, standstill
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS
@@ -172,14 +172,14 @@ def held_out(role: schema.TwinRun, motion: Motion) -> np.ndarray:
 
 
 def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
-    """Return measured (filtered) and modelled torque, power and energy side by side, a row a sample.
+    """Return filtered motion, and measured and modelled torque, power and energy side by side, a row a sample.
 
-    Columns: time, held_out, q_J, tau_J, tau_J_model, power, power_model, energy, energy_model; those that nothing
-    measured are left out. Energies are cumulative, J.
+    Columns: time, held_out, standing (no joint moves), q_J, dq_J, tau_J, tau_J_model, power, power_model, energy,
+    energy_model; those that nothing measured are left out. Energies are cumulative, J.
     """
     names = twin.robot.joint_names
-    measured = Signals(motion.time, motion.q, torque=twin.measured_torque(motion))
-    columns = {"time": motion.time, "held_out": judged, **columns_of(measured, names)}
+    measured = Signals(motion.time, motion.q, dq=motion.dq, torque=twin.measured_torque(motion))
+    columns = {"time": motion.time, "held_out": judged, "standing": standstill(motion), **columns_of(measured, names)}
     columns |= {
         f"{CHANNELS['torque'].column(name)}_model": of for name, of in zip(names, twin.torque(motion).T, strict=True)
     }

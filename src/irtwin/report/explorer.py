@@ -10,8 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from irtwin.errors import InputError
-from irtwin.packing import pack
-from irtwin.report.energy.sampling import Samples, extremes
+from irtwin.packing import Samples, extremes, pack
 from irtwin.report.questions import Answers, Row
 from irtwin.signals.channels import CHANNELS
 

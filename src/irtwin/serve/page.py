@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import prefixes
-from irtwin.report.energy.page import plotly
+from irtwin.report.energy.page import plotly, script
 from irtwin.report.heading import UNITS, WORDS
 from irtwin.report.plant.page import style as plant_style
 from irtwin.resources import Resources
@@ -28,6 +28,7 @@ POLICY = (
 FOLDER = Path(__file__).parent / "assets"
 _TYPES = {
     "answer.js": "text/javascript",
+    "curves.js": "text/javascript",
     "live.css": "text/css",
     "live.js": "text/javascript",
     "live_list.js": "text/javascript",
@@ -35,6 +36,7 @@ _TYPES = {
     "plant.css": "text/css",
     "plot.js": "text/javascript",
     "plotly.js": "text/javascript",
+    "plotting.js": "text/javascript",
     "query.css": "text/css",
     "query.js": "text/javascript",
     "robot.js": "text/javascript",
@@ -45,6 +47,7 @@ _MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
     "meshcat.js": viewer_script,
     "plant.css": plant_style,
     "plotly.js": plotly,
+    "plotting.js": partial(script, "layout/plotting.js"),
     "robot.js": partial(scene_asset, "robot.js"),
 }
 

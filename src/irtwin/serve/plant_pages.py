@@ -13,7 +13,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
-from irtwin.report.plant import comparison, links, overview, page, robot, sheet
+from irtwin.report.plant import comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.plant.tariff import Tariff, read_tariff
@@ -27,6 +27,10 @@ from irtwin.storage.database import TARIFF
 POLICY = (
     "default-src 'none'; style-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'self'; "
     "frame-ancestors 'none'"
+)
+# Of a page with curves: scripts of our own files, which ask the endpoint; Plotly styles what it draws.
+WITH_CURVES = POLICY.replace(
+    "style-src 'self'", "script-src 'self'; connect-src 'self'; style-src 'self' 'unsafe-inline'"
 )
 
 
@@ -76,22 +80,26 @@ class PlantPages:
         answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
         (run,) = answers["run"].rows
         said = self._beside(request) | self._reports.of_robot(self._links.tail(run["robot"]))
+        said["curves"] = curves.of_run(answers)
         return await html(
-            lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said)
+            lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said),
+            WITH_CURVES if said["curves"] else POLICY,
         )
 
     async def _compare(self, request: Request) -> Response:
-        trouble = ""
+        trouble, drawn = "", None
         try:
             found, answers = await self._compared(request)
+            drawn = None if found is None else await self._both_logs(request)
         except InputError as error:
             found, trouble = None, str(error)
             answers = await self._choice(request)
-        said = self._beside(request)
+        said = {**self._beside(request), "curves": drawn}
         bindings = {"robot": self._individual("robot", request.query_params.get("robot", ""))}
         said |= {"asked": dict(request.query_params), "query": request.url.query, "found": found}
         said |= {"trouble": trouble} if trouble else {}
-        return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **said))
+        policy = WITH_CURVES if drawn else POLICY
+        return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **said), policy)
 
     async def _robots_table(self, request: Request) -> Response:
         answers = await self._asking.answers(request, page.questions(), {})
@@ -136,6 +144,17 @@ class PlantPages:
             for one in sides if one is not None
         ]  # fmt: skip
         return comparison.comparison(before, after), {**answers, **before}
+
+    async def _both_logs(self, request: Request) -> dict[str, Any] | None:
+        """Return what is drawn of two runs over each other, None where it is not runs that are compared."""
+        sides = [comparison.side(request.query_params, which, self._asking.base) for which in ("a", "b")]
+        runs = [one.run for one in sides if one is not None and one.run is not None]
+        asked = {name: page.questions("run")[name] for name in ("run", "series", "joints")}
+        known = [await self._known(request, asked, {"run": run}, "run") for run in runs]
+        drawn = [
+            curves.Drawn(run, of["run"].rows[0]["name"], of["series"].rows) for run, of in zip(runs, known, strict=True)
+        ]
+        return curves.curves(drawn, known[0]["joints"].rows) if drawn else None
 
     async def _choice(self, request: Request) -> Answers:
         """Return the robot that is compared, and its runs."""
@@ -186,9 +205,9 @@ def _iris(bindings: Bindings) -> Bindings:
         raise Refusal(404, "no run has this name") from None
 
 
-async def html(drawn: Callable[[], str]) -> Response:
+async def html(drawn: Callable[[], str], policy: str = POLICY) -> Response:
     """Draw a page beside the server's other work, and return it."""
-    headers = {"Content-Security-Policy": POLICY, "Cache-Control": "no-cache", "Vary": "Accept"}
+    headers = {"Content-Security-Policy": policy, "Cache-Control": "no-cache", "Vary": "Accept"}
     return Response(await asyncio.to_thread(drawn), media_type="text/html", headers=headers)
 
 

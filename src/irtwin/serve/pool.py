@@ -64,7 +64,8 @@ class Worker:
             *(sys.executable, "-m", "irtwin.serve.worker", *arguments),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
-            env={**os.environ, "RUST_BACKTRACE": "0"},  # memory that cannot be had is no bug to trace
+            # Memory that cannot be had is no bug to trace; Arrow's own pool would take 1 GB at once, a worker's all.
+            env={**os.environ, "RUST_BACKTRACE": "0", "ARROW_DEFAULT_MEMORY_POOL": "system"},
             start_new_session=True,  # Ctrl-C in the terminal is the server's alone
         )
         worker = cls(process, limits)

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
+from irtwin.packing import extremes
 from irtwin.storage.files import inside
 from irtwin.storage.object_storage import ObjectStorage
 from irtwin.storage.series import storage_of
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import duckdb  # a tenth of a second to import, for those who ask for samples
 
 MOST_SAMPLES = 10_000
+MOST_DRAWN = 2_000  # of a curve: more than a screen is wide
 Extreme = Literal["min", "max"]
 
 
@@ -89,6 +91,18 @@ class SeriesWindows:
             )
         return list(zip(time.tolist(), values.tolist(), strict=True))
 
+    def curve(self, channel: str, start: float, end: float) -> list[tuple[float, float]]:
+        """Return time and value of at most `MOST_DRAWN` samples in a window, in order, for the eye.
+
+        Of more, it is the least and the greatest of each of as many equal parts as fit; values have seven digits.
+        """
+        self._check(channel)
+        time, values = self._samples(channel, start, end)
+        kept = extremes([values], MOST_DRAWN) if len(time) else slice(0)
+        return [
+            (at, float(f"{value:.7g}")) for at, value in zip(time[kept].tolist(), values[kept].tolist(), strict=True)
+        ]
+
     def _totals(self, channel: str, start: float, end: float) -> tuple[int, float, float, float]:
         """Return count, sum, least and greatest of a window's samples."""
         ranges, whole = [(start, end)], slice(0)
@@ -138,9 +152,9 @@ class SeriesWindows:
 
     def _samples_of(self, channel: str) -> str:
         """Return the query of a window's samples; those of a channel with a summary are all finite."""
-        name = '"' + channel.replace('"', '""') + '"'
-        finite = "" if self._known(channel) else f" AND isfinite({name})"
-        return f"SELECT time, {name} AS value FROM read_parquet(?) WHERE time BETWEEN ? AND ?{finite}"
+        value = '"' + channel.replace('"', '""') + '"::DOUBLE'  # of yes and no, 1 and 0
+        finite = "" if self._known(channel) else f" AND isfinite({value})"
+        return f"SELECT time, {value} AS value FROM read_parquet(?) WHERE time BETWEEN ? AND ?{finite}"
 
     def _known(self, channel: str) -> tuple[Summary, Channel] | None:
         self._check(channel)

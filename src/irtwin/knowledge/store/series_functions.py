@@ -33,6 +33,7 @@ _ASKED: Mapping[str, Callable[[SeriesWindows, str, float, float], Answer]] = {
     "max": lambda series, *window: series.extreme("max", *window),
     "integral": lambda series, *window: series.integral(*window),
     "samples": lambda series, *window: series.samples(*window),
+    "curve": lambda series, *window: series.curve(*window),
 }
 
 

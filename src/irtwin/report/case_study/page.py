@@ -10,13 +10,13 @@ from markupsafe import Markup
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.packing import Fragment, packed_scripts
+from irtwin.packing import Fragment
 from irtwin.report.case_study.figures import figures
-from irtwin.report.energy.page import DrawScene, content_policy, page_data, plotly
+from irtwin.report.energy.page import DrawScene, content_policy, figure_scripts, page_data
 from irtwin.report.explorer import Columns, ReadSeries
 from irtwin.report.questions import Answers, Row, ask, questions_of
 from irtwin.report.templates import style, written
-from irtwin.resources import folder, shipped
+from irtwin.resources import shipped
 from irtwin.storage.files import InsidePath, write
 
 # Yan 2018, equations (13) to (15)
@@ -48,13 +48,7 @@ def render(
 
 def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment, base: str) -> str:
     drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
-    scripts = packed_scripts(
-        [
-            plotly(),
-            (folder("reports") / "layout" / "figures.js").read_text(encoding="utf-8"),
-            (folder("reports") / "case_study" / "configurations.js").read_text(encoding="utf-8"),
-        ]
-    )
+    scripts = figure_scripts("case_study/configurations.js")
     return written(
         shipped(),
         "case_study/page.html.jinja",

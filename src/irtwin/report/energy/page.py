@@ -100,10 +100,15 @@ def _page(
     )  # fmt: skip
 
 
-def figure_scripts() -> Fragment:
-    """Return the scripts that draw a page's figures."""
-    drawing = folder("reports") / "layout" / "figures.js"
-    return packed_scripts([plotly(), drawing.read_text(encoding="utf-8")])
+def figure_scripts(*more: str) -> Fragment:
+    """Return the scripts that draw a page's figures, and others that it has, by their paths in `reports`."""
+    own = (script(name) for name in ("layout/plotting.js", "layout/figures.js", *more))
+    return packed_scripts([plotly(), *own])
+
+
+def script(name: str) -> str:
+    """Return a script by its path in `reports`."""
+    return (folder("reports") / name).read_text(encoding="utf-8")
 
 
 def page_data(drawn: Mapping[str, Figure], curves: Mapping[str, Any] | None = None) -> Markup:

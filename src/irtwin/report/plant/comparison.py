@@ -15,6 +15,7 @@ from irtwin.report.plant.energies import Kind, kind, share
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Row
 
+_LITTLE = 1e-4  # of the greater side
 _ALWAYS = ("0001-01-01", "9999-12-31")
 
 
@@ -45,6 +46,13 @@ class Pair:
     def difference(self) -> float | None:
         """After less before."""
         return None if self.before is None or self.after is None else self.after - self.before
+
+    @property
+    def same(self) -> bool:
+        """Whether the sides differ by nothing that anybody would tell."""
+        return self.difference is not None and abs(self.difference) <= _LITTLE * max(
+            abs(self.before or 0.0), abs(self.after or 0.0)
+        )
 
     @property
     def percent(self) -> float | None:

@@ -36,7 +36,9 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
     """Return a page; `answers` and `bindings` are shown as the questions behind it, links are those of `base`."""
     template = _templates(said.get("base", ID)).get_template(f"plant/{name}")
     rows = {question: answer.rows for question, answer in answers.items()}
-    return template.render(answers=answers, rows=rows, bindings=bindings, **{"number": 1, "graph_stands": None, **said})
+    return template.render(
+        answers=answers, rows=rows, bindings=bindings, **{"number": 1, "graph_stands": None, "curves": None, **said}
+    )
 
 
 @cache

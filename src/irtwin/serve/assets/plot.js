@@ -1,12 +1,9 @@
 "use strict";
 // A plot of an answer: a column of numbers over another column, a colour for each value of a third.
 (function () {
-  const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#7F8C99"]; // report/colours.py
+  const { DARK, CONFIG, PALETTE, base, chooseTheme, plain } = window.irtwinPlotting;
   const MOST_COLOURS = 24;
-  const DARK = matchMedia("(prefers-color-scheme: dark)");
   const DATE = /^\d{4}-\d{2}(-\d{2})?(T[\d:.]+(Z|[+-]\d{2}:\d{2})?)?$/;
-  const BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]];
-  const CONFIG = { displaylogo: false, responsive: true, showSendToCloud: false, showEditInChartStudio: false, modeBarButtons: BUTTONS };
   let library = null;
 
   function plotly() {
@@ -17,8 +14,6 @@
     });
     return library;
   }
-
-  const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 
   // Returns an element that is closed at first, or null where no column has numbers.
   window.irtwinPlot = function ({ names, rows, numeric, heading, short }) {
@@ -75,18 +70,14 @@
       if (!place.open) return;
       let library;
       try { library = await plotly(); } catch { drawing.textContent = "The plot cannot be drawn: its script did not come. Load the page again."; return; }
-      const style = getComputedStyle(document.documentElement), of = (name) => style.getPropertyValue("--" + name).trim();
-      const axis = { gridcolor: of("line"), zerolinecolor: of("faint"), linecolor: of("faint"), automargin: true };
+      chooseTheme(false);
       const title = (name) => ({ text: plain(heading(name)), standoff: 10 });
       const kind = numeric.has(x.value) ? "linear" : isTime(x.value) ? "date" : "category";
       drawing.setAttribute("aria-label", `Plot of ${heading(y.value)} over ${heading(x.value)}; the table below has its numbers`);
-      const layout = {
-        font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: of("ink") }, height: 380,
-        paper_bgcolor: of("paper"), plot_bgcolor: of("paper"), margin: { l: 56, r: 12, t: 40, b: 56 }, hovermode: "closest", barmode: "group",
-        modebar: { bgcolor: "rgba(0,0,0,0)", color: of("faint"), activecolor: of("ink") }, showlegend: Boolean(by.value),
-        legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { color: of("soft") } },
-        xaxis: { ...axis, type: kind, title: title(x.value) }, yaxis: { ...axis, title: title(y.value) },
-      };
+      const layout = base({
+        height: 380, margin: { l: 56, r: 12, t: 40, b: 56 }, hovermode: "closest", barmode: "group", showlegend: Boolean(by.value),
+        xaxis: { type: kind, title: title(x.value) }, yaxis: { title: title(y.value) },
+      });
       await library.react(drawing, traces(), layout, CONFIG);
     }
 

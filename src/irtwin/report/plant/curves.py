@@ -1,0 +1,121 @@
+"""Which curves a page draws of runs: a panel for each quantity, a line for each joint and each run.
+
+The page's script asks for their samples by `series:curve`, as any client may.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from irtwin.report import wording
+from irtwin.report.questions import Answers, Row
+from irtwin.signals.channels import CHANNELS, Channel
+
+MEASURED, MODELLED = "measured", "modelled"
+_MODEL = "_model"
+_FIRST = ("power", "torque", "q", "command", "dq")  # what people look at first; other channels follow
+_SPANS = ("standing", "held_out")  # columns of yes and no, drawn as shades
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve: `channel` of the series `kind` of a run, told by its place; `joint` is empty of the whole robot."""
+
+    run: int
+    kind: str
+    channel: str
+    joint: str
+    name: str
+    modelled: bool = False
+
+
+@dataclass
+class Panel:
+    """Lines of one quantity; samples times `scale` are in `unit`."""
+
+    title: str
+    unit: str
+    scale: float
+    lines: list[Line] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A run as it is drawn: `series` its rows of `series.rq`, `marks` what happened in it, (s since it began, what)."""
+
+    iri: str
+    name: str
+    series: Sequence[Row]
+    marks: Sequence[tuple[float, str]] = ()
+
+
+def of_run(answers: Answers) -> dict[str, Any] | None:
+    """Return what the page of a run draws, None where it has no samples."""
+    run = answers["run"].first
+    assert run is not None
+    marks = [
+        ((row["since"] - run["began"]).total_seconds(), row["reason"]) for row in answers["alarms"].rows if run["began"]
+    ]
+    return curves([Drawn(run["run"], run["name"], answers["series"].rows, marks)], answers["joints"].rows)
+
+
+def curves(runs: Sequence[Drawn], joints: Iterable[Row]) -> dict[str, Any] | None:
+    """Return what a page's script draws of runs of one robot, None where they have no samples.
+
+    Of several runs it is what was measured alone: they are drawn over each other.
+    """
+    kinds = {row["joint_name"]: row["kind"] or "" for row in joints}
+    panels: dict[tuple[str, str], Panel] = {}
+    for number, run in enumerate(runs):
+        for line, field_, channel in _lines(number, run, tuple(kinds), alone=len(runs) == 1):
+            unit, scale = _unit(channel, kinds.get(line.joint, ""))
+            title = CHANNELS["q"].label if field_ == "command" else channel.label
+            panels.setdefault((title, unit), Panel(title, unit, scale)).lines.append(line)
+    if not panels:
+        return None
+    there = {name for row in runs[0].series if row["kind"] == MODELLED for name in _columns(row)}
+    spans = [{"run": 0, "channel": name} for name in _SPANS if len(runs) == 1 and name in there]
+    return {
+        "runs": [{"iri": run.iri, "name": run.name, "marks": run.marks} for run in runs],
+        "joints": list(kinds),
+        "panels": [asdict(panel) for panel in panels.values()],
+        "spans": spans,
+    }
+
+
+def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Iterable[tuple[Line, str, Channel]]:
+    """Yield the lines of a run in the order of their panels: measured, then what only the twin's series has."""
+    has = {kind: set[str]() for kind in (MEASURED, MODELLED)}
+    for row in run.series:
+        has.setdefault(row["kind"], set()).update(_columns(row))
+    fields = sorted(CHANNELS, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+    for name in fields:
+        channel = CHANNELS[name]
+        if name == "time":
+            continue
+        for joint in joints if channel.per_joint else ("",):
+            column = channel.column(joint)
+            said = joint or run.name if not alone else joint or MEASURED
+            kind = next((kind for kind in (MEASURED, *has) if column in has[kind]), None)
+            if kind is not None:
+                yield Line(number, kind, column, joint, said, name == "command"), name, channel
+            if alone and f"{column}{_MODEL}" in has[MODELLED]:
+                said = f"{joint}, by the twin" if joint else "by the twin"
+                yield Line(number, MODELLED, f"{column}{_MODEL}", joint, said, True), name, channel
+
+
+def _columns(row: Row) -> list[str]:
+    return (row["columns"] or "").split(",")
+
+
+def _unit(channel: Channel, kind: str) -> tuple[str, float]:
+    """Return the unit that people read a channel in, and what SI is multiplied by for it."""
+    unit = channel.unit_of(kind)
+    if unit.startswith("rad"):
+        return unit.replace("rad", "°").replace("^2", "²"), 180.0 / math.pi
+    if unit.startswith("m") and channel.sliding == unit:
+        return f"m{unit}".replace("^2", "²"), 1000.0
+    return wording.unit_symbol(unit), 1.0
