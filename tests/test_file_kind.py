@@ -17,6 +17,9 @@ DATA_SET = '[robot]\nname = "Arm"\n[[run]]\nfile = "a.csv"\nrole = "reference"\n
     ("name", "content", "what", "command"),
     [
         ("log.CSV", "time,q", "a log", "irtwin import "),
+        ("log.csv", "t,power,q_1", "a log", "irtwin import "),
+        ("meter.csv", "Zeit;Wirkleistung [kW]", "a meter's log: power or energy, and no joint", "irtwin import "),
+        ("meter.csv", "time,energy_kWh", "a meter's log: power or energy, and no joint", "irtwin import "),
         ("arm.urdf", "<robot/>", "a robot's description", "irtwin import LOG --robot "),
         ("arm.xml", "<robot/>", "a robot's description", "irtwin import LOG --robot "),
         ("model.xml", "<!-- x --><mujoco/>", "a model of MuJoCo", "irtwin diagnose DATASET --simulator "),

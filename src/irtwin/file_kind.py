@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from irtwin.bring.metered import is_metered
 from irtwin.bring.recording import BAGS, SHEETS
 from irtwin.errors import InputError
 from irtwin.input_file import check_file
 from irtwin.storage.database import Workspace
 from irtwin.toml_text import read_toml
 
-_LOGS = (".csv", ".tsv", ".txt", ".parquet", *SHEETS, *BAGS)
+_TEXTS = (".csv", ".tsv", ".txt")
+_LOGS = (*_TEXTS, ".parquet", *SHEETS, *BAGS)
 _GRAPHS = (".ttl", ".owl", ".rdf", ".nt", ".nq", ".trig", ".jsonld")
 _HEAD = 4096  # bytes that tell a URDF from a model of MuJoCo
 
@@ -32,6 +35,16 @@ def file_kind(path: Path) -> FileKind:
     shown, suffix = shlex.quote(str(path)), path.suffix.lower()
     if path.is_dir():
         return _folder(path, shown)
+    if suffix in _TEXTS and is_metered(names_of(path)):
+        return FileKind(
+            "a meter's log: power or energy, and no joint",
+            (
+                (
+                    f"irtwin import {shown} --out FOLDER",
+                    "makes a data set of it, for `irtwin run FOLDER`: load, standby, cycles and cost, without a twin",
+                ),
+            ),
+        )
     if suffix in _LOGS:
         return FileKind(
             "a log",
@@ -66,6 +79,14 @@ def file_kind(path: Path) -> FileKind:
         f"{path}: neither a data set, a workspace, a log ({', '.join(_LOGS)}), a robot (.urdf), a model of MuJoCo "
         "(.xml), a twin (.json) nor an archive (.zip); `irtwin --help` lists what can be done"
     )
+
+
+def names_of(path: Path) -> list[str]:
+    """Return the names in the first line of a text. Raises InputError where it is no file that can be read."""
+    check_file(path)
+    with path.open("rb") as file:
+        first = file.readline(_HEAD).decode("utf-8", errors="replace")
+    return [name.strip().strip('"') for name in re.split(r"[;,\t]", first)]
 
 
 def _folder(path: Path, shown: str) -> FileKind:

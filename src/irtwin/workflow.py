@@ -35,7 +35,16 @@ from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.planner import populate
-from irtwin.providers.records import check_name, check_plans, find_robot, identifier, ingest, known_twin, robot_iri
+from irtwin.providers.records import (
+    check_name,
+    check_plans,
+    find_robot,
+    identifier,
+    ingest,
+    is_described,
+    known_twin,
+    robot_iri,
+)
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
@@ -89,7 +98,7 @@ def run(
             graph.load_ontology()
             map_rows(place, graph)
             conclude(graph, announce)
-            following = next_experiment(place, graph, robot_id)
+            following = next_experiment(place, graph, robot_id) if data_set.robot.joints else None
             if populate_others(place, graph, announce):
                 conclude(graph, announce)
         announce("Writing the report")
@@ -389,6 +398,10 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
         announce("Running the data providers")
         try:
             populate_apart(apart, announce)
+            if not data_set.robot.joints:
+                announce(
+                    "  no twin, for a meter alone was logged: which joint, effect or motion takes it stays unknown"
+                )
             known = known_twin(apart, robot_id)
             _say_doubt(known and known[1], announce)
             check_plans(apart, robot_id, data_set.plans)
@@ -441,7 +454,10 @@ def write_report(place: Workspace, graph_url: str | None, robot_id: str) -> Path
     out = place.report_path(robot_id)
     with open_graph(place.folder, graph_url) as graph:
         robot = graph.iri(robot_iri(robot_id))
-        scene = partial(draw_scene, robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document))
+        scene = None
+        if is_described(place, robot_id):
+            meshes = meshes_of_graph(graph, robot, place.read_document)
+            scene = partial(draw_scene, robot_of_graph(graph, robot), meshes)
         render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), place.resources)
     return out
 

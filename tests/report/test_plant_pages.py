@@ -150,7 +150,7 @@ def test_a_robots_page(graph: KnowledgeGraph, name: str) -> None:
 def of_robot(graph: KnowledgeGraph, bindings: Mapping[str, str]) -> str:
     answers = ask(graph, robot.questions(), bindings)
     said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": None, "gap_report": None}
-    return page.render("robot/page.html.jinja", answers, bindings, **robot.of_robot(answers), **said)
+    return page.render("robot/page.html.jinja", answers, bindings, **robot.of_robot(answers, TARIFF.zone), **said)
 
 
 def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
@@ -162,7 +162,7 @@ def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("Arm_A.fit_1", "Energy 1.00 kJ In kWh 0.000278 kWh Cost"),
+        ("Arm_A.fit_1", "Energy 0.278 Wh In joules 1.00 kJ Cost"),
         ("Arm_A.fit_1", "Drives on at rest, the log says 55.0 W and the twin 50.0 W: they differ by more than"),
         ("Arm_C.press_1", "which is mechanical energy alone"),
         ("Arm_B.live_1", "power is up to 80 W from the twin"),

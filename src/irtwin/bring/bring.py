@@ -17,6 +17,7 @@ from irtwin.bring.choice import meanings
 from irtwin.bring.data_set_text import RunText, data_set_text
 from irtwin.bring.doubt import Answer, DoubtError
 from irtwin.bring.meaning import Meaning
+from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
 from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take
@@ -82,20 +83,23 @@ class Brought:
     said: tuple[str, ...]
 
 
-def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: Ask | None = None) -> Brought:
+def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options, ask: Ask | None = None) -> Brought:
     """Write logs as a new data set, a run a file.
 
-    `robot`: a URDF file, a data set, or a name. `ask` answers what cannot be told; DoubtError where it is None. Raises
-    InputError where a log cannot be used; nothing is written then.
+    `robot`: a URDF file, a data set, or a name; None: a meter's logs, of whose joints nothing is known. `ask` answers
+    what cannot be told; DoubtError where it is None. Raises InputError where a log cannot be used; nothing is written
+    then.
     """
     _check_place(out)
-    described, origin = robot_of(robot)
-    described = with_fixed(described, options.fixed)
-    if (wrong := urdf_finding(described)) is not None:
-        raise InputError(f"{robot}: {wrong.say}")
+    described, origin = (_metered(files), "") if robot is None else robot_of(robot)
+    if robot is not None:
+        described = with_fixed(described, options.fixed)
+        if (wrong := urdf_finding(described)) is not None:
+            raise InputError(f"{robot}: {wrong.say}")
     topics = dict(_topic(text) for text in options.topics)
     logs = [_read(file, described, topics) for file in files]
     logs = [log.named(options.names) for log in logs] if options.names else logs
+    logs = [with_power(log) for log in logs] if robot is None else logs
     while True:
         said = told(options.maps, options.gear_ratios, options.power_at, described)
         try:
@@ -119,7 +123,8 @@ def bring(files: Sequence[Path], out: Path, robot: str, options: Options, ask: A
     )  # fmt: skip
     with _new_folder(out) as folder:
         (folder / "runs").mkdir()
-        (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
+        if described.urdf:
+            (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
         for run_text, run in listed:
             pa.parquet.write_table(pa.table(dict(run.columns)), folder / run_text.file)
         (folder / "dataset.toml").write_text(text, encoding="utf-8")
@@ -137,6 +142,11 @@ def init(out: Path, robot: str | None, name: str | None) -> None:
         if described is not None:
             (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
         (folder / "dataset.toml").write_text(text, encoding="utf-8")
+
+
+def _metered(files: Sequence[Path]) -> Robot:
+    """Return the robot of a meter's logs, named by the first until somebody names it."""
+    return Robot(re.sub(r"[^\w\-]+", "_", files[0].stem).strip("_") or "meter", (), (), "")
 
 
 class _Form:

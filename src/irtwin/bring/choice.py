@@ -20,6 +20,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 
 _TIMES = ("__time", "time", "timestamp")  # the first of these that is there
+_OF_POWER = ("power", "meter_voltage", "meter_current")
 _ARRAY = (frozenset(("joint", "states")), frozenset(("jointstates",)), frozenset(("field",)))  # of ROS' joint states
 
 
@@ -35,6 +36,11 @@ def meanings(recording: Recording, robot: Robot, told: Told) -> list[Meaning]:
         choose = _per_joint if channel.per_joint else _of_robot
         chosen |= {each.column: each for each in choose(recording, field, candidates, robot)}
     _check(recording, robot, chosen, {each.joint for each in first.values() if each.field == "q"})
+    if not robot.joints and not any(each.field in _OF_POWER for each in chosen.values()):
+        raise InputError(
+            f"{recording.path}: no column was taken for power or energy; say which it is: --map COLUMN=power:kW, or "
+            f"give --robot if joints were logged (there are {', '.join(recording.names)[:400]})"
+        )
     texts = {name: Meaning(name, None, why="holds neither numbers nor times of ISO 8601") for name in recording.texts}
     chosen |= texts
     return [chosen[name] for name in recording.names]

@@ -52,7 +52,7 @@ def data_set_text(
         "# Units are SI: m, rad, s, kg, N m, A, W; temperatures in degC.",
         "# A key with # before it is optional and was not said: where you know it, fill it in and remove the #.",
         "",
-        *_robot_lines(name, origin, power_at, power_at_why),
+        *_robot_lines(name, origin, power_at, power_at_why, metered=robot is not None and not robot.joints),
     ]
     for place, joint in enumerate(robot.joints if robot else ()):
         sheet = {key: getattr(joint, key) for key, _, _ in _SHEET}
@@ -82,10 +82,13 @@ def data_set_text(
     return "\n".join([*lines, ""])
 
 
-def _robot_lines(name: str, origin: str, power_at: str | None, why: str) -> Iterator[str]:
+def _robot_lines(name: str, origin: str, power_at: str | None, why: str, metered: bool) -> Iterator[str]:
     yield "[robot]"
     yield _line("name", name, "its name, here and in the graph: no two robots may share one")
-    yield _line("urdf", "robot.urdf", f"its kinematics: {origin}")
+    if metered:
+        yield _line("joints", [], "a meter's log: no joint was logged, so there is no twin")
+    else:
+        yield _line("urdf", "robot.urdf", f"its kinematics: {origin}")
     yield _line("power_at", power_at or "mains", f"{_POWER_AT}{'; ' + why if why else ''}", power_at is not None)
     yield _line("manufacturer", "MAKER", "text", False)
     yield _line("type", "articulated", "text", False)

@@ -101,7 +101,9 @@ def time(robot: Robot, runs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Evidenc
     limits = np.array(
         [joint.velocity if np.isfinite(joint.velocity) and joint.velocity > 0 else _SPEED for joint in robot.joints]
     )
-    fastest = max(_fastest(times, q, limits) for times, q in runs)  # in parts of the limit, by raw times
+    fastest = (
+        max(_fastest(times, q, limits) for times, q in runs) if robot.joints else 0.0
+    )  # in parts of the limit, by raw times
     moves = any((np.ptp(q, axis=0) > _MOVES).any() for _, q in runs)
     if moves:
         possible = [unit for unit in possible if fastest / unit.factor <= _FAST]
@@ -210,5 +212,7 @@ def _done(robot: Robot, motion: Motion) -> np.ndarray:
     """Return the power that the joints put into the motion, W; by the description's bodies where no torque is known."""
     if motion.torque is not None:
         return np.asarray(np.maximum((motion.torque * motion.derivative(1)).sum(axis=1), 0.0))
+    if not robot.joints:  # of a meter's log nothing is known of it
+        return np.zeros(1)
     rows = np.linspace(0, len(motion.time) - 1, min(_EVALUATED, len(motion.time))).astype(int)
     return np.asarray(np.maximum((_bodies(robot, motion) * motion.derivative(1)[rows]).sum(axis=1), 0.0))

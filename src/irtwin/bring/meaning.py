@@ -149,5 +149,5 @@ def field_of(meaning: Meaning, robot: Robot) -> str | None:
     """Return the field of a column: a current that is of no joint is the supply's."""
     if meaning.field != "current" or meaning.given or meaning.joint is not None:
         return meaning.field
-    whole = not meaning.numbers and (len(robot.joints) > 1 or bool(_METER & set(meaning.words)))
+    whole = not meaning.numbers and (len(robot.joints) != 1 or bool(_METER & set(meaning.words)))
     return "meter_current" if whole else "current"

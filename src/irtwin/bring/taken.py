@@ -147,7 +147,12 @@ class _Taking:
     def _si(self, field: str) -> list[np.ndarray]:
         columns = self._of(field)
         return [
-            np.column_stack([self.units[each.column][0].to_si(self._values(log, each)) for each in columns])
+            np.column_stack(
+                [
+                    np.empty((len(log.time), 0)),  # of a meter's log there is nothing else
+                    *(self.units[each.column][0].to_si(self._values(log, each)) for each in columns),
+                ]
+            )
             for log in self.logs
         ]
 
@@ -227,6 +232,8 @@ class _Taking:
             return None, ""
         if self.told.power_at is not None:
             return self.told.power_at, "as --power-at says"
+        if not self.robot.joints:
+            return "mains", "as a plant's meters are; nothing says otherwise"
         if is_rtde(self.logs[0].recording.columns):
             return POWER_AT, "RTDE's voltage and current are those of the arm's 48 V"
         words = {word for each in columns for word in each.words}

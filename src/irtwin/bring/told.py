@@ -101,7 +101,7 @@ def _target(text: str, robot: Robot) -> tuple[str, Target]:
     field_name = fields[0]
     each = CHANNELS[field_name]
     joint = next((name for name in robot.joint_names if each.per_joint and each.column(name) == channel), None)
-    quantities = tuple({each.unit_of(one.kind) for one in robot.joints if joint in (None, one.name)})
+    quantities = tuple({each.unit_of(one.kind) for one in robot.joints if joint in (None, one.name)} or {each.unit})
     motor = unit_text.startswith(MOTOR)
     unit = unit_of(unit_text.removeprefix(MOTOR), quantities) if unit_text else None
     if unit_text and unit is None:

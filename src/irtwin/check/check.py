@@ -46,6 +46,8 @@ def check(data_set: DataSet) -> Checked:
 def _findings(data_set: DataSet) -> list[Finding]:
     """Return all findings; what would follow from one that stops is not looked for."""
     found = _by_column(data_set)
+    if not data_set.robot.joints:  # a meter's log
+        return found
     seen = moving(data_set)
     if seen.runs:
         found += plausibility_findings(data_set, seen) + unsigned_findings(data_set.robot, seen)

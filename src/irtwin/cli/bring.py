@@ -24,7 +24,7 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 @click.command(name="import")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="New folder for the data set.")
-@click.option("--robot", required=True, metavar="ROBOT", help=_robot_help)
+@click.option("--robot", metavar="ROBOT", help=f"{_robot_help} Left out of a meter's log, which has no joints.")
 @_name_option
 @click.option(
     "--map", "maps", metavar="COLUMN=CHANNEL[:UNIT]", multiple=True,
@@ -49,7 +49,7 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 def import_(
     files: tuple[Path, ...],
     out: Path,
-    robot: str,
+    robot: str | None,
     name: str | None,
     maps: tuple[str, ...],
     gear_ratios: tuple[str, ...],
@@ -64,9 +64,10 @@ def import_(
     """Make a data set of logs in other formats, a run a file.
 
     FILE is a ROS bag (1, 2, MCAP), a recording of RTDE by Universal Robots, a CSV file of PlotJuggler or of anybody, a
-    Parquet or an Excel file. Units are told by names and by checks against other columns, and shown. What cannot be
-    told is asked on a terminal; elsewhere the command stops and says what to give. What was written is checked, as by
-    `irtwin check`: where something must be cured first, the exit status is 2.
+    Parquet or an Excel file. Without --robot it is a meter's: time, and power or energy. Units are told by names and by
+    checks against other columns, and shown. What cannot be told is asked on a terminal; elsewhere the command stops and
+    says what to give. What was written is checked, as by `irtwin check`: where something must be cured first, the exit
+    status is 2.
     """
     from irtwin.bring.bring import Options, bring, found_in
 

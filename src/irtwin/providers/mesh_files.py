@@ -33,7 +33,8 @@ def mesh_copies(data_set: DataSet) -> tuple[dict[str, MeshCopy], list[str]]:
     copies: dict[str, MeshCopy] = {}
     said = []
     beside = data_set.folder if data_set.urdf is None else data_set.urdf.parent
-    for name in dict.fromkeys(solid.file for solid in structure_of(data_set.robot).solids if solid.file is not None):
+    solids = structure_of(data_set.robot).solids if data_set.robot.urdf else ()  # a meter's log has none
+    for name in dict.fromkeys(solid.file for solid in solids if solid.file is not None):
         try:
             file = find_mesh(name, data_set.folder, beside)
             content = read_mesh_file(file)

@@ -278,11 +278,22 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
     )
 
 
+def is_described(workspace: Workspace, robot_id: str) -> bool:
+    """Whether a robot's joints are known; they are not where a meter alone was logged."""
+    with workspace.reading() as session:
+        return bool(session.get_one(Robot, robot_id).urdf)
+
+
 def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
     """Give back a robot with its data sheet. Raises WorkspaceFault where a joint of its URDF has no row."""
     with workspace.reading() as session:
         row = session.get_one(Robot, robot_id)
         sheets = {joint.name: joint for joint in session.scalars(select(Joint).where(Joint.robot_id == robot_id))}
+    if not row.urdf:
+        raise InputError(
+            f'{workspace.folder}: of "{row.name}" a meter alone was logged; this needs its joints: bring a log of '
+            "their positions with its URDF"
+        )
     bare = parse_urdf(row.urdf, source=f"URDF of {row.name}")
     if lost := [name for name in bare.joint_names if name not in sheets]:
         raise WorkspaceFault(

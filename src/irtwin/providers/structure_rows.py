@@ -28,6 +28,8 @@ def structure_rows(robot_id: str, robot: Robot, meshes: Mapping[str, MeshCopy] |
 
     Raises InputError.
     """
+    if not robot.joints:  # of a meter's log nothing is known of it
+        return
     structure = structure_of(robot)
     for number, body in enumerate(structure.bodies):
         yield _link(robot_id, number, body)

@@ -71,9 +71,8 @@ class PlantPages:
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
         said = self._beside(request) | self._reports.of_robot(self._links.tail(iri))
         said["number"] = page_number(request.query_params.get("page"))
-        return await html(
-            lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **robot.of_robot(answers), **said)
-        )
+        shown = {**robot.of_robot(answers, said["tariff"].zone), **said}
+        return await html(lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **shown))
 
     async def _run(self, request: Request) -> Response:
         iri = self._individual("run", request.path_params["name"])

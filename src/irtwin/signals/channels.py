@@ -134,5 +134,6 @@ def from_columns(columns: Mapping[str, Samples], joints: Iterable[str]) -> Signa
         own = channel.columns(names)
         if field in REQUIRED or any(name in columns for name in own):
             parts = [columns[name] for name in own]
-            found[field] = np.column_stack(parts) if channel.per_joint else parts[0]
+            nothing = np.empty((len(columns["time"]), 0))  # of a robot whose joints nobody logged
+            found[field] = np.column_stack([nothing, *parts]) if channel.per_joint else parts[0]
     return Signals(**found)

@@ -30,7 +30,7 @@ _POWER_AT = ("mains", "dc_bus")
 DATA_SET_KEYS = ("robot", "run", "twin", "topics")
 ROBOT_KEYS = (
     "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
-    "arm_movement_type", "simulated", "torque_scale_uncertainty", "joint",
+    "arm_movement_type", "simulated", "torque_scale_uncertainty", "joint", "joints",
 )  # fmt: skip
 RUN_KEYS = (
     "file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started", "product", "pieces", "cycles",
@@ -126,7 +126,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
         ambient_temperature=table.number("ambient_temperature"),
         power_at=power_at,
         simulated=table.values.get("simulated") is True or all(run.role == "simulated" for run in runs),
-        notes={key: value for key, value in table.values.items() if key not in ("joint", "urdf", "dh")},
+        notes={key: value for key, value in table.values.items() if key not in ("joint", "joints", "urdf", "dh")},
         repairs=tuple(dict.fromkeys(repairs)),
         findings=tuple(findings),
         urdf=urdf,
@@ -251,10 +251,15 @@ def _robot(folder: Path, table: Table) -> Robot:
     name = table.text("name")
     if name is None:
         raise InputError(f"{table.file}: [robot] name is missing")
+    if "joints" in table.values:
+        return _metered(name, table)
     if "dh" in table.values and "urdf" in table.values:
         raise InputError(f"{table.file}: [robot] has both urdf and dh; keep the one that describes the robot")
     if "dh" not in table.values and "urdf" not in table.values:
-        raise InputError(f"{table.file}: [robot] urdf is missing; name the URDF, or describe the joints in [robot.dh]")
+        raise InputError(
+            f"{table.file}: [robot] urdf is missing; name the URDF, or describe the joints in [robot.dh]; of a meter's "
+            "log write joints = []"
+        )
     robot = robot_of_table(name, table) if "dh" in table.values else read_urdf(table.path("urdf", folder))
     sheets = table.values.get("joint", {})
     if not isinstance(sheets, dict):
@@ -282,6 +287,21 @@ def _robot(folder: Path, table: Table) -> Robot:
         type=table.text("type"),
         weight=table.number("weight", least=0.0),
     )
+
+
+def _metered(name: str, table: Table) -> Robot:
+    """Return a robot of which a meter's power is all that was logged. Raises InputError where joints are said too."""
+    said = [key for key in ("urdf", "dh", "joint") if key in table.values]
+    if table.values["joints"] != [] or said:
+        wrong = f"and {said[0]}" if said else f"= {shown(table.values['joints'])}"
+        raise InputError(
+            f"{table.file}: [robot] joints {wrong}: joints = [] alone says that no joint was logged, of a meter; "
+            "else describe the robot by urdf or dh"
+        )
+    return Robot(
+        name, (), (), "", manufacturer=table.text("manufacturer"), type=table.text("type"),
+        weight=table.number("weight", least=0.0),
+    )  # fmt: skip
 
 
 def _runs(

@@ -480,6 +480,21 @@ class InseparableEnergy(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
+class MeteredLoad(Base):
+    """What the power of a run says that a meter alone logged: its standby, the cycles in it, its energy by hour."""
+
+    __tablename__ = "metered_load"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
+    standby_power_w: Mapped[float | None]  # none where no lower level of power was found
+    cycle_count: Mapped[int | None]  # none where none were found, as in the next two
+    cycle_time_s: Mapped[float | None]
+    cycle_energy_j: Mapped[float | None]
+    first_hour: Mapped[datetime]  # begin of the hour of the clock in which the run began
+    energy_by_hour_j: Mapped[str]  # from then on, comma separated
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
+
+
 class SupplyState(Base):
     """A state of the supply in a run: how long, and its mean power by the log and by the twin, with a 95 % interval."""
 
@@ -488,10 +503,10 @@ class SupplyState(Base):
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
     robot_id: Mapped[str]
-    state: Mapped[str]  # "off", "moving", "brakes closed" or "drives on at rest"
+    state: Mapped[str]  # "off", "moving", "brakes closed", "drives on at rest"; by a meter alone "standby", "working"
     seconds: Mapped[float]
     power_w: Mapped[float | None]  # none where none was logged
-    modelled_power_w: Mapped[float]
+    modelled_power_w: Mapped[float | None]  # none without a twin
     modelled_power_lower_w: Mapped[float | None]
     modelled_power_upper_w: Mapped[float | None]
     differs: Mapped[bool]  # the log's power lies outside the twin's interval

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
+from zoneinfo import ZoneInfo
 
 from irtwin.report.plant import page
 from irtwin.report.plant.energies import Days, Kind, by_day, days, kind, share
+from irtwin.report.plant.load import load
 from irtwin.report.plant.overview import PLANT_TREND, states
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Question, Row
@@ -40,8 +42,8 @@ def all_runs() -> Question:
     return replace(runs, text=runs.text.removesuffix(f"LIMIT {MOST_RUNS}"))
 
 
-def of_robot(answers: Answers) -> dict[str, Any]:
-    """Return what a robot's page says of the answers to its questions."""
+def of_robot(answers: Answers, zone: ZoneInfo) -> dict[str, Any]:
+    """Return what a robot's page says of the answers to its questions, by the plant's clock."""
     energies = sorted(
         answers["energy"].rows, key=lambda row: (not kind(row["energy_from"]).electrical, row["energy_from"])
     )
@@ -52,6 +54,7 @@ def of_robot(answers: Answers) -> dict[str, Any]:
         "standing": share(standing["idle_s"], standing["known_s"]) if standing else None,
         "state": next(iter(states(answers).values()), None),
         "most_runs": MOST_RUNS,
+        "load": load(answers["load"].rows, zone),
     }
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from irtwin.errors import InputError
 from irtwin.storage.base_iri import KEY
@@ -15,17 +16,18 @@ from irtwin.storage.database import TARIFF
 from irtwin.toml_text import read_toml
 
 JOULES = 3.6e6  # of a kWh
-_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", KEY)
+_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "time_zone", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
 
 
 @dataclass(frozen=True)
 class Tariff:
-    """Price and emission factor of a kWh; None where nobody said."""
+    """Price and emission factor of a kWh, None where nobody said; and the plant's clock."""
 
     price: float | None = None  # currency/kWh
     currency: str = ""
     co2: float | None = None  # kg/kWh
+    zone: ZoneInfo = field(default_factory=lambda: ZoneInfo("UTC"))
 
     def cost(self, joules: float | None) -> float | None:
         """Return what an electrical energy (J) costs, in the currency."""
@@ -52,7 +54,14 @@ def read_tariff(workspace: Path) -> Tariff:
         raise InputError(f'{file}: currency is a code or a sign, as "EUR", not {currency!r}')
     if price is not None and not currency:
         raise InputError(f'{file}: price_per_kwh needs a currency, as currency = "EUR"')
-    return Tariff(price, currency, _number(file, said, "co2_kg_per_kwh"))
+    return Tariff(price, currency, _number(file, said, "co2_kg_per_kwh"), _zone(file, said.get("time_zone", "UTC")))
+
+
+def _zone(file: Path, name: Any) -> ZoneInfo:
+    try:
+        return ZoneInfo(name)
+    except (ZoneInfoNotFoundError, ValueError, TypeError, OSError):
+        raise InputError(f'{file}: time_zone is a name as "Europe/Berlin", not {name!r}') from None
 
 
 def _number(file: Path, said: dict[str, Any], key: str) -> float | None:

@@ -1,0 +1,61 @@
+"""The provider of a run's state where a meter alone was logged: its energy, standby and cycles, by its power."""
+
+from __future__ import annotations
+
+from irtwin.providers.provider import Made
+from irtwin.providers.records import inputs
+from irtwin.signals.load_profile import Cycles, by_hour, load_profile
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import MEASURED, MeteredLoad, Run, RunEnergy, RunState, SupplyState
+
+
+def provide(workspace: Workspace, run_id: str) -> Made:
+    """Make a run's RunState, RunEnergy, MeteredLoad, and a SupplyState for each level of its power."""
+    with workspace.reading() as session:
+        run = session.get_one(Run, run_id)
+    robot_id, began = run.robot_id, run.start_time
+    assert began is not None
+    samples = workspace.read_series(run_id, MEASURED)
+    time, power = (samples[name].to_numpy().astype(float) for name in ("time", "power"))
+    found = load_profile(time, power)
+    working = sum(state.seconds for state in found.states if state.name == "working")
+    on = sum(state.seconds for state in found.states if state.name != "off")
+    standby = None if found.standby is None else found.standby * on
+    hour = began.replace(minute=0, second=0, microsecond=0)
+    hours = by_hour(time, power, (began - hour).total_seconds())
+    cycles = found.cycles or Cycles(0, 0.0, 0.0)
+    read = inputs(workspace, robot_id, [run_id])
+    rows = [
+        RunState(
+            run_id=run_id,
+            current_state="standstill" if found.standing[-1] else "moving",
+            idle_share=min(max(1.0 - working / run.run_time_s, 0.0), 1.0),
+        ),
+        RunEnergy(
+            run_id=run_id,
+            energy_consumption_j=None if run.role == "simulated" else found.energy,
+            energy_from="measured",
+            run_power_w=found.energy / run.run_time_s,
+            peak_power_w=float(power.max()),
+            measured_energy_j=found.energy,
+            standby_energy_j=standby,
+            standby_share=None if standby is None or found.energy <= 0 else min(standby / found.energy, 1.0),
+        ),
+        MeteredLoad(
+            run_id=run_id,
+            standby_power_w=found.standby,
+            cycle_count=cycles.count or None,
+            cycle_time_s=cycles.seconds or None,
+            cycle_energy_j=cycles.energy or None,
+            first_hour=hour,
+            energy_by_hour_j=",".join(f"{joules:.6g}" for joules in hours),
+        ),
+        *(
+            SupplyState(
+                run_id=run_id, number=number, robot_id=robot_id, state=state.name, seconds=state.seconds,
+                power_w=state.power, differs=False,
+            )
+            for number, state in enumerate(found.states, start=1)
+        ),
+    ]  # fmt: skip
+    return Made(robot_id, read, rows, metered=[one for one in read if one.startswith("series/")])
