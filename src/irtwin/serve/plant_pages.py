@@ -13,7 +13,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
-from irtwin.report.plant import comparison, curves, links, overview, page, robot, sheet
+from irtwin.report.plant import choice, comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.plant.tariff import Tariff, read_tariff
@@ -57,11 +57,13 @@ class PlantPages:
         return [Route(path, page, methods=["GET"]) for path, page in pages.items()]
 
     async def _plant(self, request: Request) -> Response:
-        answers = await self._asking.answers(request, page.questions(), {})
-        said = {**self._beside(request), "number": page_number(request.query_params.get("page"))}
+        asked, wrong = self._chosen(request)
+        answers = await self._asking.answers(request, asked.of_days(page.questions()), {})
+        said = {**self._beside(request), "number": page_number(request.query_params.get("page")), "asked": asked}
+        said |= {"trouble": wrong} if wrong else {}
 
         def drawn() -> str:
-            found = overview.overview(answers, said["tariff"])
+            found = overview.overview(answers, said["tariff"], asked)
             return page.render("page.html.jinja", answers, {}, found=found, reports=self._reports.names(), **said)
 
         return await html(drawn)
@@ -101,9 +103,18 @@ class PlantPages:
         return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **said), policy)
 
     async def _robots_table(self, request: Request) -> Response:
-        answers = await self._asking.answers(request, page.questions(), {})
+        asked, _ = self._chosen(request)
+        answers = await self._asking.answers(request, asked.of_days(page.questions()), {})
         tariff = self._beside(request)["tariff"]
-        return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff), tariff))
+        return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff, asked), tariff))
+
+    @staticmethod
+    def _chosen(request: Request) -> tuple[choice.Choice, str]:
+        """Return what a form asks of the plant, and what is wrong with it: all of it is shown then."""
+        try:
+            return choice.choice(request.query_params), ""
+        except InputError as error:
+            return choice.ALL, str(error)
 
     async def _made_table(self, request: Request) -> Response:
         answers = await self._asking.answers(request, {"made": page.questions()["made"]}, {})

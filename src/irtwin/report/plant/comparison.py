@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import date
 from typing import Any
 
 from pyoxigraph import Literal
 
-from irtwin.errors import InputError
 from irtwin.knowledge.vocabulary import ID
+from irtwin.report.plant.choice import day
 from irtwin.report.plant.energies import Kind, kind, share
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Row
@@ -81,7 +80,7 @@ def side(asked: Mapping[str, str], which: str, base: str = ID) -> Side | None:
     first, last = asked.get(f"{which}_from", "").strip(), asked.get(f"{which}_to", "").strip()
     if not (first or last):
         return None
-    return Side(None, _day(first) if first else _ALWAYS[0], _day(last) if last else _ALWAYS[1])
+    return Side(None, day(first) if first else _ALWAYS[0], day(last) if last else _ALWAYS[1])
 
 
 def comparison(before: Answers, after: Answers) -> Comparison:
@@ -154,10 +153,3 @@ def _of(answers: Answers, name: str) -> Row | None:
 
 def _percent(value: float | None) -> float | None:
     return None if value is None else 100.0 * value
-
-
-def _day(text: str) -> str:
-    try:
-        return date.fromisoformat(text).isoformat()
-    except ValueError:
-        raise InputError(f"{text[:40]!r} is not a day: write it as 2026-03-02") from None

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from irtwin.report.plant.choice import ALL, GROUPS, Choice
 from irtwin.report.plant.energies import KINDS, Days, Kind, added_up, by_day, days, kind, share
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.plant.tariff import JOULES, Tariff
@@ -25,6 +26,15 @@ class State:
     words: str
     live: str | None = None
     at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class Saving:
+    """What a robot would save in a year, J, were it off while it waits; its 95 % interval, where that is known."""
+
+    energy_j: float
+    lower_j: float | None
+    upper_j: float | None
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,8 @@ class Line:
     alarms: int
     reidentify: bool
     gap: Row | None
+    saving: Saving | None
+    of: str  # what it is grouped by
 
 
 @dataclass(frozen=True)
@@ -58,8 +70,19 @@ class Group:
 
     def total(self, name: str) -> float | None:
         """Add up a column that can be added up."""
-        known = [value for line in self.lines if (value := getattr(line, name)) is not None]
-        return sum(known) if known else None
+        return _sum(getattr(line, name) for line in self.lines)
+
+    @property
+    def parts(self) -> tuple[tuple[str, Group], ...]:
+        """The lines by what they are grouped by, in its order; none where all are of one."""
+        names = sorted({line.of for line in self.lines})
+        parts = tuple((name, Group(self.kind, tuple(line for line in self.lines if line.of == name))) for name in names)
+        return parts if len(parts) > 1 else ()
+
+    @property
+    def saving_j(self) -> float | None:
+        """What its robots would save in a year, as far as that is known."""
+        return _sum(line.saving.energy_j for line in self.lines if line.saving is not None)
 
 
 @dataclass(frozen=True)
@@ -75,12 +98,13 @@ class Overview:
     cost: float | None
     co2_kg: float | None
     standby: float | None
+    saving_j: float | None  # a year
 
 
-def overview(answers: Answers, tariff: Tariff) -> Overview:
-    """Make the overview of the answers to `reports/plant/*.rq`."""
+def overview(answers: Answers, tariff: Tariff, asked: Choice = ALL) -> Overview:
+    """Make the overview of the answers to `reports/plant/*.rq`, of what is asked for."""
     energies = answers["energy"].rows
-    groups = tuple(_groups(answers, tariff))
+    groups = tuple(_groups(answers, tariff, asked))
     daily = by_day(answers["days"].rows)
     plants = ((one, days(added_up(of for (_, name), of in daily.items() if name == one.name), PLANT_TREND))
               for one in KINDS.values())  # fmt: skip
@@ -92,11 +116,12 @@ def overview(answers: Answers, tariff: Tariff) -> Overview:
         trends=tuple((one, trend) for one, trend in plants if trend is not None),
         alarms=alarms[:MOST_ALARMS],
         active=sum(row["state"] == "active" for row in alarms),
-        robots=len({row["robot"] for row in answers["robots"].rows}),
+        robots=len({line.robot for group in groups for line in group.lines}),
         electrical_j=_sum(group.total("energy_j") for group in electrical),
         cost=_sum(group.total("cost") for group in electrical),
         co2_kg=_sum(group.total("co2_kg") for group in electrical),
         standby=share(_sum(row["standby_j"] for row in rows), _sum(row["modelled_j"] for row in rows)),
+        saving_j=_sum(group.saving_j for group in electrical),
     )
 
 
@@ -112,6 +137,7 @@ def sheet(found: Overview, tariff: Tariff) -> Sheet:
         *([f"cost_{tariff.currency}"] if tariff.price is not None else []),
         *(["CO2_kg"] if tariff.co2 is not None else []),
         "standstill_share_of_time", "standby_share_of_energy", "active_alarms", "last_gap", "gap_closed_share",
+        *(["saving_a_year_kWh", "saving_lower_kWh", "saving_upper_kWh"] if tariff.hours is not None else []),
     ]  # fmt: skip
     rows = [
         (
@@ -122,6 +148,7 @@ def sheet(found: Overview, tariff: Tariff) -> Sheet:
             *([line.co2_kg] if tariff.co2 is not None else []),
             line.standing, line.standby, line.alarms, line.gap["verdict"] if line.gap else None,
             line.gap["closed"] if line.gap else None,
+            *(_kwh(line.saving) if tariff.hours is not None else []),
         )
         for group in found.groups for line in group.lines
     ]  # fmt: skip
@@ -143,29 +170,40 @@ def made_sheet(answers: Answers) -> Sheet:
     )  # fmt: skip
 
 
-def _groups(answers: Answers, tariff: Tariff) -> list[Group]:
+def _groups(answers: Answers, tariff: Tariff, asked: Choice) -> list[Group]:
     known: dict[str, list[Row]] = {}
     for row in answers["energy"].rows:
         known.setdefault(row["robot"], []).append(row)
     daily = by_day(answers["days"].rows)
-    beside = _Beside(answers)
+    beside = _Beside(answers, tariff)
     lines: dict[Kind | None, list[Line]] = {}
     for robot in {row["robot"]: row for row in answers["robots"].rows}.values():
+        if not asked.finds(robot["name"], *(robot[name] for name in GROUPS)):
+            continue
+        of_group = (robot[asked.group] or "not said") if asked.group else ""
         for energy in known.get(robot["robot"], [None]):
             of = kind(energy["energy_from"]) if energy is not None else None
             trend = days(daily.get((robot["robot"], energy["energy_from"]), {}), TREND) if energy is not None else None
-            lines.setdefault(of, []).append(_line(robot, energy, of, trend, tariff, beside))
+            lines.setdefault(of, []).append(_line(robot, energy, of, trend, tariff, beside, of_group))
     order = [*KINDS.values(), *(of for of in lines if of is not None and of.name not in KINDS), None]
     return [
-        Group(of, tuple(sorted(lines[of], key=lambda line: (-(line.energy_j or 0.0), line.name))))
-        for of in order if of in lines
+        Group(of, tuple(sorted(lines[of], key=lambda line: _place(line, asked.sort)))) for of in order if of in lines
     ]  # fmt: skip
+
+
+def _place(line: Line, by: str) -> tuple[Any, ...]:
+    """Return what a line is sorted by: its group; then what is asked for, else what it could save; then its energy."""
+    saving = line.saving.energy_j if line.saving is not None else None
+    first = {"standby": line.standby, "standing": line.standing, "alarms": line.alarms, "runs": line.runs,
+             "energy": line.energy_j}.get(by, saving)  # fmt: skip
+    return line.of, -(first if first is not None else -1.0), -(line.energy_j or 0.0), line.name
 
 
 class _Beside:
     """What is known of robots beside their energies, by their IRIs."""
 
-    def __init__(self, answers: Answers) -> None:
+    def __init__(self, answers: Answers, tariff: Tariff) -> None:
+        self.savings = _savings(answers["waiting"].rows, tariff)
         self.standing = {row["robot"]: share(row["idle_s"], row["known_s"]) for row in answers["standstill"].rows}
         self.alarms = Counter(row["robot"] for row in answers["alarms"].rows if row["state"] == "active")
         self.reidentify = {row["robot"] for row in answers["to_reidentify"].rows}
@@ -173,7 +211,31 @@ class _Beside:
         self.states = states(answers)
 
 
-def _line(robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, tariff: Tariff, beside: _Beside) -> Line:
+def _savings(rows: Iterable[Row], tariff: Tariff) -> dict[str, Saving]:
+    """Return what each robot would save in a year, by its share of time that it waits; none where nobody said hours."""
+    of_each: dict[str, list[Row]] = {}
+    for row in rows:
+        of_each.setdefault(row["robot"], []).append(row)
+    found = {}
+    for robot, its in of_each.items():
+        time = sum(row["time_s"] for row in its)
+        if tariff.hours is None or time <= 0:
+            continue
+
+        def a_year(name: str, its: list[Row] = its, time: float = time) -> float | None:
+            if any(row[name] is None for row in its):
+                return None
+            return sum(row[name] * row["waiting_s"] for row in its) / time * tariff.hours * 3600.0  # type: ignore[no-any-return]
+
+        saved = a_year("standby_w")
+        if saved is not None and saved > 0:
+            found[robot] = Saving(saved, a_year("lower_w"), a_year("upper_w"))
+    return found
+
+
+def _line(
+    robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, tariff: Tariff, beside: _Beside, of_group: str
+) -> Line:
     iri = robot["robot"]
     joules = energy["energy_j"] if energy is not None else None
     electrical = energy if of is not None and of.electrical else None
@@ -195,6 +257,8 @@ def _line(robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, t
         alarms=beside.alarms[iri],
         reidentify=iri in beside.reidentify,
         gap=beside.gaps.get(iri),
+        saving=beside.savings.get(iri) if electrical is not None else None,
+        of=of_group,
     )  # fmt: skip
 
 
@@ -212,6 +276,12 @@ def _left(robot: Row) -> State:
     if robot["last_began"] is None:
         return State("no run yet" if not robot["runs"] else "not known")
     return State(_STATES.get(robot["state"], "not known"), None, robot["last_began"])
+
+
+def _kwh(saving: Saving | None) -> list[float | None]:
+    if saving is None:
+        return [None, None, None]
+    return [None if one is None else one / JOULES for one in (saving.energy_j, saving.lower_j, saving.upper_j)]
 
 
 def _sum(values: Any) -> float | None:

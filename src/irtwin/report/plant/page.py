@@ -10,7 +10,7 @@ import jinja2
 
 from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
-from irtwin.report.plant import links, paging
+from irtwin.report.plant import choice, links, paging
 from irtwin.report.plant.tariff import JOULES
 from irtwin.report.questions import Answers, Question, read_questions
 from irtwin.report.templates import environment
@@ -37,7 +37,18 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
     template = _templates(said.get("base", ID)).get_template(f"plant/{name}")
     rows = {question: answer.rows for question, answer in answers.items()}
     return template.render(
-        answers=answers, rows=rows, bindings=bindings, **{"number": 1, "graph_stands": None, "curves": None, **said}
+        answers=answers,
+        rows=rows,
+        bindings=bindings,
+        **{
+            "number": 1,
+            "graph_stands": None,
+            "curves": None,
+            "asked": choice.ALL,
+            "groups": choice.GROUPS,
+            "sorts": choice.SORTS,
+            **said,
+        },
     )
 
 

@@ -16,17 +16,20 @@ from irtwin.storage.database import TARIFF
 from irtwin.toml_text import read_toml
 
 JOULES = 3.6e6  # of a kWh
-_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "time_zone", KEY)
+_YEAR = 8784  # hours of the longest
+_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "hours_a_year", "time_zone", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
 
 
 @dataclass(frozen=True)
 class Tariff:
-    """Price and emission factor of a kWh, None where nobody said; and the plant's clock."""
+    """Price and emission factor of a kWh, and the hours that robots are on in a year, None where nobody said; the
+    plant's clock."""
 
     price: float | None = None  # currency/kWh
     currency: str = ""
     co2: float | None = None  # kg/kWh
+    hours: float | None = None  # a year
     zone: ZoneInfo = field(default_factory=lambda: ZoneInfo("UTC"))
 
     def cost(self, joules: float | None) -> float | None:
@@ -54,7 +57,12 @@ def read_tariff(workspace: Path) -> Tariff:
         raise InputError(f'{file}: currency is a code or a sign, as "EUR", not {currency!r}')
     if price is not None and not currency:
         raise InputError(f'{file}: price_per_kwh needs a currency, as currency = "EUR"')
-    return Tariff(price, currency, _number(file, said, "co2_kg_per_kwh"), _zone(file, said.get("time_zone", "UTC")))
+    hours = _number(file, said, "hours_a_year")
+    if hours is not None and hours > _YEAR:
+        raise InputError(f"{file}: hours_a_year is {_YEAR} at most, not {hours:g}")
+    return Tariff(
+        price, currency, _number(file, said, "co2_kg_per_kwh"), hours, _zone(file, said.get("time_zone", "UTC"))
+    )
 
 
 def _zone(file: Path, name: Any) -> ZoneInfo:
