@@ -32,8 +32,8 @@ def graph(tmp_path: Path) -> KnowledgeGraph:
     quads = """
         @prefix irt: <https://w3id.org/irtwin#> . @prefix : <https://w3id.org/irtwin/id/> .
         <https://w3id.org/irtwin/graph/source/x> {
-          :A a irt:Industrial_Robot ; irt:has_RunProcess :A.1, :A.2 ; irt:has_Twin :t .
-          :B a irt:Industrial_Robot ; irt:has_RunProcess :B.1 .
+          :A a irt:Industrial_Robot ; irt:has_Joint :j ; irt:has_RunProcess :A.1, :A.2 ; irt:has_Twin :t .
+          :B a irt:Industrial_Robot ; irt:has_Joint :k ; irt:has_RunProcess :B.1 .
           :A.1 a irt:IR_RunProcess ; irt:run_of :A ; irt:has_Series :s1 ; irt:Modelled_Energy 1.0e0 .
           :A.2 a irt:IR_RunProcess ; irt:run_of :A ; irt:has_Series :s2 .
           :B.1 a irt:IR_RunProcess ; irt:run_of :B ; irt:has_Series :s3 . }
