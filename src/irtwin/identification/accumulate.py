@@ -122,24 +122,35 @@ def accumulate_any(
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
     kind = _Products if by_products else _Triangle
-    found = [_Growing(motion, *stretch, pattern, kind) for motion in motions for stretch in _stretches(motion, total)]
+    found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total)]
     samples = sum(len(motion.time) for motion in motions)
-    alone = samples * int(pattern.sum()) < _SHARED or not can_copy()
-    blocks = _grown(found, equations) if alone else shared(lambda some: _grown(some, equations), found)
+
+    def grown(some: Sequence[tuple[Motion, int, int]]) -> list[Block]:
+        return _grown(some, equations, lambda *one: _Growing(*one, pattern, kind))
+
+    blocks = grown(found) if samples * int(pattern.sum()) < _SHARED or not can_copy() else shared(grown, found)
     return [block for block in blocks if block.rows.any()]
 
 
-def _grown(growing: Sequence[_Growing], equations: Equations) -> list[Block]:
+def _grown(
+    stretches: Sequence[tuple[Motion, int, int]], equations: Equations, begun: Callable[[Motion, int, int], _Growing]
+) -> list[Block]:
+    made: list[Future[list[Block]]] = []
     with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
-        for _, of_motion in groupby(growing, key=lambda one: id(one.motion)):
-            blocks = tuple(of_motion)
+        for _, of_motion in groupby(stretches, key=lambda one: id(one[0])):
+            blocks = tuple(begun(*stretch) for stretch in of_motion)
             for first, last, sample in _parts(blocks, equations):
                 if adding:
                     adding.result()
                 adding = other.submit(_add, blocks, first, last, sample)
+            made.append(other.submit(_made, blocks))  # what grew can go then
         if adding:
             adding.result()
+    return [block for one in made for block in one.result()]
+
+
+def _made(growing: Sequence[_Growing]) -> list[Block]:
     return [one.block() for one in growing]
 
 

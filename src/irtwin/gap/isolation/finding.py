@@ -36,8 +36,8 @@ class Finding:
     W, None where unknown; `held_out`: what is left of groups left out, `counted` the same as `apart` counts it;
     `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is
     closed theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where
-    `system` stands on torque that causes explain; `beside`: power's, if both were fitted. `seed` draws orders of many
-    causes; `tell` is told how far that has come.
+    `system` stands on torque that causes explain. `seed` draws orders of many causes; `tell` is told how far that has
+    come.
     """
 
     name: str
@@ -52,7 +52,6 @@ class Finding:
     estimate: Estimate
     part: float = 1.0
     plain: System | None = None
-    beside: BesidePower | None = None
     seed: int = 0
     tell: Tell | None = field(default=None, repr=False, compare=False)
 
@@ -169,7 +168,8 @@ def finding_of(
 ) -> Finding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
-    judged = held_out(system, noise_before(plain or system), found.noise, chosen, plain, tell)
+    alone, inside = system.with_columns(chosen)
+    judged = held_out(alone, noise_before(plain or alone), found.noise, inside, plain, tell)
     apart = Apart.of(plain or system, system, [cause.columns for cause in found.causes])
     fitted = estimate_of(system, chosen, tell) if beside is None else beside.estimate(chosen, tell)
     return Finding(
@@ -184,7 +184,6 @@ def finding_of(
         floor,
         fitted,
         plain=plain,
-        beside=beside,
         seed=seed,
         tell=tell,
     )
@@ -206,9 +205,8 @@ def attributed(
     found = attribute(apart, candidates, case.thresholds.criterion, level, tell)
     if apart is system:
         return found
-    chosen = [k for cause in found.causes for k in cause.columns]
-    noise = system.residual_rms(chosen, noise_before(system))
-    return replace(found, noise=system.residual_rms(chosen, noise))
+    alone, chosen = system.with_columns([k for cause in found.causes for k in cause.columns])
+    return replace(found, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, noise_before(alone))))
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:

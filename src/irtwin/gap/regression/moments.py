@@ -102,11 +102,9 @@ class Products:
 
     def squares(self, weights: np.ndarray) -> float:
         """Return the squares of the sum of all columns, each times its weight (D + 1,)."""
-        if self.as_rows:
-            left = self.held @ np.bincount(self.places.own, weights[self.places.every], self.held.shape[1])
-            return float(left @ left)
-        own = weights[self.places.every]
-        return float(own @ self.among(self.places.own, self.places.own) @ own)
+        own = np.bincount(self.places.own, weights[self.places.every], self.held.shape[1])
+        left = self.held @ own
+        return float(left @ left if self.as_rows else own @ left)
 
 
 class Moments(ABC):

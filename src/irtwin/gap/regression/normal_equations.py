@@ -72,7 +72,7 @@ class System:
     shaken: tuple[np.ndarray, ...] | None = None
     apart: bool = False
 
-    @cached_property
+    @property
     def by_speed(self) -> System:
         """The system with 2 g equations: rows in which a joint's dry friction turns stand apart, in the second half.
 

@@ -42,11 +42,11 @@ def shaken_products(
         return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided)
 
     motions = [motion for motion, _ in pairs]
-    blocks = accumulate_any(motions, with_progress(difference, motions, tell), pattern, by_products=True)
-    found = []
-    for equation, row in enumerate(pattern):
-        size = int(row.sum()) + 1
-        rows = sum(int(block.rows[equation]) for block in blocks)
-        total = sum((block.factors[equation].T @ block.factors[equation] for block in blocks), np.zeros((size, size)))
-        found.append(total / max(rows, 1))
-    return tuple(found)
+    told = with_progress(difference, motions, tell)
+    rows, found = np.zeros(len(pattern)), [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
+    for motion in motions:  # one by one: blocks of all together take many times what their products do
+        for block in accumulate_any([motion], told, pattern, by_products=True):
+            rows += block.rows
+            for total, factor in zip(found, block.factors, strict=True):
+                total += factor.T @ factor
+    return tuple(total / max(count, 1.0) for total, count in zip(found, rows, strict=True))
