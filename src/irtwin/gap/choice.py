@@ -16,12 +16,9 @@ from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.energy_errors import energy_errors
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.regression.channel_equations import with_load
-from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.held_out import left_out
-from irtwin.gap.search import power_causes, torque_causes, torque_source, twin_equations, variants
+from irtwin.gap.search import Search, twin_equations, variants
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.progress import Tell
 from irtwin.identification.threads import one_blas_thread
@@ -71,24 +68,13 @@ def _findings(case: Case, tell: Tell) -> Iterator[Finding]:
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     plain = twin_equations(case, stack, tell)
     floor = noise_floor(case.runs, case.motions, case.thresholds.data)
-    power_stack, torque, below = torque_source(case, stack, plain, tell)
-    before = TwinPower(power_stack, case.with_power, case.grouping, torque) if case.shows("power") else None
+    search, of_torque = Search(case, stack, plain, floor, tell), None
     tried = _standing(case, "torque"), _standing(case, "power")
     if case.shows("torque") and plain is not None:
-        loaded = with_load(case.robot, below)
-
-        def by_twin() -> TwinPower:
-            assert before is not None
-            return before
-
-        of_torque, floor, _ = torque_causes(
-            case, stack, plain, floor, loaded, torque, by_twin, tried, frozenset(), 0, tell
-        )
-        yield of_torque
-        torque = ExplainedTorque(stack, of_torque, loaded)
-    if before is not None:
-        explained, _ = power_causes(case, power_stack, floor, lambda: before, torque, tried[1], frozenset(), 0, tell)
-        yield explained.finding
+        of_torque, floor, _ = search.torque_causes(tried)
+        yield of_torque.finding
+    if case.shows("power"):
+        yield search.power_causes(tried[1], floor, of_torque)[0].finding
 
 
 def _standing(case: Case, signal: str) -> list[Effect]:

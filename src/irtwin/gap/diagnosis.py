@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from typing import Any
 
 from irtwin.document.cause_ids import cause_ids
@@ -12,12 +12,12 @@ from irtwin.document.curves import Curves
 from irtwin.document.document import Closeable, Cutoff, Document, Untestable
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Effect
 from irtwin.effects.local import LocalEffect
-from irtwin.effects.stack import Stack
 from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
-from irtwin.gap.data.case import Case, case_of
+from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.experiment.flexible_regression import flexible_regression
@@ -36,14 +36,11 @@ from irtwin.gap.localisation.channel_residuals import channel_residual, places
 from irtwin.gap.localisation.evidence import drawn
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.not_repeating import NotRepeating, with_removed
-from irtwin.gap.regression.candidate_columns import Below
-from irtwin.gap.regression.channel_equations import Torque, with_load
-from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
-from irtwin.gap.search import check_observed, power_causes, torque_causes, torque_source, twin_equations, variants
+from irtwin.gap.search import Search, check_observed, twin_equations, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
@@ -183,23 +180,15 @@ def diagnose(
     floor = noise_floor(case.runs, case.motions, thresholds.data)
     if case.shows("torque") and plain is not None:
         check_observed(plain)
-    power_stack, predicted, below = torque_source(case, stack, plain, tell)
-    loaded = with_load(case.robot, below)
-
-    @cache
-    def before() -> TwinPower:
-        return TwinPower(power_stack, case.with_power, case.grouping, predicted)
-
+    search = Search(case, stack, plain, floor, tell, frozenset(unknown), seed)
+    twin_torque = search.twin.torque
     explained: list[Explained] = []
     refusals = NOTHING_REFUSED
     scale: TorqueScale | None = None
-    torque = predicted
+    torque: ExplainedTorque | None = None
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        found, floor, refusals = _torque(
-            case, stack, plain, floor, loaded, predicted, before, frozenset(unknown), seed, tell
-        )
-        torque = ExplainedTorque(stack, found, loaded)
+        torque, floor, refusals = search.torque_causes(_tried(search, plain, tell))
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
@@ -207,9 +196,7 @@ def diagnose(
     twin_with_causes = begun(partial(closed_twin, case, causes, tell), worth=case.long)
     if case.shows("power"):
         tell("Trying every effect on power")
-        of_twin = None if torque is predicted else before
-        tried = variants(case, "power")
-        of_power, wrong = power_causes(case, power_stack, floor, of_twin, torque, tried, frozenset(unknown), seed, tell)
+        of_power, wrong = search.power_causes(variants(case, "power"), floor, torque)
         explained.append(of_power)
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
@@ -230,7 +217,7 @@ def diagnose(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.criterion
     )
     left = [
-        channel_residual(case, one, predicted if one.finding.name == "torque" else torque, tell) for one in explained
+        channel_residual(case, one, twin_torque if one is torque else torque or twin_torque, tell) for one in explained
     ]
     open_because = left_open(
         findings,
@@ -242,7 +229,8 @@ def diagnose(
     )
     located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None, tell)
     tell("Designing the next experiment")
-    planned = planned_equations(case, (stack, power_stack), findings, below, torque)
+    stacks = stack, search.power_stack
+    planned = planned_equations(case, stacks, findings, search.twin.below, torque or twin_torque)
     measures = {one.finding.name: flexible_regression(one, seed, tell) for one in left}
     proposal = next_experiment(
         case.robot,
@@ -284,24 +272,13 @@ def diagnose(
     )
 
 
-def _torque(
-    case: Case,
-    stack: Stack,
-    plain: System,
-    floor: Floor,
-    below: Below,
-    predicted: Torque,
-    before: Callable[[], TwinPower],
-    unknown: Set[str],
-    seed: int,
-    tell: Progress,
-) -> tuple[Finding, Floor, Refusals]:
-    """Find the causes of torque as `torque_causes` does, those that a screening proposes among them."""
-    found = screen(case, stack, plain, tell)
+def _tried(search: Search, plain: System, tell: Progress) -> tuple[Sequence[Effect], Sequence[Effect]]:
+    """Return the effects on torque and on power that are tried, those that a screening proposes among them."""
+    case = search.case
+    found = screen(case, search.stack, plain, tell)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
-            below(motion)
+            search.below(motion)
         if case.shows("power"):
-            before()
-    tried = found.shapes(variants(case, "torque")), variants(case, "power")
-    return torque_causes(case, stack, plain, floor, below, predicted, before, tried, unknown, seed, tell)
+            _ = search.before
+    return found.shapes(variants(case, "torque")), variants(case, "power")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
-from dataclasses import replace
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Effect, Predicted
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.data.case import Case
@@ -21,7 +22,7 @@ from irtwin.gap.isolation.finding import Finding, Without, find
 from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.refusal import Refusals, find_possible
 from irtwin.gap.regression.candidate_columns import Below
-from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.channel_equations import power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
@@ -39,82 +40,103 @@ def check_observed(system: System) -> None:
         raise InputError("in no observed run does a joint move for longer than the filter; log longer runs")
 
 
-def torque_source(case: Case, stack: Stack, plain: System | None, tell: Tell) -> tuple[Stack, Torque, Below]:
-    """Return the effects that explain power, the joint torque that they are given, and what those of torque stand on.
+@dataclass(frozen=True)
+class Search:
+    """The search for the causes in a case, and what it stands on.
 
-    It is that of a fit to torque (`plain`: the twin's equations) without the run's group; where no run shows torque,
-    that of a fit to power.
+    `stack`: the twin's effects; `plain`: its equations of torque alone, None where no torque is known; `floor`: the
+    noise floor; `unknown` are not known to it; `seed` draws orders of many causes; `tell` is told how far it has come,
+    where it takes long.
     """
-    if plain is None:
-        through_power = ThroughPower(stack, case.with_power)
-        return through_power, through_power.torque, lambda whole: Predicted(through_power.torque(whole))
-    if case.shows("torque"):
-        check_same_robot(case.runs, stack, plain, case.thresholds.data)
-    left_out = LeftOut(stack, plain, tell)
-    return stack, left_out.torque, left_out.below
 
+    case: Case
+    stack: Stack
+    plain: System | None
+    floor: Floor
+    tell: Tell
+    unknown: Set[Without] = frozenset()
+    seed: int = 0
 
-def torque_causes(
-    case: Case,
-    stack: Stack,
-    plain: System,
-    floor: Floor,
-    below: Below,
-    predicted: Torque,
-    before: Callable[[], TwinPower],
-    tried: tuple[Sequence[Effect], Sequence[Effect]],
-    unknown: Set[Without],
-    seed: int,
-    tell: Tell,
-) -> tuple[Finding, Floor, Refusals]:
-    """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both.
+    @cached_property
+    def twin(self) -> LeftOut | ThroughPower:
+        """What the twin says of torque: fitted to torque without the run's group, or through power.
 
-    tried: effects on torque, and on power; `unknown` are not known to the search. `before` gives the power that the
-    twin takes by the joint torque `predicted`.
-    """
-    if case.shows("power"):
+        Raises InputError where runs are of different robots.
+        """
+        if self.plain is None:
+            return ThroughPower(self.stack, self.case.with_power)
+        if self.case.shows("torque"):
+            check_same_robot(self.case.runs, self.stack, self.plain, self.case.thresholds.data)
+        return LeftOut(self.stack, self.plain, self.tell)
 
-        def beside_power(without: Set[Without]) -> tuple[Finding, Floor]:
-            return find_beside_power(
-                case, stack, tried, below, predicted, before(), floor, seed, without=without, tell=tell
-            )
+    @property
+    def power_stack(self) -> Stack:
+        """The effects that explain power."""
+        return self.twin if isinstance(self.twin, ThroughPower) else self.stack
 
-        return find_possible(case, beside_power, unknown)
-    system = torque_system(stack, case.with_torque, case.grouping, tried[0], below, tell, case.shaken)
+    @cached_property
+    def below(self) -> Below:
+        """What candidates of torque stand on."""
+        return with_load(self.case.robot, self.twin.below)
 
-    def alone(without: Set[Without]) -> tuple[Finding, Floor]:
-        first = find("torque", case, system, floor.torque, seed, without, tell=tell)
-        left = floor_left(case, floor, ExplainedTorque(stack, first, below)) if first.causes else floor
+    @cached_property
+    def before(self) -> TwinPower:
+        """The power that the twin takes by its own torque."""
+        return TwinPower(self.power_stack, self.case.with_power, self.case.grouping, self.twin.torque)
+
+    def torque_causes(
+        self, tried: tuple[Sequence[Effect], Sequence[Effect]]
+    ) -> tuple[ExplainedTorque, Floor, Refusals]:
+        """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both.
+
+        tried: effects on torque, and on power.
+        """
+        case = self.case
+        if case.shows("power"):
+            found = find_possible(case, lambda without: self._beside_power(tried, without), self.unknown)
+        else:
+            about = case.with_torque, case.grouping, tried[0], self.below, self.tell, case.shaken
+            system = torque_system(self.stack, *about)
+            found = find_possible(case, lambda without: self._of_torque(system, without), self.unknown)
+        finding, floor, refusals = found
+        return ExplainedTorque(self.stack, finding, self.below), floor, refusals
+
+    def _beside_power(
+        self, tried: tuple[Sequence[Effect], Sequence[Effect]], without: Set[Without]
+    ) -> tuple[Finding, Floor]:
+        about = self.below, self.twin.torque, self.before
+        return find_beside_power(
+            self.case, self.stack, tried, *about, self.floor, self.seed, without=without, tell=self.tell
+        )
+
+    def _of_torque(self, system: System, without: Set[Without]) -> tuple[Finding, Floor]:
+        first = find("torque", self.case, system, self.floor.torque, self.seed, without, tell=self.tell)
+        explained = ExplainedTorque(self.stack, first, self.below)
+        left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
         return replace(first, floor=left.torque), left
 
-    return find_possible(case, alone, unknown)
+    def power_causes(
+        self, tried: Sequence[Effect], floor: Floor, explained: ExplainedTorque | None
+    ) -> tuple[Explained, Refusals]:
+        """Find the causes of power on the joint torque that is explained, None: on that of the twin.
 
+        `floor`: what causes of torque leave.
+        """
+        case, torque = self.case, explained or self.twin.torque
+        power_of = TwinPower(self.power_stack, case.with_power, case.grouping, torque) if explained else self.before
+        system = power_system(self.power_stack, case.with_power, case.grouping, tried, torque, power_of, self.tell)
+        check_observed(system)
+        level = None if floor.power is None else np.array([floor.power])
+        plain = self.before.system if explained else None
 
-def power_causes(
-    case: Case,
-    stack: Stack,
-    floor: Floor,
-    before: Callable[[], TwinPower] | None,
-    torque: Torque,
-    tried: Sequence[Effect],
-    unknown: Set[Without],
-    seed: int,
-    tell: Tell,
-) -> tuple[Explained, Refusals]:
-    """Find the causes of power on the joint torque that is explained; `before`: power on that of the twin, if other."""
-    power_of = TwinPower(stack, case.with_power, case.grouping, torque)
-    system = power_system(stack, case.with_power, case.grouping, tried, torque, power_of, tell)
-    check_observed(system)
-    level = None if floor.power is None else np.array([floor.power])
-    plain = before().system if before else None
+        def search(without: Set[Without]) -> tuple[Finding, Floor]:
+            found = find("power", case, system, level, self.seed, without, plain, self.tell)
+            of_power = explained_power(self.power_stack, found, torque, power_of)
+            left = floor_left(case, floor, of_power) if found.causes else floor
+            return replace(found, floor=None if left.power is None else np.array([left.power])), left
 
-    def search(without: Set[Without]) -> tuple[Finding, Floor]:
-        found = find("power", case, system, level, seed, without, plain, tell)
-        left = floor_left(case, floor, explained_power(stack, found, torque, power_of)) if found.causes else floor
-        return replace(found, floor=None if left.power is None else np.array([left.power])), left
-
-    finding, _, refusals = find_possible(case, search, unknown)
-    return explained_power(stack, finding, torque, power_of), refusals
+        finding, _, refusals = find_possible(case, search, self.unknown)
+        return explained_power(self.power_stack, finding, torque, power_of), refusals
 
 
 def variants(case: Case, signal: str) -> list[Effect]:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Term
+from irtwin.effects.effect import Effect, Predicted, Term
 from irtwin.effects.stack import Stack
 from irtwin.effects.supply import MechanicalPower
 from irtwin.identification.fits import fit_through_power
@@ -38,6 +38,10 @@ class ThroughPower(Stack):
     def torque(self, motion: Motion) -> np.ndarray:
         """Return the real joint torque that fits the power best, (N, n) N m."""
         return self._own.real_torque(motion, self._values[0])
+
+    def below(self, whole: Motion) -> Predicted:
+        """Return what effects are built on: the torque."""
+        return Predicted(self.torque(whole))
 
     @cached_property
     def power_terms(self) -> Terms:
