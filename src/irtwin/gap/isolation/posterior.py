@@ -7,8 +7,8 @@ of the information `A`, are
 
     prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) / sqrt(det(1 + A / (rows v)))
 
-over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; where
-it is at one, it is at a further one with even odds. In words: `docs/how-it-decides.md`.
+over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; that
+it is at one more has even odds, whichever that is. In words: `docs/how-it-decides.md`.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ class Prior:
 
     def log_odds(self, one: Hypothesis, found: Sequence[Hypothesis]) -> float:
         """Return the log odds of a hypothesis beside those that were found."""
-        if one.joint and any((one.effect, one.scope) == (each.effect, each.scope) for each in found):
-            return 0.0
+        count = sum((one.effect, one.scope) == (each.effect, each.scope) for each in found) if one.joint else 0
+        if count:  # sets of so many joints are as likely as one another
+            return float(np.log((count + 1) / (2 * max(self.joints - count, 1))))
         return -float(np.log(self.effects * (self.joints if one.joint else 1)))
 
 
