@@ -126,7 +126,7 @@ def accumulate_any(
     samples = sum(len(motion.time) for motion in motions)
 
     def grown(some: Sequence[tuple[Motion, int, int]]) -> list[Block]:
-        return _grown(some, equations, lambda *one: _Growing(*one, pattern, kind))
+        return _grown(some, equations, lambda motion, start, stop: _Growing(motion, start, stop, pattern, kind))
 
     blocks = grown(found) if samples * int(pattern.sum()) < _SHARED or not can_copy() else shared(grown, found)
     return [block for block in blocks if block.rows.any()]
