@@ -15,10 +15,12 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID, IRT, XSD
 from irtwin.storage import gap_schema as gap
 from irtwin.storage import live_schema as live
 from irtwin.storage import schema
 from irtwin.storage import structure_schema as structure
+from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base
 
@@ -107,6 +109,7 @@ def fill(workspace: Workspace) -> None:
             *_prices(),
             *_diagnoses(),
             *_live_runs(),
+            *_facts(),
         ]:
             session.add(row)
             session.flush()
@@ -118,6 +121,14 @@ NOTES = (
     ("Arm_C", "tools", 1, "gripper"),
     ("Arm_C", "tools", 2, "welder"),
 )
+
+
+def _facts() -> Iterator[Base]:
+    yield AssertedFact(
+        fact_id="1", about_robot="Arm_B", subject=f"{ID}run/Arm_B.work_2", predicate=f"{IRT}Payload", value="1.0",
+        kind=f"{XSD}double", graph=f"{GRAPH_SOURCE}run_process", author="anna", time=_moment("2026-03-05 08:00"),
+        replaced="0.0", place="run.payload_kg", row_key='{"run_id": "Arm_B.work_2"}',
+    )  # fmt: skip
 
 
 def _robots() -> Iterator[Base]:

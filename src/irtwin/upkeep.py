@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import fcntl
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pyoxigraph import Quad
 from sqlalchemy import select
 
 from irtwin.alarms.settings import NAME
 from irtwin.alarms.settings import asks as alarm_asks
 from irtwin.asking import WORKSPACE
 from irtwin.errors import InputError
-from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE
 from irtwin.next_experiment import proposal_files
 from irtwin.providers.effects_of_ontology import check_effects
 from irtwin.providers.records import find_robot, find_run, run_iri
@@ -145,10 +142,9 @@ def repair(
 ) -> None:
     """Make the graph of a workspace anew from its database, and look through its files.
 
-    The graph that was there is replaced once the new one is whole. What SPARQL updates had written is carried over
-    where it can be read; else the damaged graph is kept aside. On a server, by `graph_url`, each named graph is
-    replaced in a transaction of its own, and what SPARQL updates had written stays. Raises InputError where the
-    database is damaged, or at the end where files are lost that only a data set or a backup can give back.
+    The graph that was there is replaced once the new one is whole. On a server, by `graph_url`, each named graph is
+    replaced in a transaction of its own. Raises InputError where the database is damaged, or at the end where files
+    are lost that only a data set or a backup can give back.
     """
     with Workspace.existing(Path(workspace), database) as place:
         if graph_url is None:
@@ -173,20 +169,18 @@ def _rebuild(place: Workspace, announce: Announce) -> None:
     with _nobody_else(place.graph_folder), files.working_folder(place.folder, ".repair-") as folder:
         place.mapped_rows.unlink(missing_ok=True)
         with KnowledgeGraph(folder / "graph", place.folder, place.resources, place.base) as graph:
-            readable = _fill(place, graph, announce)
-        _swap(place, folder / "graph", keep=not readable)
+            _fill(place, graph, announce)
+        _swap(place, folder / "graph")
 
 
-def _fill(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
-    """Put all that the database knows into a graph; return whether what else was in the folder's was carried over."""
+def _fill(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
+    """Put all that the database knows into a graph."""
     announce("Rebuilding the graph from the database")
     graph.load_ontology()
     check_effects(graph)
     map_rows(place, graph)
-    readable = graph.folder is None or _carry_over(place.graph_folder, graph, announce)
     populate_others(place, graph, announce)
     conclude(graph, announce)
-    return readable
 
 
 @contextmanager
@@ -203,39 +197,14 @@ def _nobody_else(folder: Path) -> Iterator[None]:
         yield
 
 
-def _carry_over(old: Path, new: KnowledgeGraph, announce: Callable[[str], None]) -> bool:
-    """Copy what nobody but SPARQL updates wrote; return whether the old graph could be read to its end."""
-    if not (old / "CURRENT").is_file():
-        return not old.exists()
-    try:
-        with told(old), KnowledgeGraph.as_it_stands(old) as before:
-            written = [quad for quad in before.quads() if not _made(_name(quad))]
-    except InputError:
-        announce(f"  the old graph could not be read; it is kept in {_DAMAGED}/, with what SPARQL updates had written")
-        return False
-    if written:
-        new.replace(written, *{_name(quad) for quad in written})
-    return True
-
-
-def _made(name: str) -> bool:
-    """Whether mapping, rules or validation make a named graph."""
-    return name.startswith(GRAPH) and name != GRAPH_UPDATE
-
-
-def _name(quad: Quad) -> str:
-    return str(quad.graph_name)[1:-1]
-
-
-def _swap(place: Workspace, new: Path, keep: bool) -> None:
+def _swap(place: Workspace, new: Path) -> None:
     """Put the new graph in place. A kill in between leaves none, which the next opening tells."""
     aside = place.folder / _DAMAGED
     if place.graph_folder.exists():
         shutil.rmtree(aside, ignore_errors=True)
         place.graph_folder.rename(aside)
     new.rename(place.graph_folder)
-    if not keep:
-        shutil.rmtree(aside, ignore_errors=True)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def lost_files(place: Workspace) -> list[str]:

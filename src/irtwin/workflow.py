@@ -19,6 +19,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
+from irtwin.knowledge.asserted.statements import map_facts
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import explain_one
 from irtwin.knowledge.extensions import check_mappings
@@ -39,6 +40,7 @@ from irtwin.providers.records import (
     check_name,
     check_plans,
     find_robot,
+    followed,
     identifier,
     ingest,
     is_described,
@@ -160,6 +162,7 @@ def diagnose(
         with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
             check_before(place)
             check_name(place, data_set.robot.name)
+            data_set = followed(data_set, place.facts_about(identifier(data_set.robot.name)))
     model = None if simulator is None else read_model(Path(simulator), data_set.robot)
     data_set = with_simulated_runs(data_set, model, announce)
     found = gap.diagnose(data_set, twin=given, withhold=withhold, seed=seed, progress=announce)
@@ -224,7 +227,7 @@ def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Di
     robot_id = identifier(data_set.robot.name)
     closed = None if found.twin is None else to_json(found.twin)
     with staged(place, robot_id) as apart:
-        ingest(apart, data_set)
+        ingest(apart, data_set, facts=place.facts_about(robot_id))
         record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
     graph.load_ontology()
     map_rows(place, graph)
@@ -385,6 +388,8 @@ def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     seconds = LONGEST_SQL if any(file.is_extension for file in files) else math.inf
     place.note_changes()
     refresh(graph, place.engine, [file.path for file in files], place.mapped_rows, seconds)
+    with place.reading() as session:
+        map_facts(graph, session)
 
 
 def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda line: None) -> str:
@@ -394,7 +399,8 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
     count = len(data_set.runs) + len(data_set.plans)
     announce(f"Ingesting {data_set.robot.name}, {count} runs")
     with staged(place, robot_id) as apart:
-        announce(f"  {ingest(apart, data_set, lambda line: announce(f'  {line}'))}")
+        facts = place.facts_about(robot_id)
+        announce(f"  {ingest(apart, data_set, lambda line: announce(f'  {line}'), facts)}")
         announce("Running the data providers")
         try:
             populate_apart(apart, announce)

@@ -16,7 +16,7 @@ from irtwin.knowledge.contained import contain
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_UPDATE, OWL, RDF, term
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_INFERRED, OWL, RDF, term
 from irtwin.storage.database import Workspace
 from irtwin.workflow import rewriting
 
@@ -118,7 +118,7 @@ def second_payload(workspace: Path) -> str:
     """Say a second payload of a run of the first robot; return the run."""
     with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
         run = next(str(row["run"]) for row in graph.query("SELECT ?run { ?run irt:Payload ?kg } ORDER BY ?run"))
-        payload = Quad(NamedNode(run), NamedNode(term("Payload")), Literal(5.5), NamedNode(GRAPH_UPDATE))
+        payload = Quad(NamedNode(run), NamedNode(term("Payload")), Literal(5.5), NamedNode(GRAPH_ASSERTED))
         graph.change((), {payload})
     return run
 
@@ -151,7 +151,7 @@ def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> Non
     second_payload(workspace)
     assert irtwin("reason", "--workspace", workspace).status == 3
     with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
-        graph.change(set(graph.quads_in(GRAPH_UPDATE)), ())
+        graph.change(set(graph.quads_in(GRAPH_ASSERTED)), ())
         assert reason(graph).set_aside == ()
     assert concluded(workspace) == before
     assert irtwin("status", "--workspace", workspace).status == 0

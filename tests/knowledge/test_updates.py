@@ -7,8 +7,8 @@ from pyoxigraph import DefaultGraph, Literal, NamedNode, Quad, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.updates import keeping_union
-from irtwin.knowledge.vocabulary import GRAPH_UPDATE, PREFIXES
+from irtwin.knowledge.store.updates import by_doing
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
 
 A, B = "http://e/a", "http://e/b"
 
@@ -39,27 +39,30 @@ def values(graph: KnowledgeGraph) -> dict[str, list[int]]:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("INSERT DATA { <x> <p> 3 }", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]}),
+        ("INSERT DATA { <x> <p> 3 }", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_ASSERTED: [3]}),
         ("INSERT DATA { <x> <p> 2 }", {"": [1, 2], A: [1], B: [1, 2]}),
         ("INSERT DATA { GRAPH <a> { <x> <p> 3 } }", {"": [1, 2, 3], A: [1, 3], B: [1, 2]}),
         ("DELETE DATA { GRAPH <a> { <x> <p> 1 } }", {"": [1, 2], B: [1, 2]}),
         ("DELETE DATA { GRAPH <b> { <x> <p> 2 } }", {"": [1], A: [1], B: [1]}),
         ("DELETE DATA { <x> <p> 1 }", {"": [2], B: [2]}),
         ("DELETE WHERE { ?s <p> ?o }", {"": []}),
-        ("DELETE { ?s <p> 2 } INSERT { ?s <p> 4 } WHERE { ?s <p> 2 }", {"": [1, 4], A: [1], B: [1], GRAPH_UPDATE: [4]}),
+        (
+            "DELETE { ?s <p> 2 } INSERT { ?s <p> 4 } WHERE { ?s <p> 2 }",
+            {"": [1, 4], A: [1], B: [1], GRAPH_ASSERTED: [4]},
+        ),
         ("DROP GRAPH <b>", {"": [1], A: [1]}),
         ("DROP ALL", {"": []}),
         ("INSERT DATA { <x> <p> 3 } ; DELETE DATA { <x> <p> 3 } ; # and back\n", {"": [1, 2], A: [1], B: [1, 2]}),
         (
             'insert data { <x> <p> 3 } # DELETE DATA { <x> <p> 1 } "',
-            {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]},
+            {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_ASSERTED: [3]},
         ),
         ("INSERT DATA { <x> <p> 3 . GRAPH <a> { <x> <p> 3 } }", {"": [1, 2, 3], A: [1, 3], B: [1, 2]}),
         ("# nothing", {"": [1, 2], A: [1], B: [1, 2]}),
-        ("#x\rINSERT#\rDATA#\r{ <x> <p> 3 } #;", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]}),
-        ("INSERT DATA { <x> <p> 3 } #\r; DELETE DATA { <x> <p> 1 } ;\r", {"": [2, 3], B: [2], GRAPH_UPDATE: [3]}),
-        ("INSERT DATA { <x> <p> 3 } ; DELETE WHERE { <x> <p> 1 }", {"": [2, 3], B: [2], GRAPH_UPDATE: [3]}),
-        ("INSERT { <x> <p> 3 } WHERE { FILTER(1<2)#>\r } ;", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_UPDATE: [3]}),
+        ("#x\rINSERT#\rDATA#\r{ <x> <p> 3 } #;", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_ASSERTED: [3]}),
+        ("INSERT DATA { <x> <p> 3 } #\r; DELETE DATA { <x> <p> 1 } ;\r", {"": [2, 3], B: [2], GRAPH_ASSERTED: [3]}),
+        ("INSERT DATA { <x> <p> 3 } ; DELETE WHERE { <x> <p> 1 }", {"": [2, 3], B: [2], GRAPH_ASSERTED: [3]}),
+        ("INSERT { <x> <p> 3 } WHERE { FILTER(1<2)#>\r } ;", {"": [1, 2, 3], A: [1], B: [1, 2], GRAPH_ASSERTED: [3]}),
         ("DELETE DATA { <x> <p> 1 . GRAPH <b> { <x> <p> 2 } } ; #}", {"": []}),
     ],
 )
@@ -81,13 +84,13 @@ def test_data_by_itself_leaves_what_the_whole_comparison_leaves(updates: list[tu
         said = " ".join(where % f"<http://e/x> <http://e/p> {number} ." for where, number in data)
         text = f"{operation} DATA {{ {said} }}"
         looked_up.update(text)
-        compared._store.update(keeping_union(text), prefixes=PREFIXES)
+        compared.change(*by_doing(text, compared.quads()))
         assert set(looked_up._store) == set(compared._store)
 
 
 def test_data_with_blank_nodes_goes_the_long_way(graph: KnowledgeGraph) -> None:
     graph.update("INSERT DATA { _:b <http://e/p> 3 }")
-    assert values(graph)[GRAPH_UPDATE] == [3]
+    assert values(graph)[GRAPH_ASSERTED] == [3]
 
 
 @pytest.mark.parametrize(
@@ -121,9 +124,9 @@ def test_strings_are_kept_as_they_are(graph: KnowledgeGraph, end: str) -> None:
 
 def test_relative_names_are_below_the_base(graph: KnowledgeGraph) -> None:
     graph.update("INSERT DATA { <x> <p> 3 }", base="http://e/")
-    assert values(graph)[GRAPH_UPDATE] == [3]
+    assert values(graph)[GRAPH_ASSERTED] == [3]
 
 
 def test_payload_is_a_word_like_any_other(graph: KnowledgeGraph) -> None:
     graph.update("INSERT DATA { <http://e/x> irt:Payload 5 ; <http://e/load> 6 } # load")
-    assert values(graph)[GRAPH_UPDATE] == [5, 6]
+    assert values(graph)[GRAPH_ASSERTED] == [5, 6]

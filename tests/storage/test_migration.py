@@ -45,6 +45,7 @@ from irtwin.storage.revisions.versions import (
     r0014_inseparable,
     r0015_supply_states,
     r0017_metered_loads,
+    r0018_asserted_facts,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -135,6 +136,7 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
             connection.execute(text("DROP TABLE inseparable_energy"))
             connection.execute(text("DROP TABLE supply_state"))
             connection.execute(text("DROP TABLE metered_load"))
+            connection.execute(text("DROP TABLE asserted_fact"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
@@ -172,6 +174,7 @@ def test_each_revision_follows_another() -> None:
     assert r0014_inseparable.down_revision == r0013_choices.revision
     assert r0015_supply_states.down_revision == r0014_inseparable.revision
     assert r0017_metered_loads.down_revision == r0015_supply_states.revision
+    assert r0018_asserted_facts.down_revision == r0017_metered_loads.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from irtwin.cli.options import Number, payload_com_option, printable, say
+from irtwin.cli.options import Number, database_option, graph_option, payload_com_option, printable, say
+from irtwin.errors import InputError
 
 if TYPE_CHECKING:
     from irtwin.bring.bring import Brought
@@ -23,7 +24,7 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 
 @click.command(name="import")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="New folder for the data set.")
+@click.option("--out", type=click.Path(path_type=Path), help="New folder for the data set.")
 @click.option("--robot", metavar="ROBOT", help=f"{_robot_help} Left out of a meter's log, which has no joints.")
 @_name_option
 @click.option(
@@ -46,9 +47,16 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
 @payload_com_option
 @click.option("--repair", is_flag=True, help="Drop samples whose time does not rise, and say how many.")
+@click.option(
+    "--owl", type=click.Path(path_type=Path), help="Edited file of `irtwin export --owl`; FILE: the workspace."
+)
+@click.option("--yes", is_flag=True, help="Take the changes of --owl without asking.")
+@click.option("--author", metavar="NAME", help="Who says so, with --owl. Default: the user's name here.")
+@database_option
+@graph_option
 def import_(
     files: tuple[Path, ...],
-    out: Path,
+    out: Path | None,
     robot: str | None,
     name: str | None,
     maps: tuple[str, ...],
@@ -60,15 +68,30 @@ def import_(
     payload_mass: float | None,
     payload_com: tuple[float, float, float],
     repair: bool,
+    owl: Path | None,
+    yes: bool,
+    author: str | None,
+    database: str | None,
+    graph_url: str | None,
 ) -> None:
-    """Make a data set of logs in other formats, a run a file.
+    """Make a data set of logs in other formats, a run a file; or take back an edited OWL file.
 
     FILE is a ROS bag (1, 2, MCAP), a recording of RTDE by Universal Robots, a CSV file of PlotJuggler or of anybody, a
     Parquet or an Excel file. Without --robot it is a meter's: time, and power or energy. Units are told by names and by
     checks against other columns, and shown. What cannot be told is asked on a terminal; elsewhere the command stops and
     says what to give. What was written is checked, as by `irtwin check`: where something must be cured first, the exit
     status is 2.
+
+    With --owl, FILE is a workspace, and what was changed since `irtwin export --owl`, in Protégé or elsewhere, is shown
+    and, once you agree, kept with its author and time: rows follow, and the next `irtwin run` fits the twin to them.
+    What would contradict is refused, with the reason, and nothing changes.
     """
+    if owl is not None:
+        if len(files) != 1 or out is not None or robot is not None:
+            raise click.UsageError("--owl takes one FILE, the workspace, and neither --out nor --robot.")
+        return _take_edited(owl, files[0], yes, author, database, graph_url)
+    if out is None:
+        raise click.UsageError("Give --out, or --owl.")
     from irtwin.bring.bring import Options, bring, found_in
 
     options = Options(
@@ -106,6 +129,34 @@ def init(dataset: Path, robot: str | None, name: str | None) -> None:
         say(f"Put the robot's URDF into {dataset} as robot.urdf.")
     say(f"Put runs into {dataset / 'runs'}, list them in {dataset / 'dataset.toml'}; then: irtwin check {dataset}")
     click.echo(dataset)
+
+
+def _take_edited(
+    owl: Path, workspace: Path, yes: bool, author: str | None, database: str | None, graph_url: str | None
+) -> None:
+    from getpass import getuser
+
+    from irtwin.asserting import take_edited
+    from irtwin.knowledge.asserted.edited import Edit
+
+    def agrees(edit: Edit) -> bool:
+        for line in edit.words:
+            click.echo(printable(line))
+        if not edit.words or yes:
+            return bool(edit.words)
+        if not sys.stdin.isatty():
+            raise InputError(f"{owl}: nothing was taken: say --yes to take these changes")
+        return click.confirm(f"Take these {len(edit.words)} changes", err=True)
+
+    said = take_edited(
+        owl, workspace, author=author or getuser(), agrees=agrees, database=database, graph_url=graph_url, announce=say
+    )
+    if said is None:
+        say("Nothing was taken.")
+    elif any(fact.place for fact in said.facts):
+        say("Taken. Run the data set again, by `irtwin run`, to have the twin follow.")
+    else:
+        say("Taken.")
 
 
 def _ask(doubt: DoubtError) -> Answer:

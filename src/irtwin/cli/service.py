@@ -19,6 +19,9 @@ from irtwin.cli.options import DAY, Number, database_option, graph_option, say, 
 @click.option(
     "--memory", type=click.IntRange(64, 1 << 20), default=1024, show_default=True, help="Limit per query, MB."
 )
+@click.option(
+    "--allow-origin", "origins", metavar="ORIGIN", multiple=True, help="Site whose pages may ask the endpoint."
+)
 @click.option("--token-file", type=click.Path(path_type=Path), help="File with the token that permits updates.")
 def serve(
     workspace: Path,
@@ -28,13 +31,15 @@ def serve(
     host: str,
     timeout: float,
     memory: int,
+    origins: tuple[str, ...],
     token_file: Path | None,
 ) -> None:
     """Serve the plant's pages at / and the graph as a SPARQL endpoint at /sparql.
 
     A query page is at /query, live robots at /live, the ontology and each individual at the paths of their IRIs. Prices
     are shown where `plant.toml` in the workspace says price_per_kwh, currency and co2_kg_per_kwh. The endpoint is
-    read-only unless you give a token for updates, in a file or in the environment variable IRTWIN_TOKEN.
+    read-only unless you give a token for updates, in a file or in the environment variable IRTWIN_TOKEN. What an update
+    asserts is kept in the database, with what `From:` of the request says for its author.
 
     Where a command was broken off and left the graph behind the database, answers have the header `Irtwin-Graph:
     behind` (`updating` while a command is at work on it) and pages a banner. The server catches up by itself.
@@ -57,6 +62,7 @@ def serve(
         limits=limits,
         announce=_announce,
         database=database,
+        origins=origins,
     )
 
 

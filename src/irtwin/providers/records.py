@@ -30,6 +30,8 @@ from irtwin.signals import log
 from irtwin.signals.channels import columns_of, from_columns
 from irtwin.signals.conditioning import condition
 from irtwin.storage import schema
+from irtwin.storage.asserted import follow
+from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.files import inside
 from irtwin.storage.schema import (
@@ -55,22 +57,46 @@ _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for th
 _READABLE = 40  # characters of a name that is not plain
 
 
-def ingest(workspace: Workspace, data_set: log.DataSet, announce: Callable[[str], None] = lambda line: None) -> Outcome:
+def ingest(
+    workspace: Workspace,
+    data_set: log.DataSet,
+    announce: Callable[[str], None] = lambda line: None,
+    facts: Sequence[AssertedFact] = (),
+) -> Outcome:
     """Take a data set into the workspace, all of it or nothing; say whether it was new.
 
-    `announce` is told of each mesh that cannot be drawn.
+    `facts` are what users asserted of the robot, which is followed. `announce` is told of that, and of each mesh that
+    cannot be drawn.
     """
     meshes, undrawn = mesh_copies(data_set)
     for line in undrawn:
         announce(line)
     robot, parts, runs = rows_of(data_set, meshes)
+    for line in follow([robot, *parts, *runs], facts):
+        announce(line)
     _check_kept_runs(workspace, robot.robot_id, data_set, runs)
     series = {
         row.run_id: pa.table(columns_of(run.signals, data_set.robot.joint_names))
         for row, run in zip(runs, _listed(data_set), strict=True)
     }
     documents = {mesh.path: mesh.content for mesh in meshes.values()}
-    return workspace.ingest(robot, parts, runs, series, documents)
+    return workspace.ingest(robot, parts, runs, series, documents, facts)
+
+
+def followed(data_set: log.DataSet, facts: Sequence[AssertedFact]) -> log.DataSet:
+    """Return a data set as users asserted that it is: its robot's joints and sheet, its payloads and temperature."""
+    if not facts:
+        return data_set
+    row, parts, runs = rows_of(data_set, {})
+    follow([row, *parts, *runs], facts)
+    payloads = {row.name: row.payload_kg for row in runs}
+    return replace(
+        data_set,
+        robot=_with_sheets(data_set.robot, row, {part.name: part for part in parts if isinstance(part, Joint)}),
+        runs=tuple(replace(run, payload_mass=payloads[run.name]) for run in data_set.runs),
+        plans=tuple(replace(run, payload_mass=payloads[run.name]) for run in data_set.plans),
+        ambient_temperature=row.ambient_temperature_degc,
+    )
 
 
 def rows_of(data_set: log.DataSet, meshes: Mapping[str, MeshCopy]) -> tuple[Robot, list[Base], list[Run]]:
@@ -300,30 +326,32 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
             f'{workspace.folder}: the database has no row of joint "{lost[0]}" of "{row.name}"; run its data set '
             "again, or restore a backup by `irtwin restore ARCHIVE --workspace NEW`"
         )
+    return _with_sheets(replace(bare, name=row.name), row, sheets)
+
+
+def _with_sheets(robot: description.Robot, row: Robot, sheets: Mapping[str, Joint]) -> description.Robot:
+    """Return a robot with the limits and data sheets that rows say."""
+
+    def limit(value: float | None, none: float = math.inf) -> float:
+        return none if value is None else value
+
     joints = tuple(
-        description.Joint(
-            name=joint.name,
-            kind=joint.kind,
-            lower=joint.lower,
-            upper=joint.upper,
-            velocity=joint.velocity,
-            effort=joint.effort,
-            acceleration=sheets[joint.name].acceleration_limit_rad_s2,
-            gear_ratio=sheets[joint.name].gear_ratio,
-            rotor_inertia=sheets[joint.name].rotor_inertia_kg_m2,
-            torque_constant=sheets[joint.name].torque_constant_nm_a,
-            winding_resistance=sheets[joint.name].winding_resistance_ohm,
+        replace(
+            joint,
+            lower=limit(sheet.lower_limit_rad, -math.inf),
+            upper=limit(sheet.upper_limit_rad),
+            velocity=limit(sheet.speed_limit_rad_s),
+            effort=limit(sheet.torque_limit_nm),
+            acceleration=sheet.acceleration_limit_rad_s2,
+            gear_ratio=sheet.gear_ratio,
+            rotor_inertia=sheet.rotor_inertia_kg_m2,
+            torque_constant=sheet.torque_constant_nm_a,
+            winding_resistance=sheet.winding_resistance_ohm,
         )
-        for joint in bare.joints
+        for joint in robot.joints
+        for sheet in [sheets[joint.name]]
     )
-    return replace(
-        bare,
-        name=row.name,
-        joints=joints,
-        manufacturer=row.manufacturer,
-        type=row.type,
-        weight=row.weight_kg,
-    )
+    return replace(robot, joints=joints, manufacturer=row.manufacturer, type=row.type, weight=row.weight_kg)
 
 
 def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log.Run:

@@ -13,7 +13,7 @@ from starlette.types import Receive, Scope, Send
 
 from irtwin.serve import description, negotiation, page
 from irtwin.serve.answer import Answer, Answers
-from irtwin.serve.pool import Limits, NotBegun, Pool, Worker
+from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
@@ -94,7 +94,8 @@ class Endpoint:
         return description.response(accept, _address(request), graphs, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
-        await self._updates.do(operation, _address(request), request.headers.get("authorization", ""))
+        said = request.headers
+        await self._updates.do(operation, _address(request), said.get("authorization", ""), said.get("from", ""))
         return Response(status_code=204)
 
     async def _query(self, operation: Operation, request: Request, send: Send) -> None:
@@ -109,8 +110,8 @@ class Endpoint:
             async with self._pool.worker(client(request)) as worker:
                 deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
                 accept = request.headers.get("accept", "")
-                media_type = await self._ask(worker, operation, request, accept, deadline)
-                sending = asyncio.create_task(_send(answer, media_type, send))
+                head = await self._ask(worker, operation, request, accept, deadline)
+                sending = asyncio.create_task(_send(answer, head, request, send))
                 held.callback(sending.cancel)
                 try:
                     async with asyncio.timeout_at(deadline):
@@ -126,8 +127,8 @@ class Endpoint:
                     answer.break_off()
             await sending
 
-    async def _ask(self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float) -> str:
-        """Ask a worker; return the answer's media type."""
+    async def _ask(self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float) -> Head:
+        """Ask a worker; return what is known of the answer."""
         asked = {
             "text": operation.text,
             "default_graphs": operation.default_graphs,
@@ -143,7 +144,7 @@ class Endpoint:
             seconds = self._limits.seconds
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
         note(request, head.standing)
-        return head.media_type
+        return head
 
     async def _named_graphs(self, request: Request) -> list[str]:
         async with self._pool.worker(client(request)) as worker:
@@ -162,12 +163,18 @@ def refused(refusal: Refusal) -> Response:
     return PlainTextResponse(text, status_code=refusal.status, headers=refusal.headers)
 
 
-async def _send(answer: Answer, media_type: str, send: Send) -> None:
-    """Send an answer at its client's pace; one that is broken off is not ended."""
-    headers = {"Content-Type": _with_charset(media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
+async def _send(answer: Answer, head: Head, request: Request, send: Send) -> None:
+    """Send an answer at its client's pace, or that he has it already; one that is broken off is not ended."""
+    headers = {"Content-Type": _with_charset(head.media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
+    if head.etag is not None:
+        headers["ETag"] = head.etag
     encoded = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
-    await send({"type": "http.response.start", "status": 200, "headers": encoded})
+    known = {one.strip() for one in request.headers.get("if-none-match", "").split(",")}
+    is_known = head.etag in known and request.method != "POST"
+    await send({"type": "http.response.start", "status": 304 if is_known else 200, "headers": encoded})
     async for piece in answer.pieces():
+        if is_known:
+            continue
         await send({"type": "http.response.body", "body": piece, "more_body": True})
     if answer.whole:
         await send({"type": "http.response.body", "body": b"", "more_body": False})

@@ -20,33 +20,43 @@ _HEADERS = {
 class Guard:
     """Adds security headers, and refuses what pages of other sites ask, of which they could not read the answer.
 
-    With `local`, it answers only to this machine's own names.
+    Those of `origins` may ask the endpoint, and read its answers. With `local`, it answers only to this machine's own
+    names.
 
     A page from elsewhere can have its own name resolve to 127.0.0.1 and then read what is served there as if it were
     its own (DNS rebinding): such a request carries that name in Host.
     """
 
-    def __init__(self, app: ASGIApp, local: bool):
+    def __init__(self, app: ASGIApp, local: bool, origins: frozenset[str] = frozenset()):
         self._app = app
         self._local = local
+        self._origins = origins
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, unless it is for another host."""
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
 
+        request = Request(scope)
+        origin = request.headers.get("origin", "")
+        is_welcome = origin in self._origins and request.url.path == "/sparql"
+
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
+                if is_welcome:
+                    headers["Access-Control-Allow-Origin"] = origin
+                    headers["Access-Control-Allow-Headers"] = "Accept, Content-Type"  # no token: pages only ask
+                    headers["Cross-Origin-Resource-Policy"] = "cross-origin"
+                    headers.add_vary_header("Origin")
             await send(message)
 
-        request = Request(scope)
         if self._local and _host(request.headers.get("host", "")) not in _LOCAL:
             refusal = PlainTextResponse("this server answers to localhost only\n", status_code=421)
             return await refusal(scope, receive, send_guarded)
-        if _from_another_site(request):
+        if not is_welcome and _from_another_site(request):
             refusal = PlainTextResponse("this server does not answer to other sites' pages\n", status_code=403)
             return await refusal(scope, receive, send_guarded)
         await self._app(scope, receive, send_guarded)

@@ -38,10 +38,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Head:
-    """What is known of an answer before its bytes: their media type, and how the graph stands (`irtwin.asking`)."""
+    """What is known of an answer before its bytes: media type, how the graph stands (`irtwin.asking`), and its ETag.
+
+    An answer has an ETag where all of it was there before its first byte left.
+    """
 
     media_type: str
     standing: str | None
+    etag: str | None
 
 
 class NotBegun(Exception):

@@ -39,7 +39,17 @@ def read_get(query_string: str) -> Operation | None:
     parameters = _parameters(query_string)
     if "update" in parameters:
         raise Refusal(400, "an update is sent by POST, not by GET")
+    if "query" not in parameters and {"graph", "default"} & parameters.keys():
+        return _graph(parameters)
     return _operation("query", parameters) if "query" in parameters else None
+
+
+def _graph(parameters: Mapping[str, Sequence[str]]) -> Operation:
+    """Read which graph is asked for (SPARQL 1.1 Graph Store HTTP Protocol, section 4.2)."""
+    named = parameters.get("graph", ())
+    if len(named) > 1 or (named and "default" in parameters):
+        raise Refusal(400, "ask for one graph: `graph=IRI` or `default`")
+    return Operation("query", "CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }", tuple(named))
 
 
 def read_post(content_type: str, query_string: str, body: bytes) -> Operation:

@@ -8,7 +8,7 @@ import logging
 import os
 import signal
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from types import FrameType
 import uvicorn
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
@@ -44,6 +45,7 @@ from irtwin.storage.database import Workspace
 
 _GRACE = 3  # s that answers under way may still take when the server stops
 _LONGEST_TOKEN = 100_000  # bytes
+_SMALL = 2000  # bytes of an answer that is not worth to be packed
 _LATE = "Cancel %s running task(s), timeout graceful shutdown exceeded"  # uvicorn's
 
 
@@ -56,11 +58,13 @@ def serve(
     limits: Limits,
     announce: Callable[[str], None],
     database: str | None = None,
+    origins: Sequence[str] = (),
 ) -> None:
     """Serve a workspace's graph until SIGINT or SIGTERM.
 
-    Port 0 takes a free one; `announce` is told the endpoint's address once it answers; `database` is the URL of the
-    workspace's database, which the graph is held against first.
+    Pages of other sites may ask the endpoint where their origin is one of `origins`. Port 0 takes a free one;
+    `announce` is told the endpoint's address once it answers; `database` is the URL of the workspace's database, which
+    the graph is held against first.
     Raises InputError where the graph is missing, the port is taken, or the tariff cannot be used.
     """
     base = _base(source, database)  # what cannot be read is said here, once, rather than by each worker
@@ -69,7 +73,14 @@ def serve(
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
     app = application(
-        source, host, token=token, limits=limits, base=base, opened=lambda: announce(address), database=database
+        source,
+        host,
+        token=token,
+        limits=limits,
+        base=base,
+        opened=lambda: announce(address),
+        database=database,
+        origins=origins,
     )
     config = uvicorn.Config(
         app,
@@ -155,13 +166,15 @@ def application(
     base: str = ID,
     opened: Callable[[], None] = lambda: None,
     database: str | None = None,
+    origins: Sequence[str] = (),
 ) -> Starlette:
     """Return the ASGI application; its workers live between its start-up and its shutdown.
 
-    base: what the IRIs of the graph's individuals begin with; database: the URL of the workspace's, for `catch_up`.
+    base: what the IRIs of the graph's individuals begin with; database: the URL of the workspace's, for updates and
+    `catch_up`; origins: of other sites whose pages may ask the endpoint.
     """
     pool = Pool(source, 1 + max(2, os.cpu_count() or 2), limits)
-    updates = Updates(source, token, limits)
+    updates = Updates(source, token, limits, database)
     live = LivePages(source)
     resources = checked(source.workspace)
     asking = Asking(pool, updates, limits, base)
@@ -193,7 +206,11 @@ def application(
             Route("/assets/{name}", page.asset, methods=["GET"]),
             *individuals.routes(asking, resources),
         ],
-        middleware=[Middleware(Guard, local=_is_loopback(host)), Middleware(Standing)],
+        middleware=[
+            Middleware(Guard, local=_is_loopback(host), origins=frozenset(origins)),
+            Middleware(GZipMiddleware, minimum_size=_SMALL, compresslevel=5),
+            Middleware(Standing),
+        ],
         exception_handlers={Refusal: _refused},
         lifespan=lifespan,
     )

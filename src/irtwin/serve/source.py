@@ -54,7 +54,3 @@ class Source:
         else:
             with KnowledgeGraph(self.url, self.workspace) as graph:
                 yield lambda at_once: graph
-
-    def writing(self) -> KnowledgeGraph:
-        """Open the graph to change it. Raises InputError where another process does, or the server is not there."""
-        return KnowledgeGraph(self.folder if self.url is None else self.url, self.workspace)

@@ -8,6 +8,7 @@ all that comes. Where a SPARQL server keeps the graph, a query that is ended her
 
 from __future__ import annotations
 
+import hashlib
 import json
 import struct
 import sys
@@ -44,6 +45,7 @@ class _Sink:
         self._out = out
         self._left = most_bytes
         self._held = bytearray()
+        self._etag: str | None = None
 
     def write(self, data: bytes) -> int:
         self._left -= len(data)
@@ -60,12 +62,16 @@ class _Sink:
     def end(self) -> None:
         if not self.begun and len(self._held) <= _MOST_KEPT:
             self.small = bytes(self._held)
+        if not self.begun:
+            named = hashlib.sha256(self.media_type.encode() + b"\0" + self._held)
+            self._etag = f'W/"{named.hexdigest()[:32]}"'
         self._send()
         _frame(self._out, b"E", b"")
 
     def _send(self) -> None:
         if not self.begun:
-            _frame(self._out, b"H", json.dumps({"media_type": self.media_type, "standing": self.standing}).encode())
+            head = {"media_type": self.media_type, "standing": self.standing, "etag": self._etag}
+            _frame(self._out, b"H", json.dumps(head).encode())
             self.begun = True
         _frame(self._out, b"D", bytes(self._held))
         self._held.clear()

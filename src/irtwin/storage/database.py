@@ -13,9 +13,10 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.resources import Resources, resources_of
-from irtwin.storage import base_iri, engine, files, series_place
+from irtwin.storage import asserted, base_iri, engine, files, series_place
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
+from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
@@ -188,6 +189,7 @@ class Workspace:
         runs: Sequence[Run],
         series: Mapping[str, pa.Table],
         documents: Mapping[str, bytes] | None = None,
+        facts: Sequence[AssertedFact] = (),
     ) -> Outcome:
         """Take in a robot's data set, all of it or nothing.
 
@@ -203,7 +205,8 @@ class Workspace:
         rows = [robot, *parts, *runs]
         with self._writing() as session:
             known = bool(session.scalar(select(exists().where(Robot.robot_id == robot.robot_id))))
-            if known and self._holds(session, robot.robot_id, rows):
+            is_followed = not asserted.is_newer_than_twin(session, robot.robot_id, facts)
+            if known and is_followed and self._holds(session, robot.robot_id, rows):
                 for row in parts:
                     if isinstance(row, SourceFile):
                         session.merge(row)  # the data set may lie in another folder now
@@ -272,6 +275,16 @@ class Workspace:
             run.file, run.sha256 = stored.path, stored.series_id
             insert_rows(session, [run, stored, *rows])
         return stored
+
+    def facts_about(self, robot_id: str) -> list[AssertedFact]:
+        """Return the facts that rows of a robot follow, the earliest first."""
+        with self.reading() as session:
+            return asserted.facts_about(session, robot_id)
+
+    def keep_facts(self, facts: Sequence[AssertedFact], withdrawn: Iterable[str]) -> None:
+        """Keep what a user asserted, with the rows that follow; drop what was taken back, by `fact_id`."""
+        with self._writing() as session:
+            asserted.keep(session, facts, withdrawn)
 
     def drop_robot(self, robot_id: str) -> None:
         """Forget a robot and everything derived from it."""

@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import Column, Connection, Table, inspect, select
 
 from irtwin.errors import InputError
+from irtwin.storage.asserted_schema import FILLED
 from irtwin.storage.base_iri import checked as checked_base
 from irtwin.storage.rows import FILES
 from irtwin.storage.schema import MEASURED, MEASURED_RUN, MODELLED, PLANNED, PLANNED_RUN, WATCHED_RUNS, Base, Moment
@@ -29,6 +30,11 @@ _PATTERNS = {
     "series_id": re.compile(r"[0-9a-f]{64}"),
     "run.kind": re.compile("|".join((PLANNED_RUN, MEASURED_RUN, *WATCHED_RUNS))),
     "series.kind": re.compile("|".join((MEASURED, PLANNED, MODELLED))),
+    "asserted_fact.place": re.compile("|".join(f"{table}[.]({'|'.join(names)})" for table, names in FILLED.items())),
+    **dict.fromkeys(
+        (f"asserted_fact.{name}" for name in ("subject", "predicate", "graph")),
+        re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:[^\x00-\x20<>\"{}|^`\\]*"),
+    ),
 }
 _FILE = re.compile(r"[a-z]+/[A-Za-z0-9_~-][A-Za-z0-9_.~-]{0,250}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")

@@ -125,6 +125,9 @@ class Explainer:
             activity = self._graph.iri(f"activity/{name.removeprefix(GRAPH_ACTIVITY)}")
             used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
             return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
+        said = provenance.asserted(self._graph, triple)
+        if said is not None:
+            return Explanation(what, said)
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
             maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)

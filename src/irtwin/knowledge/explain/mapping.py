@@ -18,14 +18,19 @@ _TYPE = NamedNode(RDF + "type")
 
 def mapping_of(triple: Triple, files: Files, base: str) -> str:
     """Return, in words, the first triples map of the mappings that may have made a triple of a graph with a base."""
-    for where, triples_map in _triples_maps(files):
+    return says(triple, files, base) or "a mapping"
+
+
+def says(triple: Triple, files: Files, base: str) -> str | None:
+    """Return as `mapping_of`; None where no mapping makes such a triple."""
+    for where, triples_map in maps_of(files):
         if _says(triples_map, triple, base):
             return f"mapping {where}, {_table(triples_map.table)}"
-    return "a mapping"
+    return None
 
 
 @lru_cache(maxsize=16)
-def _triples_maps(files: Files) -> tuple[tuple[str, TriplesMap], ...]:
+def maps_of(files: Files) -> tuple[tuple[str, TriplesMap], ...]:
     """Return the triples maps of mappings, each with its name beside that of its file."""
     return tuple(
         (f"{file} #{re.split('[#/]', getattr(node, 'value', ''))[-1]}", triples_map)

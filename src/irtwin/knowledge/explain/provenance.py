@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pyoxigraph import Literal, NamedNode, Triple
+
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Row
+from irtwin.knowledge.vocabulary import XSD, shorten
 
 _MAKERS = """
 SELECT ?activity ?provider ?software ?finished
@@ -54,6 +57,15 @@ WHERE {
   FILTER(isIRI(?next) && ?next != ?thing)
 }
 ORDER BY ?next"""
+
+_ASSERTED = """
+SELECT ?value ?by ?at ?replaced ?fact
+WHERE {
+  ?fact irt:asserted_of ?thing ; irt:Asserted_Property ?property ; irt:Asserted_Value ?value ; irt:Asserted_By ?by ;
+    irt:Asserted_At ?at .
+  OPTIONAL { ?fact irt:Replaced_Value ?replaced }
+}
+ORDER BY DESC(?at)"""
 
 _RUN = """
 SELECT ?run
@@ -129,6 +141,28 @@ def behind(graph: KnowledgeGraph, thing: str) -> list[str]:
         if found := [node for node in nodes if file_of(graph, node).file is not None]:
             return found
     return []
+
+
+def asserted(graph: KnowledgeGraph, triple: Triple) -> str | None:
+    """Return, in words, who asserted a triple, when and in place of what; None where nobody did."""
+    if not isinstance(triple.subject, NamedNode) or not isinstance(triple.object, NamedNode | Literal):
+        return None
+    property = Literal(triple.predicate.value, datatype=NamedNode(f"{XSD}anyURI"))
+    rows = graph.query(_ASSERTED, {"thing": triple.subject.value, "property": property})
+    for row in rows:
+        if _same(row["value"], triple.object):
+            replaced = f", in place of {row['replaced']}" if row["replaced"] is not None else ""
+            when = f"{row['at']:%Y-%m-%d %H:%M:%S %Z}"
+            return f"asserted by {row['by']}, {when}{replaced}, {shorten(row['fact'], graph.base)}"
+    return None
+
+
+def _same(written: str, term: NamedNode | Literal) -> bool:
+    """Whether a fact's value is that of a term, whose number may be written otherwise."""
+    try:
+        return written == term.value or float(written) == float(term.value)
+    except ValueError:
+        return False
 
 
 def told_in(graph: KnowledgeGraph, thing: str, property: str) -> File:

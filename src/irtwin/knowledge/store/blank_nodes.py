@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
+from secrets import token_hex
 from typing import cast
 
 from pyoxigraph import BlankNode, CanonicalizationAlgorithm, Dataset, Literal, NamedNode, Quad, Triple
@@ -29,6 +30,18 @@ def named_by_content(triples: Iterable[Triple], content: bytes) -> Iterator[Trip
         return names.setdefault(term, BlankNode(f"f{file}n{len(names)}")) if isinstance(term, BlankNode) else term
 
     return (cast(Triple, named(triple)) for triple in triples)
+
+
+def named_below(quads: Iterable[Quad], place: str) -> set[Quad]:
+    """Return quads with an IRI of their own below a place for each blank node (RDF 1.1, section 3.5)."""
+    names: dict[BlankNode, NamedNode] = {}
+
+    def named(term: Object) -> Object:
+        if isinstance(term, BlankNode):
+            return names.setdefault(term, NamedNode(place + token_hex(12)))
+        return term
+
+    return {Quad(named(q.subject), q.predicate, named(q.object), q.graph_name) for q in quads}  # type: ignore[arg-type]
 
 
 def same(some: set[Triple], others: set[Triple]) -> bool:

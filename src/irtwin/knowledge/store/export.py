@@ -16,6 +16,7 @@ from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
+    GRAPH_ASSERTED,
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
     GRAPH_SOURCE,
@@ -40,9 +41,18 @@ def export_owl(graph: KnowledgeGraph, path: Path) -> None:
     The modules become one ontology that imports nothing, so that the file needs neither network nor catalogue. Rules
     stand in it in SWRL; of a rule that SWRL cannot say, a comment of the ontology tells why, and what it concluded
     stands there. Each individual has a label. The SHACL report stays out: it speaks about the graph, not about robots.
-    Times are cut to milliseconds.
+    Times are cut to milliseconds. What was edited in it can be taken back: see `asserted.edited`.
     """
-    triples = graph.triples(GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_ACTIVITY, GRAPH_INFERRED)
+    kept = exported(graph)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    serialize(sorted(kept, key=str), str(part), RdfFormat.RDF_XML, prefixes=graph.prefixes)
+    part.replace(path)
+
+
+def exported(graph: KnowledgeGraph) -> set[Triple]:
+    """Return the triples that an export of a graph holds."""
+    triples = graph.triples(GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_ACTIVITY, GRAPH_ASSERTED, GRAPH_INFERRED)
     modules = _of_type(triples, NamedNode(OWL + "Ontology")) - {_ONTOLOGY}
     kept = {
         to_milliseconds(triple) for triple in triples if triple.subject not in modules and triple.predicate != _IMPORTS
@@ -52,10 +62,7 @@ def export_owl(graph: KnowledgeGraph, path: Path) -> None:
     rules = as_swrl(graph, all_rules(graph.resources))
     kept |= rules.triples
     kept |= {Triple(_ONTOLOGY, _COMMENT, _left_out(rule, why)) for rule, why in rules.left_out}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    serialize(sorted(kept, key=str), str(part), RdfFormat.RDF_XML, prefixes=graph.prefixes)
-    part.replace(path)
+    return kept
 
 
 def _left_out(rule: Rule, why: str) -> Literal:

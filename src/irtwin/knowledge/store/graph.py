@@ -23,7 +23,7 @@ from pyoxigraph import (
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store import changes, store_files
-from irtwin.knowledge.store.blank_nodes import has_blank_node, same
+from irtwin.knowledge.store.blank_nodes import has_blank_node, named_below, same
 from irtwin.knowledge.store.column_functions import column_functions
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
@@ -36,13 +36,14 @@ from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import Table, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
-from irtwin.knowledge.store.updates import as_change, check, keeping_union
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, GRAPH_UPDATE, ID, VOID, prefixes
+from irtwin.knowledge.store.updates import as_change, by_doing, check
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
+Subject = NamedNode | BlankNode | Triple
 _MOST_KEPT = 2_000  # values of an answer that is kept
 _NAMED_AT_ONCE = 5_000  # IRIs in a query
 _MANY = 10_000  # new quads: from there on a file of their own is quicker than the store's log, and takes no memory
@@ -378,7 +379,15 @@ class KnowledgeGraph:
     def update(
         self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str | None = None
     ) -> None:
-        """Do a SPARQL update in one transaction that keeps the default graph the union: see `updates`.
+        """Do a SPARQL update in one transaction; raises InputError as `difference`."""
+        self.change(*self.difference(text, default_graphs, named_graphs, base))
+        self.flush()
+
+    @telling
+    def difference(
+        self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str | None = None
+    ) -> tuple[set[Quad], set[Quad]]:
+        """Return the quads of named graphs that a SPARQL update would take out and put in: see `updates`.
 
         Graphs and base are those of `answer`. InputError where the text is no update, reads from elsewhere, or fails.
         """
@@ -388,15 +397,15 @@ class KnowledgeGraph:
             text = using(text, default_graphs, named_graphs, base)
         try:
             change = as_change(text, self._holding, base, self.prefixes)
-            if change is None:
-                self._forget_what_was_inferred([GRAPH_UPDATE])
-                with self._writing() as store:
-                    store.update(keeping_union(text, base), base_iri=base, prefixes=self.prefixes)
-            else:
-                self.change(*change)
-            self._store.flush()
+            removed, added = change or by_doing(text, self.quads(), base, self.prefixes)
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
+        return removed, named_below(added, self.iri("genid/"))
+
+    def said(self, subject: Subject, predicate: NamedNode) -> set[Quad]:
+        """Return the quads of named graphs that say a property of a subject."""
+        rows = self._store.query(f"SELECT ?o ?g {{ GRAPH ?g {{ {subject} {predicate} ?o }} }}")
+        return {Quad(subject, predicate, row["o"], row["g"]) for row in cast(QuerySolutions, rows)}
 
     @telling
     def about(self, node: NamedNode | BlankNode) -> list[Quad]:

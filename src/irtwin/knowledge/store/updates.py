@@ -1,4 +1,4 @@
-"""SPARQL updates that keep the default graph the union of the named graphs.
+"""What SPARQL updates take out of named graphs and put in, so that the default graph stays their union.
 
 Who writes an update sees one graph, the union, beside the named ones. What it puts there belongs to no source, so it
 goes into a named graph of its own; what it takes from there is taken from every named graph that holds it.
@@ -7,7 +7,7 @@ goes into a named graph of its own; what it takes from there is taken from every
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
 
@@ -16,9 +16,9 @@ from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.keywords import is_update, parse_update, refuse_service_and_load
 from irtwin.knowledge.store.sparql_text import SPACE, after_prologue
 from irtwin.knowledge.store.syntax_error import in_words
-from irtwin.knowledge.vocabulary import GRAPH, GRAPH_UPDATE, PREFIXES
+from irtwin.knowledge.store.union import with_union
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, PREFIXES
 
-_BEFORE = f"{GRAPH}before"  # there only while an update lasts
 _DATA = re.compile(rf"(INSERT|DELETE){SPACE}DATA", re.IGNORECASE | re.ASCII)
 
 
@@ -56,33 +56,31 @@ def as_change(
     if head[1].lower() == "delete":
         return named | set(holding(union)), set()
     new = union - {quad.triple for quad in (*named, *holding(union))}
-    graph = NamedNode(GRAPH_UPDATE)
-    return set(), named | {Quad(triple.subject, triple.predicate, triple.object, graph) for triple in new}
+    return set(), named | set(_in_graph(new))
 
 
-def keeping_union(text: str, base: str | None = None) -> str:
-    """Return an update that does what `text` says, and what the union then needs, in one transaction.
+def by_doing(
+    text: str, quads: Iterable[Quad], base: str | None = None, prefixes: dict[str, str] = PREFIXES
+) -> tuple[set[Quad], set[Quad]]:
+    """Return the same as `as_change`, of any update, by doing it on a copy of all quads in memory.
 
-    The text has passed `check`.
+    Raises SyntaxError or RuntimeError where it fails.
     """
-    start = after_prologue(text)
-    prologue, operations = text[:start], text[start:]
-    if not operations:
-        return prologue
-    # A text may end with a semicolon, or with a comment that the new line ends.
-    semicolon = ";" if is_update(f"{text}\n; CLEAR DEFAULT", base) else ""
-    # Oxigraph takes a prologue before the first operation only, so it stays in front.
-    return f"""{prologue}
-COPY DEFAULT TO <{_BEFORE}> ;
-{operations}
-{semicolon}
-INSERT {{ GRAPH <{GRAPH_UPDATE}> {{ ?s ?p ?o }} }}
-WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?o }} }} }} ;
-DELETE {{ GRAPH ?g {{ ?s ?p ?o }} }}
-WHERE {{ GRAPH <{_BEFORE}> {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} GRAPH ?g {{ ?s ?p ?o }} }} ;
-DROP SILENT GRAPH <{_BEFORE}> ;
-DELETE {{ ?s ?p ?o }} WHERE {{ ?s ?p ?o FILTER NOT EXISTS {{ GRAPH ?g {{ ?s ?p ?o }} }} }} ;
-INSERT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER NOT EXISTS {{ ?s ?p ?o }} }}"""
+    before, store = set(quads), Store()
+    store.bulk_extend(with_union(before))
+    store.update(text, base_iri=base, prefixes=prefixes)
+    union = {quad.triple for quad in store.quads_for_pattern(None, None, None, DefaultGraph())}
+    old = {quad.triple for quad in before}
+    lost = old - union
+    named = {quad for quad in store if quad.graph_name != DefaultGraph() and quad.triple not in lost}
+    new = union - old - {quad.triple for quad in named}
+    after = named | set(_in_graph(new))
+    return before - after, after - before
+
+
+def _in_graph(triples: Iterable[Triple]) -> Iterator[Quad]:
+    graph = NamedNode(GRAPH_ASSERTED)
+    return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
 
 
 def _in_place(text: str, base: str | None) -> SyntaxError | None:

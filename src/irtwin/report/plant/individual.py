@@ -9,12 +9,12 @@ from typing import Any
 
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
+    GRAPH_ASSERTED,
     GRAPH_CHANGED,
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
     GRAPH_REASONED,
     GRAPH_SOURCE,
-    GRAPH_UPDATE,
     GRAPH_VALIDATION,
     ID,
     RDF,
@@ -133,7 +133,7 @@ def _by(graph: str, base: str) -> tuple[str, str | None]:
         return f"taken in ({graph.removeprefix(GRAPH_SOURCE)})", None
     known = {
         GRAPH_ONTOLOGY: "the ontology",
-        GRAPH_UPDATE: "an update",
+        GRAPH_ASSERTED: "asserted",
         GRAPH_REASONED: "noted by the reasoner",
         GRAPH_CHANGED: "noted by the reasoner",
         GRAPH_VALIDATION: "the validation",

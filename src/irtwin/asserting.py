@@ -1,0 +1,127 @@
+"""What users assert by SPARQL Update or an edited OWL file: tried, kept in the database, and followed.
+
+Run as a module it does one update for `irtwin serve`, in a process that can be ended: a JSON object on standard input
+says which, and an answer of one line says what is wrong with it. Nothing is kept before that line; the graph follows
+after it.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from pyoxigraph import Quad
+
+from irtwin.errors import InputError
+from irtwin.knowledge.asserted.edited import Edit, edit_of
+from irtwin.knowledge.asserted.statements import Assertion, read
+from irtwin.knowledge.asserted.trial import check
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.no_network import leave_network
+from irtwin.knowledge.store.sparql_server import ServerFault
+from irtwin.limits import limit_memory
+from irtwin.storage.database import Workspace
+from irtwin.workflow import Announce, conclude, map_rows, rewriting
+
+_SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
+_BUSY = "another process is writing the graph: try again later"
+
+
+def take_edited(
+    owl: Path,
+    workspace: Path,
+    *,
+    author: str,
+    agrees: Callable[[Edit], bool],
+    database: str | None = None,
+    graph_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> Assertion | None:
+    """Take in what was changed in an OWL file since `irtwin export` wrote it; None where nothing was, or not agreed.
+
+    `agrees` is shown the difference before anything is written. Raises InputError where a change is nobody's to make,
+    or would contradict.
+    """
+    with Workspace.existing(workspace, database) as place, rewriting(place, graph_url, announce) as graph:
+        edit = edit_of(graph, owl)
+        if not agrees(edit):
+            return None
+        said = keep(place, graph, edit.removed, edit.added, author)
+        follow(place, graph, said, announce)
+        return said
+
+
+def keep(
+    place: Workspace, graph: KnowledgeGraph, removed: Iterable[Quad], added: Iterable[Quad], author: str
+) -> Assertion:
+    """Keep what a change of the graph asserts, if it holds with all else. Raises InputError where it does not."""
+    with place.reading() as session:
+        said = read(graph, session, removed, added, author)
+        session.expunge_all()
+    check(graph, said.removed, said.added)
+    place.keep_facts(said.facts, said.withdrawn)
+    return said
+
+
+def follow(place: Workspace, graph: KnowledgeGraph, said: Assertion, announce: Announce = lambda line: None) -> None:
+    """Bring the graph up to date with what is kept now."""
+    if said.facts or said.withdrawn:
+        map_rows(place, graph)
+        graph.change(said.removed, ())  # of a user's own graph that nothing is left of
+        conclude(graph, announce)
+
+
+def main(memory: int) -> None:
+    """Do the update on standard input; write what is wrong with it. Both are JSON."""
+    request = json.load(sys.stdin.buffer)
+    if request["url"] is None:
+        leave_network()
+    with ExitStack() as held:
+        try:
+            place, graph = held.enter_context(_opened(request))
+        except ServerFault as error:
+            return _answer(_of_server(error))
+        except InputError:
+            return _answer({"status": 503, "message": _BUSY, "headers": {"Retry-After": "5"}})
+        limit_memory(memory)
+        dataset = request["text"], request["default_graphs"], request["named_graphs"], request["base"]
+        try:
+            if place is None:
+                graph.update(*dataset)
+                return _answer({})
+            said = keep(place, graph, *graph.difference(*dataset), request["author"])
+        except ServerFault as error:
+            return _answer(_of_server(error))
+        except InputError as error:
+            return _answer({"status": 400, "message": str(error), "headers": {}})
+        _answer({})
+        follow(place, graph, said)
+
+
+@contextmanager
+def _opened(request: dict[str, Any]) -> Iterator[tuple[Workspace | None, KnowledgeGraph]]:
+    """Open the graph to write, with its workspace; of a graph that has no database it is all that is kept."""
+    folder, url = Path(request["workspace"]), request["url"]
+    if Workspace.is_there(folder, request["database"]):
+        with Workspace.existing(folder, request["database"]) as place, rewriting(place, url) as graph:
+            yield place, graph
+    else:
+        with KnowledgeGraph(url or folder / "graph", folder) as graph:
+            yield None, graph
+
+
+def _of_server(error: ServerFault) -> dict[str, object]:
+    print(f"irtwin: {error}", file=sys.stderr)
+    return {"status": 502, "message": _SERVER_FAILS, "headers": {}}
+
+
+def _answer(answer: dict[str, object]) -> None:
+    print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

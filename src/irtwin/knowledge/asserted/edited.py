@@ -1,0 +1,76 @@
+"""What was changed in an OWL file since it was exported, as in Protégé: the statements that went and that came."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pyoxigraph import NamedNode, Quad, RdfFormat, Store, Triple, parse
+
+from irtwin.errors import InputError
+from irtwin.knowledge.owl_rl.closure import show
+from irtwin.knowledge.store.blank_nodes import has_blank_node
+from irtwin.knowledge.store.export import exported
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, RDF
+
+_TYPE = NamedNode(f"{RDF}type")
+_FORMATS = {".owl": RdfFormat.RDF_XML, ".rdf": RdfFormat.RDF_XML, ".xml": RdfFormat.RDF_XML, ".ttl": RdfFormat.TURTLE}
+
+
+@dataclass(frozen=True)
+class Edit:
+    """Quads of named graphs that an edited file takes out, and that it puts in; `words` a line for each."""
+
+    removed: frozenset[Quad]
+    added: frozenset[Quad]
+    words: tuple[str, ...]
+
+
+def edit_of(graph: KnowledgeGraph, path: Path) -> Edit:
+    """Return what was changed in a file since the graph was exported into it.
+
+    Axioms of unnamed classes, rules and other statements without names are not compared: editors write them anew.
+    Raises InputError where the file cannot be read, or is no export of this graph.
+    """
+    new, old = _named(_parsed(path)), _named(exported(graph))
+    if not new & old:
+        raise InputError(f"{path}: says nothing that this workspace says; give a file that `irtwin export --owl` wrote")
+    gone = old - new
+    known = {triple.subject for triple in old}
+    came = {triple for triple in new - old if not (triple.subject in known and _is_declaration(triple))}
+    removed = {
+        quad for triple in gone for quad in graph.said(triple.subject, triple.predicate) if quad.triple == triple
+    }
+    words = [f"{sign} {' '.join(show(term, graph.base) for term in triple)}" for sign, triple in _in_order(gone, came)]
+    return Edit(frozenset(removed), frozenset(in_graph(came, GRAPH_ASSERTED)), tuple(words))
+
+
+def _parsed(path: Path) -> Iterator[Triple]:
+    form = _FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise InputError(f"{path}: its name must end in {', '.join(_FORMATS)}; save it as RDF/XML or Turtle")
+    try:
+        yield from (quad.triple for quad in parse(read_rdf(path, form), format=form))
+    except (SyntaxError, MemoryError) as error:
+        refuse(path, error)
+
+
+def _named(triples: Iterable[Triple]) -> set[Triple]:
+    """Return the triples of names and literals, these as the graph gives them back; not those about the file itself."""
+    store = Store()
+    store.extend(in_graph(triple for triple in triples if not has_blank_node([triple])))
+    return {quad.triple for quad in store if quad.subject != NamedNode(ONTOLOGY)}
+
+
+def _is_declaration(triple: Triple) -> bool:
+    """Whether a triple says only what kind of term something is, which editors write of every term."""
+    kind = triple.object
+    return triple.predicate == _TYPE and isinstance(kind, NamedNode) and kind.value.startswith(OWL)
+
+
+def _in_order(gone: set[Triple], came: set[Triple]) -> list[tuple[str, Triple]]:
+    both = [*(("-", triple) for triple in gone), *(("+", triple) for triple in came)]
+    return sorted(both, key=lambda one: (str(one[1].subject), str(one[1].predicate), one[0] != "-", str(one[1])))

@@ -1,0 +1,258 @@
+"""A change of the graph read as facts: what a row is to say, what stands for itself, and what nobody can assert."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+from urllib.parse import unquote
+
+from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Triple
+from sqlalchemy import Column, select
+from sqlalchemy.orm import Session
+
+from irtwin.errors import InputError
+from irtwin.knowledge.explain.mapping import maps_of, says
+from irtwin.knowledge.mapping.document import TermMap, TriplesMap
+from irtwin.knowledge.mapping.identifiers import Identifier
+from irtwin.knowledge.mapping.terms import absolute
+from irtwin.knowledge.owl_rl.closure import show
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import (
+    GRAPH,
+    GRAPH_ACTIVITY,
+    GRAPH_ASSERTED,
+    GRAPH_INFERRED,
+    GRAPH_ONTOLOGY,
+    GRAPH_SOURCE,
+    RDF,
+    XSD,
+)
+from irtwin.storage.asserted import key_text, row_of, value_of, written
+from irtwin.storage.asserted_schema import FILLED, AssertedFact
+from irtwin.storage.row_rules import check_row
+from irtwin.storage.rows import values
+from irtwin.storage.schema import Base, Robot
+
+_TYPE = NamedNode(f"{RDF}type")
+_NUMBERS = frozenset(f"{XSD}{name}" for name in ("double", "float", "decimal", "integer", "int", "long"))
+_MADE_BY = {
+    GRAPH_ACTIVITY: "a provider worked it out; change what it worked on",
+    GRAPH_INFERRED: "it is concluded; change what it is concluded from",
+    GRAPH_SOURCE: "it was taken in with a data set; change it there",
+    GRAPH_ONTOLOGY: "it stands in the ontology; put a module of your own into the workspace's ontology/",
+}
+
+
+@dataclass
+class Assertion:
+    """Facts to keep, ids of those that are taken back, and what the graph will lose and get by both."""
+
+    facts: list[AssertedFact] = field(default_factory=list)
+    withdrawn: list[str] = field(default_factory=list)
+    removed: set[Quad] = field(default_factory=set)
+    added: set[Quad] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """A column that a user may fill, of the row that a subject is; `graph` and `datatype` of what it is mapped to."""
+
+    column: Column[Any]
+    key: dict[str, str]
+    graph: NamedNode
+    datatype: NamedNode | None
+
+
+def read(
+    graph: KnowledgeGraph, session: Session, removed: Iterable[Quad], added: Iterable[Quad], author: str
+) -> Assertion:
+    """Read what a user takes out of named graphs and puts into them as one assertion.
+
+    Raises InputError, which says why, where a statement is nobody's to assert or to take back.
+    """
+    found = Assertion()
+    taken, given = _by_property(removed), _by_property(added)
+    now = datetime.now(UTC)
+    for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
+        gone, new = taken.get((subject, predicate), set()), given.get((subject, predicate), set())
+        about = _robot(graph, session, subject)
+        cell = _cell(graph, subject, predicate)
+        if cell is not None:
+            _fill(found, graph, session, cell, (subject, predicate), new, (about, author, now))
+            continue
+        for quad in gone:
+            _withdraw(found, graph, session, quad)
+        for quad in new:
+            _check_free(graph, quad)
+            found.facts.append(_free(quad, about, author, now))
+            found.added.add(quad)
+    return found
+
+
+def quad_of(fact: AssertedFact) -> Quad:
+    """Return the quad of a fact that no row follows."""
+    value = str(fact.value)
+    if fact.kind == "IRI":
+        term: NamedNode | Literal = NamedNode(value)
+    elif fact.kind.startswith("@"):
+        term = Literal(value, language=fact.kind[1:])
+    else:
+        term = Literal(value, datatype=NamedNode(fact.kind))
+    return Quad(NamedNode(fact.subject), NamedNode(fact.predicate), term, NamedNode(fact.graph))
+
+
+def map_facts(graph: KnowledgeGraph, session: Session) -> None:
+    """Bring the statements that no row follows into the graph: those that are kept, and no other."""
+    quads = set(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
+    graph.replace(quads, GRAPH_ASSERTED, *{quad.graph_name.value for quad in quads})  # type: ignore[union-attr]
+
+
+def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:
+    found: dict[tuple[NamedNode, NamedNode], set[Quad]] = {}
+    for quad in quads:
+        if any(isinstance(term, BlankNode | Triple) for term in (quad.subject, quad.object)):
+            raise InputError("statements with blank nodes cannot be asserted or taken out: give each an IRI")
+        found.setdefault((quad.subject, quad.predicate), set()).add(quad)  # type: ignore[arg-type]
+    return found
+
+
+def _cell(graph: KnowledgeGraph, subject: NamedNode, predicate: NamedNode) -> _Cell | None:
+    for _, triples_map in maps_of(graph.resources.of("mappings")):
+        table = triples_map.table.table[-1].name if triples_map.table.table else ""
+        key = _key(triples_map, subject, graph.base) if table in FILLED else None
+        for pair in triples_map.properties if key is not None else ():
+            column = pair.objects[0].column if isinstance(pair.objects[0], TermMap) else None
+            if column is None or column.name not in FILLED[table] or pair.predicates[0].constant != predicate:
+                continue
+            constant = triples_map.graphs[0].constant
+            assert isinstance(constant, NamedNode) and isinstance(pair.objects[0], TermMap) and key is not None
+            of_column = Base.metadata.tables[table].columns[column.name]
+            return _Cell(of_column, key, constant, pair.objects[0].datatype)
+    return None
+
+
+def _key(triples_map: TriplesMap, subject: NamedNode, base: str) -> dict[str, str] | None:
+    """Return the values of the columns that a subject's IRI is made of; None where it is no such IRI."""
+    parts = absolute(triples_map.subject.template, base)
+    form = "".join(re.escape(part) if isinstance(part, str) else "([^/]+)" for part in parts)
+    fits = re.fullmatch(form, subject.value)
+    names = [part.name for part in parts if isinstance(part, Identifier)]
+    return None if fits is None else dict(zip(names, map(unquote, fits.groups()), strict=True))
+
+
+def _fill(
+    found: Assertion,
+    graph: KnowledgeGraph,
+    session: Session,
+    cell: _Cell,
+    about: tuple[NamedNode, NamedNode],
+    new: set[Quad],
+    by: tuple[str | None, str, datetime],
+) -> None:
+    """Read what a row is to say in place of what it says."""
+    what = " ".join(show(term, graph.base) for term in about)
+    if len({quad.object for quad in new}) > 1:
+        raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
+    said = next(iter(new)).object if new else None
+    fact = AssertedFact(
+        fact_id=secrets.token_hex(12),
+        about_robot=by[0],
+        subject=about[0].value,
+        predicate=about[1].value,
+        value=_text(cell.column, said, what),
+        kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
+        graph=cell.graph.value,
+        author=by[1],
+        time=by[2],
+        place=f"{cell.column.table.name}.{cell.column.name}",
+        row_key=key_text(cell.key),
+    )
+    row = row_of(session, fact)
+    if row is None:
+        raise InputError(f"{what}: the database has no such {cell.column.table.name}; nothing changed")
+    if fact.value is None and not cell.column.nullable:
+        raise InputError(f"{what}: needs a value; say another one in the same update; nothing changed")
+    try:
+        check_row(fact.table, values(row) | {cell.column.name: value_of(cell.column, fact.value)})
+    except ValueError as error:
+        raise InputError(f"{what}: {error}; nothing changed") from None
+    fact.replaced = written(getattr(row, cell.column.name))
+    if fact.value == fact.replaced:
+        return
+    found.facts.append(fact)
+    found.removed |= {quad for quad in graph.said(*about) if quad.graph_name == cell.graph}
+    if fact.value is not None:
+        found.added.add(quad_of(fact))
+
+
+def _text(column: Column[Any], said: object, what: str) -> str | None:
+    """Return a value as facts write it, in the column's own form. InputError where the column can hold no such."""
+    if said is None:
+        return None
+    is_number = column.type.python_type is not str
+    datatype = said.datatype.value if isinstance(said, Literal) else ""
+    if not isinstance(said, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
+        raise InputError(f"{what}: is a {'number' if is_number else 'text'}, not {said}; nothing changed")
+    try:
+        return written(value_of(column, said.value))
+    except ValueError:
+        raise InputError(f"{what}: cannot be {said.value!r}; nothing changed") from None
+
+
+def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str | None:
+    """Return the robot that an individual's IRI is about, if any."""
+    parts = subject.value.removeprefix(graph.base).split("/")
+    robot_id = parts[1].partition(".")[0] if len(parts) > 1 and subject.value.startswith(graph.base) else ""
+    return robot_id if robot_id and session.get(Robot, robot_id) is not None else None
+
+
+def _withdraw(found: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:
+    about = select(AssertedFact).where(AssertedFact.subject == getattr(quad.subject, "value", ""))
+    free = session.scalars(about.where(AssertedFact.place.is_(None)))
+    ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
+    name = getattr(quad.graph_name, "value", "")
+    if not ids and name.startswith(GRAPH):
+        why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
+        raise InputError(f"{_show(quad, graph)}: cannot be taken out: {why}; nothing changed")
+    found.withdrawn += ids
+    found.removed.add(quad)
+
+
+def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
+    """Raise InputError where a statement is one that irtwin makes itself."""
+    name = getattr(quad.graph_name, "value", "")
+    if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
+        raise InputError(f"{_show(quad, graph)}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+    if quad.predicate != _TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
+        raise InputError(
+            f"{_show(quad, graph)}: cannot be asserted: irtwin takes it from logs and files, or works it out; "
+            "nothing changed"
+        )
+
+
+def _free(quad: Quad, about: str | None, author: str, now: datetime) -> AssertedFact:
+    term = quad.object
+    assert isinstance(quad.subject, NamedNode) and isinstance(term, NamedNode | Literal)
+    literal = term if isinstance(term, Literal) else None
+    return AssertedFact(
+        fact_id=secrets.token_hex(12),
+        about_robot=about,
+        subject=quad.subject.value,
+        predicate=quad.predicate.value,
+        value=term.value,
+        kind="IRI" if literal is None else f"@{literal.language}" if literal.language else literal.datatype.value,
+        graph=quad.graph_name.value,  # type: ignore[union-attr]
+        author=author,
+        time=now,
+        replaced=None,
+        place=None,
+        row_key=None,
+    )
+
+
+def _show(quad: Quad, graph: KnowledgeGraph) -> str:
+    return " ".join(show(term, graph.base) for term in quad.triple)

@@ -1,0 +1,93 @@
+"""What users assert: each statement with its author and time, and what it replaced; rows follow it.
+
+A statement about a column that a user may fill is followed by its row, in the data set of that robot too whenever it
+is taken in again. It lapses where the data set has come to say something that the user did not know of.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from sqlalchemy import Column, delete, exists, select
+from sqlalchemy.orm import Session
+
+from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.schema import Base, Twin
+
+
+def written(value: object) -> str | None:
+    """Return a column's value as facts write it."""
+    return None if value is None else repr(value) if isinstance(value, float) else str(value)
+
+
+def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
+    """Have the rows of a data set say what facts say, the earliest first; return, in words, which are followed or not.
+
+    A fact is followed where the data set says what it replaced. Where that says something else, the user who asserted
+    it did not know of that.
+    """
+    by_key = {(row.__tablename__, _key(row)): row for row in rows}
+    said: dict[tuple[str, str], str] = {}
+    for fact in facts:
+        row = by_key.get((fact.table.name, _key(fact)))
+        if row is None:
+            continue
+        now = written(getattr(row, fact.column.name))
+        what = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
+        by = f"{fact.author} said on {fact.time:%Y-%m-%d}"
+        if now == fact.replaced:
+            setattr(row, fact.column.name, value_of(fact.column, fact.value))
+            said[str(fact.place), _key(fact)] = f"{what}: {fact.value}, as {by}; the data set says {fact.replaced}"
+        elif now != fact.value:
+            said[str(fact.place), _key(fact)] = f"{what}: the data set says {now} now; what {by} no longer holds"
+    return list(said.values())
+
+
+def _key(of: Base) -> str:
+    if isinstance(of, AssertedFact):
+        return str(of.row_key)
+    return key_text({column.name: getattr(of, column.name) for column in of.__table__.primary_key})
+
+
+def key_text(key: dict[str, Any]) -> str:
+    """Return a row's key as facts write it."""
+    return json.dumps({name: str(part) for name, part in sorted(key.items())}, ensure_ascii=False)
+
+
+def value_of(column: Column[Any], value: str | None) -> Any:
+    """Return what a column holds where a fact says this. ValueError where it can hold no such value."""
+    return None if value is None else column.type.python_type(value)
+
+
+def keep(session: Session, facts: Sequence[AssertedFact], withdrawn: Iterable[str]) -> None:
+    """Keep facts, have the rows follow that they are about, and drop others by their ids."""
+    session.execute(delete(AssertedFact).where(AssertedFact.fact_id.in_(list(withdrawn))))
+    for fact in facts:
+        if fact.place is not None:
+            setattr(row_of(session, fact), fact.column.name, value_of(fact.column, fact.value))
+    session.add_all(facts)
+
+
+def row_of(session: Session, fact: AssertedFact) -> Base | None:
+    """Return the row that a fact is about; None where there is none."""
+    key = json.loads(str(fact.row_key))
+    mapper = next(one for one in Base.registry.mappers if one.local_table is fact.table)
+    ident = tuple(value_of(column, key[column.name]) for column in fact.table.primary_key)
+    return session.get(mapper.class_, ident)
+
+
+def facts_about(session: Session, robot_id: str) -> list[AssertedFact]:
+    """Return the facts that rows of a robot follow, the earliest first."""
+    of_robot = AssertedFact.about_robot == robot_id
+    found = select(AssertedFact).where(of_robot, AssertedFact.place.is_not(None)).order_by(AssertedFact.time)
+    return list(session.scalars(found))
+
+
+def is_newer_than_twin(session: Session, robot_id: str, facts: Sequence[AssertedFact]) -> bool:
+    """Whether one of the facts is younger than the twin that the robot has."""
+    if not facts:
+        return False
+    older = exists().where(Twin.robot_id == robot_id, Twin.created < max(fact.time for fact in facts))
+    return bool(session.scalar(select(older)))

@@ -1,0 +1,150 @@
+"""What users assert: kept in the database with its author, followed by rows and graph, explained, refused whole."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from irtwin.asking import ask, explain, export
+from irtwin.asserting import follow, keep
+from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
+from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.database import Workspace
+from irtwin.storage.schema import Run
+from irtwin.workflow import conclude, map_rows, rewriting
+from tests import small_fleet
+from tests.data_sets import irtwin
+
+RUN = "https://w3id.org/irtwin/id/run/Arm_A.check_1"
+PAYLOAD = f"SELECT ?kg {{ <{RUN}> irt:Payload ?kg }}"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace of four robots, with a graph that was reasoned over."""
+    folder = tmp_path_factory.mktemp("made") / "place"
+    with Workspace(folder) as place:
+        small_fleet.fill(place)
+        with KnowledgeGraph(place.graph_folder, folder, place.resources, place.base) as graph:
+            graph.load_ontology()
+            map_rows(place, graph)
+            conclude(graph, lambda line: None)
+    return folder
+
+
+@pytest.fixture
+def workspace(made: Path, tmp_path: Path) -> Iterator[Path]:
+    yield Path(shutil.copytree(made, tmp_path / "place"))
+
+
+def update(workspace: Path, text: str, author: str = "anna") -> None:
+    """Do an update as `irtwin serve` does in a process of its own."""
+    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+        follow(place, graph, keep(place, graph, *graph.difference(text), author))
+
+
+def rows(workspace: Path, question: str) -> list[tuple[object, ...]]:
+    return [tuple(row.values()) for row in ask(question, workspace).rows]
+
+
+def test_a_payload_that_is_updated_is_a_row_and_a_fact_of_its_author(workspace: Path) -> None:
+    text = (
+        f"DELETE {{ <{RUN}> irt:Payload ?o }} INSERT {{ <{RUN}> irt:Payload 5.5 }} WHERE {{ <{RUN}> irt:Payload ?o }}"
+    )
+    update(workspace, text)
+    assert rows(workspace, PAYLOAD) == [(5.5,)]
+    with Workspace.existing(workspace) as place, place.reading() as session:
+        assert session.get_one(Run, "Arm_A.check_1").payload_kg == 5.5
+        fact = session.scalars(select(AssertedFact).where(AssertedFact.about_robot == "Arm_A")).one()
+        assert (fact.author, fact.value, fact.replaced, fact.place) == ("anna", "5.5", "3.0", "run.payload_kg")
+    (said,) = explain(f"<{RUN}> irt:Payload ?", workspace)
+    assert said.by.startswith("asserted by anna, ") and ", in place of 3.0, id:asserted_fact/" in said.by
+    assert ("payload", "5.5", "3.0", "anna") in [row[1:5] for row in rows(workspace, "asserted_facts")]
+
+
+def test_what_no_table_holds_stays_a_triple_and_can_be_taken_back(workspace: Path) -> None:
+    said = (
+        f'<{RUN}> a <urn:plant/Night_Shift> ; rdfs:comment "leise"@de . GRAPH <urn:mine> {{ <urn:a> <urn:b> <urn:c> }}'
+    )
+    update(workspace, f"INSERT DATA {{ {said} }}")
+    with Workspace.existing(workspace) as place, KnowledgeGraph(None, workspace) as anew:
+        map_rows(place, anew)
+        assert len(anew.triples(GRAPH_ASSERTED)) == 2
+    night = f"SELECT ?t {{ <{RUN}> a ?t FILTER(STRSTARTS(STR(?t), 'urn:')) }}"
+    assert rows(workspace, night) == [("urn:plant/Night_Shift",)]
+    (why,) = explain(f"<{RUN}> rdfs:comment ?", workspace)
+    assert why.by.startswith("asserted by anna, ")
+    update(workspace, f"DELETE DATA {{ {said} }}")
+    assert rows(workspace, night) == rows(workspace, "SELECT ?o { GRAPH <urn:mine> { ?s ?p ?o } }") == []
+    with Workspace.existing(workspace) as place, place.reading() as session:
+        assert (
+            session.scalars(
+                select(AssertedFact).where(AssertedFact.author == "anna", AssertedFact.place.is_(None))
+            ).all()
+            == []
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("DELETE DATA { <RUN> irt:Payload 3.0e0 }", "irt:Payload: needs a value"),
+        ("INSERT DATA { <RUN> irt:Payload 1, 2 }", "has one value, not 2"),
+        ("INSERT DATA { <RUN> irt:Payload 'much' }", "is a number, not"),
+        ("INSERT DATA { <RUN> irt:Payload 'INF'^^xsd:double }", "payload_kg 'inf' is none that irtwin writes"),
+        ("INSERT DATA { <RUN> irt:Payload -1 }", "refused, nothing changed: .*payload is one number, 0 kg or more"),
+        ("INSERT DATA { <RUN> irt:Product 5 }", "is a text, not"),
+        ("INSERT DATA { <RUN> }", "not a SPARQL update"),
+        ("INSERT DATA { id:run\\/Arm_A.none irt:Payload 5 }", "the database has no such run"),
+        ("INSERT DATA { <RUN> irt:Run_Time 5.0e0 }", "irtwin takes it from logs and files, or works it out"),
+        ("DELETE WHERE { <RUN> irt:Run_Time ?s }", "cannot be taken out: it was taken in with a data set"),
+        ("DELETE WHERE { <RUN> irt:Energy_Consumption ?s }", "cannot be taken out: a provider worked it out"),
+        ("INSERT DATA { <RUN> a irt:Industrial_Robot }", r"refused, nothing changed: .*\(OWL 2 RL rule cax-adc\)"),
+        ("DELETE WHERE { irt:Payload rdfs:label ?l }", "it stands in the ontology"),
+        ("INSERT DATA { GRAPH <https://w3id.org/irtwin/graph/source/x> { <RUN> <urn:p> 1 } }", "is irtwin's own"),
+        ("DROP ALL", "blank nodes cannot be asserted or taken out"),
+        ("LOAD <file:///etc/passwd>", "LOAD and SERVICE read from elsewhere"),
+    ],
+)
+def test_what_nobody_can_assert_is_refused_whole(made: Path, text: str, why: str) -> None:
+    with Workspace.existing(made) as place, rewriting(place, None) as graph:
+        before = len(place.facts_about("Arm_A")), set(graph.quads())
+        with pytest.raises(InputError, match=why):
+            keep(place, graph, *graph.difference(text.replace("<RUN>", f"<{RUN}>")), "anna")
+        assert (len(place.facts_about("Arm_A")), set(graph.quads())) == before
+
+
+def test_an_edited_export_comes_back_as_a_difference(workspace: Path, tmp_path: Path) -> None:
+    owl = tmp_path / "edited.owl"
+    export(owl, workspace)
+    assert irtwin("import", workspace, "--owl", owl).err.strip().endswith("Nothing was taken.")
+    text = owl.read_text(encoding="utf-8")
+    payload = '<irt:Payload rdf:datatype="http://www.w3.org/2001/XMLSchema#double">3'
+    place = text.index(payload)
+    text = text[:place] + text[place:].replace(">3", ">5.5", 1)
+    owl.write_text(text, encoding="utf-8")
+    shown = irtwin("import", workspace, "--owl", owl)
+    assert shown.status == 2 and "say --yes" in shown.err
+    assert "- id:run/Arm_A.check_1 irt:Payload" in shown.out and "+ id:run/Arm_A.check_1 irt:Payload" in shown.out
+    taken = irtwin("import", workspace, "--owl", owl, "--yes", "--author", "bert")
+    assert (taken.status, taken.err.strip().splitlines()[-1]) == (0, TAKEN), taken.err
+    assert rows(workspace, PAYLOAD) == [(5.5,)]
+    with Workspace.existing(workspace) as again, again.reading() as session:
+        assert {fact.author for fact in session.scalars(select(AssertedFact))} == {"anna", "bert"}
+
+
+TAKEN = "Taken. Run the data set again, by `irtwin run`, to have the twin follow."
+
+
+def test_a_file_that_says_nothing_of_the_workspace_is_refused(workspace: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.ttl"
+    other.write_text("<urn:a> <urn:b> <urn:c> .")
+    said = irtwin("import", workspace, "--owl", other, "--yes")
+    assert said.status == 2 and "says nothing that this workspace says" in said.err
+    assert irtwin("import", workspace, "--owl", tmp_path / "x.doc").err.count("its name must end in") == 1
