@@ -43,6 +43,13 @@ def workspace(made: Path, tmp_path: Path) -> Iterator[Path]:
     yield Path(shutil.copytree(made, tmp_path / "place"))
 
 
+@pytest.fixture(scope="module")
+def opened(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Workspace, KnowledgeGraph]]:
+    copy = shutil.copytree(made, tmp_path_factory.mktemp("opened") / "place")
+    with Workspace.existing(copy) as place, rewriting(place, None) as graph:
+        yield place, graph
+
+
 def update(workspace: Path, text: str, author: str = "anna") -> None:
     """Do an update as `irtwin serve` does in a process of its own."""
     with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
@@ -112,12 +119,13 @@ def test_what_no_table_holds_stays_a_triple_and_can_be_taken_back(workspace: Pat
         ("LOAD <file:///etc/passwd>", "LOAD and SERVICE read from elsewhere"),
     ],
 )
-def test_what_nobody_can_assert_is_refused_whole(made: Path, text: str, why: str) -> None:
-    with Workspace.existing(made) as place, rewriting(place, None) as graph:
-        before = len(place.facts_about("Arm_A")), set(graph.quads())
-        with pytest.raises(InputError, match=why):
-            keep(place, graph, *graph.difference(text.replace("<RUN>", f"<{RUN}>")), "anna")
-        assert (len(place.facts_about("Arm_A")), set(graph.quads())) == before
+def test_what_nobody_can_assert_is_refused_whole(opened: tuple[Workspace, KnowledgeGraph], text: str, why: str) -> None:
+    place, graph = opened
+    with pytest.raises(InputError, match=why):
+        keep(place, graph, *graph.difference(text.replace("<RUN>", f"<{RUN}>")), "anna")
+    assert place.facts_about("Arm_A") == []
+    assert [row["kg"] for row in graph.query(PAYLOAD).rows] == [3.0]
+    assert not graph.is_behind
 
 
 def test_an_edited_export_comes_back_as_a_difference(workspace: Path, tmp_path: Path) -> None:
