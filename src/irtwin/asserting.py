@@ -12,20 +12,21 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyoxigraph import Quad
 
 from irtwin.errors import InputError
-from irtwin.knowledge.asserted.edited import Edit, edit_of
-from irtwin.knowledge.asserted.statements import Assertion, read
-from irtwin.knowledge.asserted.trial import check
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.limits import limit_memory
 from irtwin.storage.database import Workspace
-from irtwin.workflow import Announce, conclude, map_rows, rewriting
+
+if TYPE_CHECKING:  # they take seconds to import, which an update of a graph without a database can spare
+    from irtwin.knowledge.asserted.edited import Edit
+    from irtwin.knowledge.asserted.statements import Assertion
+    from irtwin.workflow import Announce
 
 _SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
 _BUSY = "another process is writing the graph: try again later"
@@ -46,6 +47,9 @@ def take_edited(
     `agrees` is shown the difference before anything is written. Raises InputError where a change is nobody's to make,
     or would contradict.
     """
+    from irtwin.knowledge.asserted.edited import edit_of
+    from irtwin.workflow import rewriting
+
     with Workspace.existing(workspace, database) as place, rewriting(place, graph_url, announce) as graph:
         edit = edit_of(graph, owl)
         if not agrees(edit):
@@ -59,6 +63,9 @@ def keep(
     place: Workspace, graph: KnowledgeGraph, removed: Iterable[Quad], added: Iterable[Quad], author: str
 ) -> Assertion:
     """Keep what a change of the graph asserts, if it holds with all else. Raises InputError where it does not."""
+    from irtwin.knowledge.asserted.statements import read
+    from irtwin.knowledge.asserted.trial import check
+
     with place.reading() as session:
         said = read(graph, session, removed, added, author)
         session.expunge_all()
@@ -69,6 +76,8 @@ def keep(
 
 def follow(place: Workspace, graph: KnowledgeGraph, said: Assertion, announce: Announce = lambda line: None) -> None:
     """Bring the graph up to date with what is kept now."""
+    from irtwin.workflow import conclude, map_rows
+
     if said.facts or said.withdrawn:
         map_rows(place, graph)
         graph.change(said.removed, ())  # of a user's own graph that nothing is left of
@@ -107,6 +116,8 @@ def _opened(request: dict[str, Any]) -> Iterator[tuple[Workspace | None, Knowled
     """Open the graph to write, with its workspace; of a graph that has no database it is all that is kept."""
     folder, url = Path(request["workspace"]), request["url"]
     if Workspace.is_there(folder, request["database"]):
+        from irtwin.workflow import rewriting
+
         with Workspace.existing(folder, request["database"]) as place, rewriting(place, url) as graph:
             yield place, graph
     else:
