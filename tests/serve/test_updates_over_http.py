@@ -12,6 +12,7 @@ import httpx
 import pytest
 import rdflib
 from rdflib.plugins.stores.sparqlstore import SPARQLUpdateStore
+from tests.endpoint import CLIENT
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
@@ -81,7 +82,7 @@ def test_an_update_that_fails_changes_nothing(writable, text: str, status: int, 
 
 
 def update_of(server, text: str, **dataset: str) -> httpx.Response:
-    return httpx.post(
+    return CLIENT.post(
         server.sparql, data={"update": text} | dataset, headers={"Authorization": "Bearer a-token-for-tests"}
     )
 

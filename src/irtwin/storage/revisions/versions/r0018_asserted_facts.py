@@ -5,7 +5,7 @@ from alembic import op
 
 revision = "0018"
 down_revision = "0017"
-TABLES = "93e8536599b7a903"
+TABLES = "2848dd6e1bceb484"
 
 
 def upgrade() -> None:
