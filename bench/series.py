@@ -19,7 +19,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.series import write_series
 
 FACTS = """PREFIX irt: <https://w3id.org/irtwin#> INSERT DATA {{ GRAPH <urn:g> {{
-  <urn:run> irt:has_Series <urn:series> . <urn:series> irt:Series_Kind "measured" ; irt:File "{path}" }} }}"""
+  <urn:series> irt:series_of <urn:run> ; irt:Series_Kind "measured" ; irt:File "{path}" }} }}"""
 
 
 def least(work: Callable[[], object], times: int = 7) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 from irtwin.document.curves import Curves
 from irtwin.document.document import Document
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
@@ -36,7 +36,7 @@ def graph_of(workspace: Workspace) -> KnowledgeGraph:
     graph.load_ontology()
     mappings = sorted(folder("mappings").glob("*.r2rml.ttl"))
     graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    infer(graph)
+    reason(graph)
     return graph
 
 

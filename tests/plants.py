@@ -9,7 +9,7 @@ from sqlalchemy import update
 from sqlalchemy.orm import Session
 
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, RDFS
 from irtwin.resources import folder
@@ -44,10 +44,10 @@ def robots(place: Path) -> list[Quad]:
 
 
 def tell(graph: KnowledgeGraph, quads: list[Quad], copies: int) -> None:
-    """Tell a graph the ontology, so many copies of the quads, and what the rules conclude."""
+    """Tell a graph the ontology, so many copies of the quads, and what it concludes."""
     graph.load_ontology()
     graph.replace((quad for number in range(copies) for quad in _renamed(quads, number)), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    infer(graph)
+    reason(graph)
 
 
 def make_plant(place: Path, copies: int = 1) -> Path:

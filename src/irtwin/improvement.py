@@ -80,5 +80,5 @@ def improve(
 
 
 def _limit(graph: KnowledgeGraph) -> float:
-    (row,) = graph.query("SELECT ?limit { irt:default_Limits irt:Energy_Error_Limit ?limit }")
+    (row,) = graph.query("SELECT ?limit { limit:energy_error irt:Limit_Value ?limit }")
     return float(row["limit"])

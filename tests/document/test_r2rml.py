@@ -38,16 +38,11 @@ def properties() -> Iterator[tuple[str, str, str]]:
     for table in TABLES:
         owner, whole = _individual(table), table.whole and _individual(table.whole)
         for column in table.columns:
-            there, back = column.links
             wanted = "owl:ObjectProperty" if column.names else f"xsd:{DATATYPES[column.kind]}"
-            of = [(column.term, owner), (there, whole)]
-            yield from ((term, name, wanted) for term, name in of if term and name)
-            if back and column.names:
-                yield back, INDIVIDUALS[column.names.iri.partition("/")[0]], f"irt:{whole}"
+            if column.term and owner:
+                yield column.term, owner, wanted
         if table.individual and whole:
             yield table.individual.of, owner, f"irt:{whole}"
-            if table.individual.has:
-                yield table.individual.has, whole, f"irt:{owner}"
             yield from ((term, owner, "xsd:string") for term, _ in table.individual.constants)
 
 

@@ -28,7 +28,7 @@ class Share:
     share: float = told("Share")
 
 
-@part("Fault", table="gap_fault", of="fault_of", has="has_Fault", ranked=True)
+@part("Fault", table="gap_fault", of="fault_of", ranked=True)
 class Fault:
     id: str = told(column="fault_id", key=True)
     joints: tuple[Joint, ...] = told("fault_in_Joint")

@@ -11,7 +11,7 @@ from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, term
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, LIMIT, term
 
 EX = "https://example.org/"
 MODEL = """@prefix : <https://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -53,21 +53,25 @@ def test_the_shipped_rules_say_the_same_in_swrl(graph: KnowledgeGraph) -> None:
     written = as_swrl(graph, rules)
     left_out = {rule.label: why for rule, why in written.left_out}
     in_swrl = [rule for rule in rules if rule.label not in left_out]
-    assert {rule.label for rule in in_swrl} == {"twin to identify again", "idle-heavy run"}
+    assert {rule.label for rule in in_swrl} == {
+        *("condition number beyond the limit", "energy error beyond the limit", "idle share beyond the limit"),
+        *("standby share beyond the limit", "twin to identify again"),
+    }
     facts = graph.triples()
     assert said(conclusions(facts, read_back(written))) == said(conclusions(facts, in_swrl)) != set()
     assert not any("BuiltinAtom" in str(triple) for triple in written.triples)  # HermiT takes none
-    assert left_out["regenerating run"] == "it reckons, and HermiT takes no built-ins"
+    assert left_out["returned share beyond the limit"] == "it reckons, and HermiT takes no built-ins"
     assert left_out["twin alarm"] == "SWRL has no BIND"
     assert left_out["dominant joint"] == "SWRL has no subqueries or VALUES"
 
 
 def test_the_limits_are_those_of_the_graph(graph: KnowledgeGraph) -> None:
-    limit = NamedNode(term("Idle_Share_Limit"))
-    quads = [Quad(*one, NamedNode(GRAPH_ONTOLOGY)) for one in graph.triples(GRAPH_ONTOLOGY) if one.predicate != limit]
-    own = Quad(NamedNode(term("default_Limits")), limit, Literal(0.15), NamedNode(GRAPH_SOURCE + "own"))
+    limit, value = NamedNode(LIMIT + "idle_share"), NamedNode(term("Limit_Value"))
+    said = (one for one in graph.triples(GRAPH_ONTOLOGY) if (one.subject, one.predicate) != (limit, value))
+    quads = [Quad(*one, NamedNode(GRAPH_ONTOLOGY)) for one in said]
+    own = Quad(limit, value, Literal(0.15), NamedNode(GRAPH_SOURCE + "own"))
     graph.replace(quads, GRAPH_ONTOLOGY)
-    idle = [rule for rule in all_rules(graph.resources) if rule.label == "idle-heavy run"]
+    idle = [rule for rule in all_rules(graph.resources) if rule.label == "idle share beyond the limit"]
     assert as_swrl(graph, idle).left_out[0][1] == "what it looks up has no values in the graph"
     graph.change((), {own})
     assert Literal(0.15) in {triple.object for triple in as_swrl(graph, idle).triples}

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
+from pyoxigraph import NamedNode, Triple
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 from tests import small_fleet
@@ -15,11 +16,11 @@ from tests import small_fleet
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
-from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.store.table import Row
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_INFERRED, GRAPH_SOURCE, RDF, shorten
 from irtwin.resources import folder
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
@@ -36,7 +37,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
         small_fleet.fill(workspace)
         documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    infer(graph)
+    reason(graph)
     return graph
 
 
@@ -56,6 +57,46 @@ def test_the_question_has_its_answer(graph: KnowledgeGraph, name: str) -> None:
     expected = cells((ANSWERS / f"{name}.csv").read_text(encoding="utf-8"))
     near = [[pytest.approx(cell) if isinstance(cell, float) else cell for cell in row] for row in expected]
     assert cells(to_csv(ask(graph, name))) == near
+
+
+PEOPLE_ASK = {"robot", "run", "joint", "energy", "ledger", "twin", "gap", "fleet"}
+
+
+def test_forty_questions_that_people_ask_need_what_is_concluded() -> None:
+    needy = [question for question in QUESTIONS.values() if question.concluded]
+    assert len([question for question in needy if question.theme in PEOPLE_ASK]) >= 40
+
+
+def test_a_question_needs_the_conclusions_that_it_names_and_no_others(graph: KnowledgeGraph) -> None:
+    """Its header names them: without any one of these it answers otherwise; one that names none answers the same."""
+    answers = {name: list(ask(graph, name)) for name in QUESTIONS}
+    concluded = {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED)}
+    users: dict[str, list[str]] = {}
+    for question in QUESTIONS.values():
+        for term in question.concluded:
+            users.setdefault(term, []).append(question.name)
+
+    def answered_without(left_out: Callable[[Triple], bool], names: Iterable[str]) -> set[str]:
+        kept = (
+            quad for graph_name, triples in concluded.items() for quad in in_graph(triples, graph_name)
+            if not left_out(quad.triple)
+        )  # fmt: skip
+        graph.replace(kept, GRAPH_INFERRED)
+        return {name for name in names if list(ask(graph, name)) == answers[name]}
+
+    try:
+        for term, names in users.items():
+            assert answered_without(lambda triple, term=term: _concludes(triple, term), names) == set(), term
+        needless = {name for name, question in QUESTIONS.items() if not question.concluded}
+        assert answered_without(lambda triple: True, QUESTIONS) == needless
+    finally:
+        answered_without(lambda triple: False, ())
+
+
+def _concludes(triple: Triple, term: str) -> bool:
+    """Whether a triple says that something is of a class, or has a property, of that name."""
+    said = triple.object if triple.predicate.value == RDF + "type" else triple.predicate
+    return isinstance(said, NamedNode) and shorten(said.value) == term
 
 
 @pytest.mark.parametrize("name", [name for name, question in QUESTIONS.items() if question.of_robot])

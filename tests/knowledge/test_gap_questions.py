@@ -11,8 +11,7 @@ from tests import gap_cases, rows
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.owl_dl import classify
 from irtwin.knowledge.questions.queries import ask
-from irtwin.knowledge.reasoning import asserted
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import asserted, reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
@@ -39,7 +38,7 @@ def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
         mappings = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    infer(graph)
+    reason(graph)
     return verdict, graph
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pyoxigraph import RdfFormat, parse
 
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
 SOURCE = "https://w3id.org/irtwin/graph/source/rules"
@@ -103,7 +103,7 @@ def actions() -> dict[str, set[str]]:
     graph = KnowledgeGraph()
     graph.load_ontology()
     graph.replace(parse(individuals(), format=RdfFormat.TRIG), SOURCE)
-    infer(graph)
+    reason(graph)
     found: dict[str, set[str]] = {}
     rows = graph.query(
         """SELECT ?of ?label WHERE {

@@ -49,13 +49,13 @@ def quad(subject: str, predicate: str, value, graph: str = SOURCE) -> Quad:
     )
 
 
-LIMITS = term("default_Limits")
+LIMIT = "https://w3id.org/irtwin/limit/idle_share"
 EFFECT = "https://w3id.org/irtwin/effect/copper_loss"
 ONTOLOGY = [
     quad(subject, predicate, value, GRAPH_ONTOLOGY)
     for subject, predicate, value in [
         (term("IR_RunProcess"), TYPE, OWL + "Class"),
-        (term("Idle_Heavy_Run"), RDFS + "subClassOf", term("IR_RunProcess")),
+        (term("exceeds"), RDFS + "domain", term("IR_RunProcess")),
         (term("IR_RunProcess"), RDFS + "subClassOf", term("Process")),
         (term("Joint_Energy"), TYPE, OWL + "Class"),
         (term("has_RunProcess"), OWL + "inverseOf", term("run_of")),
@@ -69,7 +69,7 @@ ONTOLOGY = [
         (term("of_Effect"), RDFS + "range", term("Effect")),
         (term("before"), TYPE, OWL + "TransitiveProperty"),
         (EFFECT, TYPE, term("Effect")),
-        (LIMITS, term("Idle_Share_Limit"), Literal(0.5)),
+        (LIMIT, term("Limit_Value"), Literal(0.5)),
     ]
 ]
 
@@ -98,15 +98,14 @@ def of_robot(robot: str) -> list[Quad]:
 
 FACTS = [fact for robot in ROBOTS for fact in of_robot(robot)]
 JOINING = {  # by each of these, something follows for both robots
-    "a limit of its own": quad(individual("limits", "x"), term("Idle_Share_Limit"), Literal(0.1)),
-    "another limit of the ontology's": quad(LIMITS, term("Idle_Share_Limit"), Literal(0.1)),
+    "another value of the ontology's limit": quad(LIMIT, term("Limit_Value"), Literal(0.1)),
     "a class of runs": quad(term("IR_RunProcess"), RDFS + "subClassOf", individual("class", "Lazy")),
     "a key": quad(term("IR_RunProcess"), OWL + "hasKey", individual("list", "x")),
     "runs that are the same": quad(individual("run", "r.1"), OWL + "sameAs", individual("run", "s.1")),
     "a robot that is an effect": quad(EFFECT, OWL + "sameAs", individual("robot", "r")),
     "from the ontology to a run": quad(EFFECT, term("before"), individual("run", "s.1")),
     "the ontology's joint": quad(individual("robot", "r"), term("has_Joint"), EFFECT),
-    "an energy of the ontology's run": quad(individual("energy", "r"), term("of_Run"), LIMITS),
+    "an energy of the ontology's run": quad(individual("energy", "r"), term("of_Run"), LIMIT),
     "a property that is transitive": quad(term("of_Run"), TYPE, OWL + "TransitiveProperty"),
     "a robot before the other": quad(individual("run", "r.2"), term("before"), individual("run", "s.1")),
     "a datatype": quad(individual("joint", "r"), term("Joint_Kind"), XSD + "byte"),
@@ -246,15 +245,15 @@ def test_statements_that_contradict_each_other_are_set_aside_and_all_else_is_con
 
 
 def test_a_contradiction_that_is_no_robots_is_contained_too() -> None:
-    graph = holding([*FACTS, quad(LIMITS, OWL + "differentFrom", LIMITS)])
-    assert [node for node, _ in reason(graph).set_aside] == [LIMITS]
+    graph = holding([*FACTS, quad(LIMIT, OWL + "differentFrom", LIMIT)])
+    assert [node for node, _ in reason(graph).set_aside] == [LIMIT]
     assert conclusions(graph) == conclusions(anew(FACTS))
 
 
 def test_an_ontology_that_contradicts_itself_is_told_and_what_was_concluded_stays() -> None:
     graph = anew(FACTS)
     before = conclusions(graph)
-    wrong = Triple(NamedNode(LIMITS), NamedNode(OWL + "differentFrom"), NamedNode(LIMITS))
+    wrong = Triple(NamedNode(LIMIT), NamedNode(OWL + "differentFrom"), NamedNode(LIMIT))
     graph.replace([*ONTOLOGY, *in_graph([wrong], GRAPH_ONTOLOGY)], GRAPH_ONTOLOGY)
     for _ in range(2):
         with pytest.raises(Contradiction, match="eq-diff1"):

@@ -41,7 +41,7 @@ def quad(subject: str, predicate: str, value) -> Quad:
 FACTS = [
     *(quad(run, TYPE, term("IR_RunProcess")) for run in RUNS),
     *(quad(run, term("Idle_Share"), Literal(share)) for run, share in zip(RUNS, (0.7, 0.2), strict=True)),
-    quad(term("default_Limits"), term("Idle_Share_Limit"), Literal(0.5)),
+    quad("https://w3id.org/irtwin/limit/idle_share", term("Limit_Value"), Literal(0.5)),
     quad(individual("energy", "x"), TYPE, term("Joint_Energy")),
     quad(individual("energy", "x"), term("of_Run"), RUNS[0]),
     quad(individual("energy", "x"), term("of_Joint"), JOINTS[0]),
@@ -53,7 +53,7 @@ FACTS = [
     quad(individual("robot", "r"), term("has_Joint"), JOINTS[0]),
     quad(term("has_Joint"), "http://www.w3.org/2002/07/owl#inverseOf", term("joint_of")),
     quad(term("IR_RunProcess"), RDFS + "subClassOf", term("Process")),
-    quad(term("Idle_Heavy_Run"), RDFS + "subClassOf", term("Lazy")),
+    quad(term("exceeds"), RDFS + "domain", term("Lazy")),
 ]
 
 
@@ -108,7 +108,7 @@ def test_graphs_of_rules_whose_premises_stay_are_not_rewritten() -> None:
     graph.replace(FACTS, GRAPH_SOURCE)
     reason(graph)
     graph.replace([one for one in FACTS if one.predicate.value != term("Idle_Share")], GRAPH_SOURCE)
-    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}idle_heavy_run")
+    assert reason(graph).changed == (GRAPH_OWL_RL, f"{GRAPH_SHACL}idle_share")
     assert graph.triples(f"{GRAPH_SHACL}dominant_joint")
 
 

@@ -74,10 +74,10 @@ def test_samples_come_as_json(graph: KnowledgeGraph) -> None:
 
 @pytest.mark.parametrize("graph", [False, pytest.param(True, marks=pytest.mark.system)], indirect=True)
 def test_functions_work_within_patterns_sums_and_filters(graph: KnowledgeGraph) -> None:
-    found = graph.query("SELECT ?run { ?run a irt:IR_RunProcess FILTER(series:max(?run, 'power', 0, 1e6) > 250) }")
+    found = graph.query("SELECT ?run { ?run a irt:Measured_Run FILTER(series:max(?run, 'power', 0, 1e6) > 250) }")
     assert [run["run"].rpartition(".")[2] for run in found] == ["work"]
     total = """SELECT (SUM(?energy) AS ?total) (COUNT(?energy) AS ?runs) {
-                 ?run a irt:IR_RunProcess BIND(series:integral(?run, "power", START, 1e6) AS ?energy) }"""
+                 ?run a irt:Measured_Run BIND(series:integral(?run, "power", START, 1e6) AS ?energy) }"""
     (row,) = graph.query(total.replace("START", "0"))
     assert row == {"total": pytest.approx(np.trapezoid(POWER, TIME) + 100.5), "runs": 2}
     (row,) = graph.query(total.replace("START", "10"))  # when the other run is over
@@ -117,7 +117,7 @@ def test_no_file_outside_the_workspace_is_read(graph: KnowledgeGraph, tmp_path: 
     with KnowledgeGraph(workspace=tmp_path / "workspace") as other:
         other._store.update(
             """PREFIX irt: <https://w3id.org/irtwin#> INSERT DATA {
-              <urn:run> irt:has_Series <urn:s> . <urn:s> irt:Series_Kind "measured" ; irt:File "../secret.parquet" }"""
+              <urn:s> irt:series_of <urn:run> ; irt:Series_Kind "measured" ; irt:File "../secret.parquet" }"""
         )
         table = other.query("SELECT (series:mean(<urn:run>, 'power', 0, 1) AS ?value) {}")
     assert table[0]["value"] is None

@@ -1,5 +1,6 @@
 """SHACL-AF rules run set-wise, against pySHACL, which runs them node by node."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pyshacl
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from pyoxigraph import RdfFormat, Triple, parse, serialize
 
 from irtwin.errors import InputError
+from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.rules.shacl import rules_of
@@ -120,3 +122,30 @@ def test_recursive_rules_agree_with_pyshacl_on_drawn_data(statements: list[tuple
 def test_rule_that_cannot_be_run_is_refused(shapes: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=message):
         by_us(turtle(DATA), shapes, tmp_path)
+
+
+def test_rules_and_owl_go_on_in_turn_and_a_higher_order_waits_for_both() -> None:
+    """A rule starts from a superclass of what another one made; one of a higher order asks what that did not reach."""
+    rules = """
+    ex:One a sh:NodeShape ; sh:targetSubjectsOf ex:p ; sh:rule [ a sh:SPARQLRule ; sh:prefixes <https://example.org> ;
+        sh:construct "CONSTRUCT { $this a ex:Low } WHERE { $this ex:p ?any }" ] .
+    ex:Two a sh:NodeShape ; sh:targetClass ex:High ; sh:rule [ a sh:SPARQLRule ; sh:prefixes <https://example.org> ;
+        sh:construct "CONSTRUCT { $this ex:q ex:found } WHERE { }" ] .
+    ex:Three a sh:NodeShape ; sh:targetSubjectsOf ex:n ; sh:rule [ a sh:SPARQLRule ; sh:order 1 ;
+        sh:prefixes <https://example.org> ;
+        sh:construct "CONSTRUCT { $this a ex:Left } WHERE { FILTER NOT EXISTS { $this a ex:Reached } }" ] ."""
+    model = "ex:Low rdfs:subClassOf ex:High . ex:q rdfs:domain ex:Reached . ex:a ex:p 1 ; ex:n 1 . ex:b ex:n 1 ."
+    closure = Closure(turtle(model))
+    found = conclusions(
+        turtle(model) | closure.worth_keeping(), rules_of(Shapes(turtle(rules), "drawn")), closing(closure)
+    )
+    said = {" ".join(str(one.value).rpartition("/")[2] for one in it) for it in set().union(*found.values())}
+    assert said == {"a 22-rdf-syntax-ns#type Low", "a q found", "b 22-rdf-syntax-ns#type Left"}
+
+
+def closing(closure: Closure) -> Callable[[set[Triple]], set[Triple]]:
+    def close(found: set[Triple]) -> set[Triple]:
+        closure.add(found)
+        return closure.worth_keeping()
+
+    return close

@@ -118,7 +118,8 @@ SMELL, FOUND = "https://w3id.org/irtwin/channel/smell", ID + "gap_finding/x"
 WRONG_LINES = {
     "id:robot/Arm_A: id:run/Arm_A.fit_1: is not said to be an industrial robot run process (irt:IR_RunProcess), "
     "though only one has such properties",
-    f"id:robot/Arm_A: id:robot/Arm_A: what a robot has as a joint is one (irt:has_Joint is {JOINT})",
+    f"id:robot/Arm_A: {shorten(JOINT)}: is not said to be a robot joint (irt:Robot_Joint), "
+    "though only one has such properties",
     f"id:robot/Arm_A: {shorten(SHARE)}: an energy share is of one effect of the catalogue (irt:of_Effect is {MAGIC})",
     f"id:robot/Arm_A: {shorten(PARAMETER)}: a parameter is of one effect of the catalogue (irt:of_Effect is {MAGIC}2)",
     "id:robot/Arm_A: effect:magic2: is not in the ontology, which lists every effect (irt:Effect)",

@@ -110,7 +110,7 @@ def test_a_joints_limits_cite_the_file_that_describes_the_robot(filled: Path) ->
     for name in ("Lower_Limit", "Upper_Limit", "Speed_Limit"):
         assert asked(filled, f"irt:{name}", joint)[1] == ["whole: data/robot.urdf"]
     graph = KnowledgeGraph()  # of a robot that a table of its data set describes
-    graph.update("""INSERT DATA { irt:Lower_Limit irt:told_in "URDF" . <urn:r> irt:has_Joint <urn:j> .
+    graph.update("""INSERT DATA { irt:Lower_Limit irt:told_in "URDF" . <urn:j> irt:joint_of <urn:r> .
         <urn:s> irt:source_of <urn:r> ; irt:Source_Kind "data set" ; irt:File "dataset.toml" ; irt:Checksum "1" ;
         irt:Data_Folder "/data" }""")
     assert told_in(graph, "urn:j", term("Lower_Limit")).file == "dataset.toml"

@@ -10,7 +10,7 @@ from tests import gap_cases, rows
 
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
@@ -28,7 +28,7 @@ def answers(workspace: Workspace) -> dict[str, list[dict[str, object]]]:
     graph = KnowledgeGraph()
     graph.load_ontology()
     graph.replace(map_database(workspace.engine, MAPPINGS), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    infer(graph)
+    reason(graph)
     return {name: [dict(row) for row in ask(graph, name)] for name in QUESTIONS}
 
 

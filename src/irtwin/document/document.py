@@ -75,7 +75,7 @@ class Gap:
         return (*torque, *power)
 
 
-@part("Gap_Location", of="location_of", has="has_Location", ranked=True)
+@part("Gap_Location", of="location_of", ranked=True)
 class Location:
     """A place of the gap; joint and regime None: the whole robot, any motion.
 
@@ -160,7 +160,7 @@ class Evidence:
         return tuple(Competitor(effect=one, probability=chance) for one, chance in self.probability_of_rivals.items())
 
 
-@part("Gap_Cause", of="cause_of", has="has_Cause", ranked=True)
+@part("Gap_Cause", of="cause_of", ranked=True)
 class Cause:
     """An effect held responsible for part of the gap; `joints` none: it acts on the whole robot.
 
@@ -191,13 +191,13 @@ class Member:
     `confidence`: of a cause as there; of others their probability in its place.
     """
 
-    cause: CauseId = told("member_by_Cause", links=("", "part_of_Finding"))
+    cause: CauseId = told("member_by_Cause")
     effect: Effect = told("of_member_Effect")
     family: str
     confidence: Share = told("Confidence")
 
 
-@part("Gap_Finding", of="finding_of", has="has_Finding", ranked=True)
+@part("Gap_Finding", of="finding_of", ranked=True)
 class Finding:
     """The answer one level up: causes of one family and scope whose joints overlap, in one channel.
 
@@ -225,7 +225,7 @@ class Finding:
         return tuple(dict.fromkeys(member.cause for member in self.members))
 
 
-@part("Gap_Disturbance", of="disturbance_of", has="has_Disturbance", ranked=True, unit_of="channel")
+@part("Gap_Disturbance", of="disturbance_of", ranked=True, unit_of="channel")
 class NotRepeating:
     """What differs between repeats of a motion beyond noise: `id`, `channel`, `joint` (None: the whole robot), `kind`.
 
@@ -247,7 +247,7 @@ class NotRepeating:
 class Untestable:
     """An effect that the data cannot show, and why."""
 
-    effect: Effect = told("of_untestable_Effect", links=("not_testable", ""))
+    effect: Effect = told("of_untestable_Effect")
     why: str = told("Reason")
 
 
@@ -303,7 +303,7 @@ class ChangeBy(Change):
     place: str = told(key=True)
 
 
-@part("Gap_Shrinkage", of="shrinkage_of", has="has_Shrinkage")
+@part("Gap_Shrinkage", of="shrinkage_of")
 class ClosedFraction:
     """The share of the gap above the floor that closes, at most 1; below 0 where the causes make it worse."""
 

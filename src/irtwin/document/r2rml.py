@@ -29,7 +29,7 @@ def r2rml() -> str:
 
 
 def _maps(table: Table) -> Iterator[str]:
-    """Yield the triples maps of a table: what its individuals say, and what others say of them."""
+    """Yield the triples maps of a table: what its individuals say."""
     individual, whole = table.individual, table.whole
     if individual is None:
         (column,) = table.columns
@@ -40,14 +40,6 @@ def _maps(table: Table) -> Iterator[str]:
     says += [_says(column.term, _object(column)) for column in table.columns if column.term]
     says.append(_predicate("prov:wasGeneratedBy", _template("activity/{activity_id}")))
     yield _map(individual.name, table, table.iri, says, f"rr:class irt:{individual.name} ; ")
-    if whole and individual.has:
-        yield _map(individual.has, table, whole.iri, [_says(individual.has, _template(table.iri))])
-    for column in table.columns:
-        there, back = column.links
-        if whole and there:
-            yield _map(there, table, whole.iri, [_says(there, _object(column))])
-        if whole and back:
-            yield _map(back, table, _iri(column), [_says(back, _template(whole.iri))])
 
 
 def _map(name: str, table: Table, subject: str, says: list[str], kind: str = "") -> str:

@@ -23,7 +23,7 @@ Steps = tuple[str | int, ...]
 class Column:
     """A column: `steps` lead from the part to its value; `is_place`: it says where the part stands instead.
 
-    `term`: its property; `names`: what its text names; `links` as told; `unit_of`: it is the unit of that word.
+    `term`: its property; `names`: what its text names; `unit_of`: it is the unit of that word.
     """
 
     name: str
@@ -33,7 +33,6 @@ class Column:
     key: bool = False
     term: str = ""
     names: Names | None = None
-    links: tuple[str, str] = ("", "")
     is_place: bool = False
     unit_of: str = ""
 
@@ -166,7 +165,7 @@ class _Member:
             named = _names(self.type.kind)
             name = next((one for one in (*told.columns, named.column if named else "") if one), self.name)
             term = next(iter(told.terms), "")
-            yield Column(name, _plain(self.type.kind), self.steps, nullable, told.key, term, named, told.links)
+            yield Column(name, _plain(self.type.kind), self.steps, nullable, told.key, term, named)
 
     def table(self, whole: Table) -> Table:
         individual = individual_of(self.type.kind)

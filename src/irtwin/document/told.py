@@ -29,7 +29,7 @@ class Names:
 
 @dataclass(frozen=True)
 class Individual:
-    """What a part is: of a class of the ontology; by which properties it leads `of` the whole, and the whole to it.
+    """What a part is: of a class of the ontology; by which property it leads to the whole, `of`.
 
     `table` that has its rows; `ranked`: they count from 1; `unit_of`: the column whose word says the unit of its
     numbers (`words.UNITS`); `constants`: properties with one value for all.
@@ -38,7 +38,6 @@ class Individual:
     name: str
     table: str
     of: str
-    has: str
     ranked: bool
     unit_of: str
     constants: tuple[tuple[str, str], ...]
@@ -53,7 +52,6 @@ class Told:
     table: str = ""
     key: bool = False
     optional: bool = False
-    links: tuple[str, str] = ("", "")
 
 
 def told(
@@ -62,19 +60,18 @@ def told(
     table: str = "",
     key: bool = False,
     optional: bool = False,
-    links: tuple[str, str] = ("", ""),
     default: Any = MISSING,
     with_field: str = "",
 ) -> Any:
     """Return a field that is kept, as a property of the ontology where it has one, `terms`.
 
     `column` where it is not called as the field; `table` of a list of names; `key`: the rows are told apart by it;
-    `optional`: rows may lack it though documents do not; `links`: properties from the whole to what is named, and back.
+    `optional`: rows may lack it though documents do not.
     An interval has two terms and columns, parted by a space, or those of its field with "lower" and "upper"; a list of
     names with columns stands in these. The term of a mapping is that of its keys. With the default None a field goes
     without saying in JSON, or goes `with_field`.
     """
-    said = Told(terms, tuple(column.split()), table, key, optional, links)
+    said = Told(terms, tuple(column.split()), table, key, optional)
     return field(default=default, metadata={_TOLD: said} | (goes_with(with_field) if with_field else {}))
 
 
@@ -94,7 +91,6 @@ def part(
     *,
     table: str = "",
     of: str = "",
-    has: str = "",
     ranked: bool = False,
     unit_of: str = "",
     constants: tuple[tuple[str, str], ...] = (),
@@ -102,7 +98,7 @@ def part(
     """Make a class a frozen dataclass; with an individual, one whose parts are that in the graph: see `Individual`."""
 
     def made(kind: Class) -> Class:
-        found = Individual(individual, table or individual.lower(), of, has, ranked, unit_of, constants)
+        found = Individual(individual, table or individual.lower(), of, ranked, unit_of, constants)
         setattr(kind, _INDIVIDUAL, found if individual else None)
         return cast(Class, dataclass(frozen=True, kw_only=True)(kind))
 

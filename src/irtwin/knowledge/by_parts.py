@@ -12,6 +12,7 @@ from collections.abc import Set as AbstractSet
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import Any
 
 from pyoxigraph import Literal, Quad, RdfFormat, Triple, parse, serialize
@@ -141,13 +142,10 @@ def _conclude_of_one(ontology: Ontology, region: Region, aside: AbstractSet[Trip
         asserted = region.asserted - aside
         closure = Beside(ontology.schema, asserted)
         _check(borders, closure)
-        found = by_rules(ontology, ontology.triples, ontology.schema.kept, asserted, closure.worth_keeping())
-        found = found.without(aside)
-        closure.add(found.concluded())
+        found = by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure, aside)
         _check(borders, closure)
     except Equality as same:
         raise Joined from same
-    found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     return found
 
 

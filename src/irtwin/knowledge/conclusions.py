@@ -16,6 +16,7 @@ from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 from irtwin.knowledge import parts
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.locality import read_by_rules
+from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
@@ -54,10 +55,29 @@ class Conclusions:
         return quads.difference(written).union(store)
 
 
-def by_rules(ontology: Ontology, *known: Iterable[Triple]) -> Conclusions:
-    """Return what the rules conclude of what is known, each into a named graph of its own."""
+def by_rules(
+    ontology: Ontology,
+    known: Iterable[Triple],
+    closure: Closure | Beside | None = None,
+    aside: AbstractSet[Triple] = frozenset(),
+) -> Conclusions:
+    """Return what the rules conclude of what is known, each into a named graph of its own.
+
+    With a closure of it, rules and closure conclude in turn; what is set aside is concluded by neither.
+    """
     resources = ontology.resources
-    return Conclusions(running.conclusions(read_by_rules(resources, *known), all_rules(resources)))
+
+    def close(found: set[Triple]) -> Iterable[Triple]:
+        if closure is None:
+            return ()
+        closure.add(found - aside)
+        return read_by_rules(resources, closure.worth_keeping())
+
+    seen = read_by_rules(resources, known, closure.worth_keeping() if closure else ())
+    found = Conclusions(running.conclusions(seen, all_rules(resources), close)).without(aside)
+    if closure is not None:
+        found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
+    return found
 
 
 def infer(ontology: Ontology, premises: set[Triple], aside: AbstractSet[Triple] = frozenset()) -> Conclusions:
@@ -66,11 +86,8 @@ def infer(ontology: Ontology, premises: set[Triple], aside: AbstractSet[Triple] 
     count = len(closure)
     asserted = premises - aside
     closure.add(asserted)
-    known = ontology.triples | asserted | closure.worth_keeping()
-    found = by_rules(ontology, known).without(aside)
-    closure.add(found.concluded())
+    found = by_rules(ontology, ontology.triples | asserted, closure, aside)
     found.joined_by = parts.join(ontology, closure, count)
-    found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     return found
 
 

@@ -82,8 +82,8 @@ class Inferences:
 def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     """Bring what is inferred up to date with what is asserted.
 
-    The closure comes first, so that rules see types and inverses that nobody wrote; then the rules; then the
-    closure of what they concluded. Statements that contradict each other are set aside, and all else is concluded.
+    The closure comes first, so that rules see types and inverses that nobody wrote; then rules and closure in turn,
+    until neither finds anything new. Statements that contradict each other are set aside, and all else is concluded.
     Contradiction names one of the ontology's own: what was inferred before stays, with a note of it. Engines other than
     the native one close
     the graph as one part, take no contradiction, and leave what was inferred before as it is where they fail.

@@ -12,6 +12,7 @@ IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
 REASONER = f"{ONTOLOGY}/reasoner/"
+LIMIT = f"{ONTOLOGY}/limit/"
 SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
 COLUMN = f"{ONTOLOGY}/column/"  # likewise
 ID = DEFAULT  # individuals of a workspace that has no base of its own
@@ -30,6 +31,7 @@ VOID = "http://rdfs.org/ns/void#"
 PREFIXES = {
     "irt": IRT,
     "effect": EFFECT,
+    "limit": LIMIT,
     "provider": PROVIDER,
     "reasoner": REASONER,
     "series": SERIES,

@@ -19,7 +19,7 @@ from irtwin.storage.database import Workspace
 
 _STATE, _REASON = term("Alarm_State"), term("Alarm_Reason")
 _BESIDE = """CONSTRUCT { ?s ?p ?o } WHERE {
-  { VALUES ?p { irt:Joint_Name qudt:symbol } ?s ?p ?o } UNION { ?s a irt:Judgement_Limits ; ?p ?o } }"""
+  { VALUES ?p { irt:Joint_Name qudt:symbol } ?s ?p ?o } UNION { ?s a irt:Limit ; ?p ?o } }"""
 
 
 class ShownRuns:
@@ -75,7 +75,7 @@ class ShownRuns:
             f"""SELECT ?g ?s ?p ?o {{
               {{ VALUES ?g {{ {graphs} }} GRAPH ?g {{ ?s ?p ?o }} }} UNION
               {{ GRAPH ?g {{ {run} ?p ?o }} BIND({run} AS ?s)
-                 FILTER(STRSTARTS(STR(?g), "{GRAPH_SOURCE}") && ?p != irt:has_Series) }} UNION
+                 FILTER(STRSTARTS(STR(?g), "{GRAPH_SOURCE}")) }} UNION
               {{ GRAPH ?g {{ ?s irt:alarm_of_Run {run} ; ?p ?o }}
                  FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }}"""
         )

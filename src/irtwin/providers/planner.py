@@ -26,6 +26,12 @@ GROUP BY ?provider ?class
 ORDER BY ?provider
 """
 
+# Providers work before reasoning: what a property says may stand in the graph by its inverse.
+_INVERSES = """
+PREFIX owl: <http://www.w3.org/2002/07/owl#>
+SELECT ?one ?other WHERE { ?one owl:inverseOf|^owl:inverseOf ?other FILTER(isIRI(?one) && isIRI(?other)) }
+"""
+
 
 @dataclass(frozen=True)
 class Declaration:
@@ -137,17 +143,22 @@ def lacking(graph: KnowledgeGraph, declaration: Declaration) -> list[str]:
 
     A requirement may be met by the individual itself, by its robot, or by a run of it.
     """
+    inverses = {row["one"]: row["other"] for row in graph.query(_INVERSES)}
+
+    def said(iri: str) -> str:
+        return f"<{iri}>|^<{inverses[iri]}>" if iri in inverses else f"<{iri}>"
+
     required = "".join(
-        f"FILTER EXISTS {{ ?subject (irt:run_of|irt:has_RunProcess)? / <{iri}> ?value{place} }}\n"
+        f"FILTER EXISTS {{ ?subject (irt:run_of|^irt:run_of)? / ({said(iri)}) ?value{place} }}\n"
         for place, iri in enumerate(sorted(declaration.requires))
     )
-    populated = " ".join(f"<{iri}>" for iri in sorted(declaration.populates))
     rows = graph.query(
         f"""PREFIX irt: <https://w3id.org/irtwin#>
-        SELECT ?subject WHERE {{
-          ?subject a <{declaration.applies_to}> .
+        PREFIX rdfs: <http://www.w3.org/2000/01/rdf-schema#>
+        SELECT DISTINCT ?subject WHERE {{
+          ?class rdfs:subClassOf* <{declaration.applies_to}> . ?subject a ?class .
           {required}
-          FILTER NOT EXISTS {{ VALUES ?property {{ {populated} }} ?subject ?property ?there }}
+          FILTER NOT EXISTS {{ ?subject ({"|".join(map(said, sorted(declaration.populates)))}) ?there }}
         }} ORDER BY ?subject"""
     )
     return [row["subject"] for row in rows]

@@ -30,9 +30,9 @@ from irtwin.virtual.robot_data import robot_data
 
 _MOST_ROBOTS = 64  # that are remembered as drawn
 _POSES = """SELECT ?run ?name ?q {
-  { SELECT ?run { ?run irt:run_of ?arm ; irt:Start_Time ?start ; irt:has_Joint_State ?any } GROUP BY ?run ?start
+  { SELECT ?run { ?run irt:run_of ?arm ; irt:Start_Time ?start . ?any irt:state_of ?run } GROUP BY ?run ?start
     ORDER BY DESC(?start) LIMIT 60 }
-  ?run irt:has_Joint_State ?state . ?state irt:of_Joint / irt:Joint_Name ?name ; irt:Joint_Position ?q }"""
+  ?state irt:state_of ?run ; irt:of_Joint / irt:Joint_Name ?name ; irt:Joint_Position ?q }"""
 
 
 class LivePages:

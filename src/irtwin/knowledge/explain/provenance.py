@@ -39,7 +39,7 @@ _TOLD_IN = """
 SELECT ?file ?checksum ?folder
 WHERE {
   ?property irt:told_in ?kind .
-  ?thing (irt:run_of | ^irt:has_Joint | ^irt:has_Information | irt:note_of) ?robot .
+  ?thing (irt:run_of | irt:joint_of | ^irt:has_Information | irt:note_of) ?robot .
   ?source irt:source_of ?robot ; irt:Source_Kind ?one ; irt:File ?file ; irt:Checksum ?checksum ;
     irt:Data_Folder ?folder .
   FILTER(?one = ?kind || (?kind = "URDF" && NOT EXISTS { ?other irt:source_of ?robot ; irt:Source_Kind ?kind }))

@@ -22,7 +22,7 @@ from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import Table
 from irtwin.resources import MOST_BYTES, Files, Resources, shipped
 
-_HEADER = re.compile(r"^# (title|question|theme|of): (.+)$", re.MULTILINE)
+_HEADER = re.compile(r"^# (title|question|theme|of|concluded): (.+)$", re.MULTILINE)
 THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
 _QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|delete)\b", re.IGNORECASE)
 
@@ -31,7 +31,8 @@ _QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|d
 class Question:
     """A named SPARQL query; `question` is what it answers, in words.
 
-    One that is `of_robot` can be asked of one robot, its variable `?arm`, instead of all.
+    One that is `of_robot` can be asked of one robot, its variable `?arm`, instead of all. `concluded` are the classes
+    and properties that it asks for and that nobody asserts: OWL and rules conclude them.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Question:
     question: str
     theme: str
     of_robot: bool
+    concluded: tuple[str, ...]
     text: str
 
 
@@ -119,7 +121,9 @@ def read_question(file: Path) -> Question:
         raise InputError(f"{file}, line 1: a question begins with `# {lacking[0]}: ...`; add that line")
     if header["theme"] not in THEMES:
         raise InputError(f"{file}: its theme is {header['theme']!r}; take one of {', '.join(THEMES)}")
-    return Question(file.stem, header["title"], header["question"], header["theme"], header.get("of") == "robot", text)
+    concluded = tuple(header.get("concluded", "").split(", ")) if "concluded" in header else ()
+    of_robot = header.get("of") == "robot"
+    return Question(file.stem, header["title"], header["question"], header["theme"], of_robot, concluded, text)
 
 
 def _text(question: str, resources: Resources) -> str:

@@ -91,7 +91,7 @@ class _Asker:
     def _series(self, run: NamedNode, kind: str) -> SeriesWindows:
         from irtwin.storage.windows import open_series
 
-        for series in self._objects(run, "has_Series"):
+        for series in self._subjects("series_of", run):
             if kind in map(to_python, self._objects(series, "Series_Kind")):
                 for file in self._objects(series, "File"):
                     return open_series(self._workspace, str(to_python(file)))
@@ -108,6 +108,10 @@ class _Asker:
             if isinstance(start, datetime):
                 return series.begin + (_in_utc(value) - _in_utc(start)).total_seconds()
         raise InputError(f"{shorten(run.value)}: the graph does not know when this run began; give seconds")
+
+    def _subjects(self, name: str, object: Any) -> Iterable[Any]:
+        quads = self._store.quads_for_pattern(None, NamedNode(term(name)), object, DefaultGraph())
+        return [quad.subject for quad in quads]
 
     def _objects(self, subject: Any, name: str) -> Iterable[Any]:
         quads = self._store.quads_for_pattern(subject, NamedNode(term(name)), None, DefaultGraph())

@@ -9,7 +9,7 @@ from typing import Any
 
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, MODELLED, PALETTE, effect_colour
-from irtwin.report.energy.verdict import SEED_ENERGY_ERROR
+from irtwin.report.limits import limits
 from irtwin.report.questions import Answer, Answers, Row
 
 Figure = dict[str, Any]  # {"data": [...], "layout": {...}}
@@ -23,7 +23,7 @@ def figures(answers: Answers) -> dict[str, Figure | None]:
     return {
         "energy_per_day": energy_per_day(answers["energy_per_day"]),
         "energy_per_run": energy_per_run(answers["energy_per_run"]),
-        "energy_error": energy_error(answers["energy_per_run"]),
+        "energy_error": energy_error(answers["energy_per_run"], limits(answers)["seed_energy_error"]),
         "energy_per_joint": energy_per_joint(answers["energy_per_joint"]),
         "energy_per_effect": energy_per_effect(answers["energy_per_effect"], colours),
         "energy_per_joint_and_effect": energy_per_joint_and_effect(answers["energy_per_joint_and_effect"], colours),
@@ -53,7 +53,7 @@ def energy_per_run(answer: Answer) -> Figure | None:
     return {"data": data, "layout": {"barmode": "group", "yaxis": _axis("energy", unit)}}
 
 
-def energy_error(answer: Answer) -> Figure | None:
+def energy_error(answer: Answer, seed_error: float) -> Figure | None:
     """Draw the energy error (%) of each run beside the one that the seed paper reached."""
     rows = [row for row in answer.rows if row["error_percent"] is not None]
     if not rows:
@@ -69,11 +69,11 @@ def energy_error(answer: Answer) -> Figure | None:
             bars = _bars(name, _labels(of_part, "run_name"), _column(of_part, "error_percent"), "%", "")
             data.append({**bars, "marker": marker})
     order = {"categoryorder": "array", "categoryarray": _labels(rows, "run_name")}
-    lines = [_level(SEED_ENERGY_ERROR), _level(-SEED_ENERGY_ERROR)]
+    lines = [_level(seed_error), _level(-seed_error)]
     lines = lines if any(row["error_percent"] < 0 for row in rows) else lines[:1]
     seed = {
-        "x": 0.005, "xref": "paper", "xanchor": "left", "y": SEED_ENERGY_ERROR, "yanchor": "bottom", "showarrow": False,
-        "text": f"seed paper: {SEED_ENERGY_ERROR} %", "font": {"color": LIMIT},
+        "x": 0.005, "xref": "paper", "xanchor": "left", "y": seed_error, "yanchor": "bottom", "showarrow": False,
+        "text": f"seed paper: {seed_error} %", "font": {"color": LIMIT},
     }  # fmt: skip
     layout = {"barmode": "overlay", "xaxis": order, "yaxis": _axis("energy error", "%"),
               "shapes": lines, "annotations": [seed]}  # fmt: skip

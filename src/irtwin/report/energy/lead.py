@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from irtwin.report import wording
 from irtwin.report.energy import verdict
+from irtwin.report.limits import limits
 from irtwin.report.questions import Answers, Row
 
 _HOUR = 3600.0  # s
-_LEAST_OF_A_DAY = 4 * _HOUR  # that the logs cover: less tells nothing of a day
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,11 @@ def taken(answers: Answers) -> str:
         said += f": {wording.kilowatt_hours(hour)} for each hour of such work"
     days = answers["energy_per_day"].rows
     logged = sum(day["duration_s"] for day in days)
-    if days and logged >= _LEAST_OF_A_DAY * len(days) and all(day["day_from"] == "log" for day in days):
+    if (
+        days
+        and logged >= limits(answers)["logged_of_day"] * len(days)
+        and all(day["day_from"] == "log" for day in days)
+    ):
         mean = sum(day["energy_j"] for day in days) / len(days)
         said += f", {wording.kilowatt_hours(mean)} on a day with runs"
     return f"{said}."

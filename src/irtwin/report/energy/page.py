@@ -17,6 +17,7 @@ from irtwin.report import colours
 from irtwin.report.energy import lead, tables, verdict
 from irtwin.report.energy.figures import Figure, figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
+from irtwin.report.limits import limits
 from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, folder, shipped
@@ -85,7 +86,7 @@ def _page(
         constant=lead.constant_power(answers),
         torque=verdict.torque(answers),
         energy=verdict.energy(answers),
-        seed_error=verdict.SEED_ENERGY_ERROR,
+        limits=limits(answers),
         parameters=tables.parameters(answers["parameters"].rows, answers["joints"].rows),
         run_fits=tables.run_fits(answers["torque_fit"].rows),
         fits=tables.fits(answers["torque_fit_per_joint"].rows),

@@ -6,11 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from irtwin.report import wording
+from irtwin.report.limits import limits
 from irtwin.report.questions import Answers, Row
-
-SEED_ENERGY_ERROR = 6.54  # %, Yan 2018, equation (15)
-
-_POORLY = 0.5  # a joint of which less is explained is named
 
 # A twin is judged on data that it never saw; failing that, on what there is, and the page says so.
 _TORQUE_PARTS = (("held_out", "on data it never saw"), ("fit", "on the data it was fitted to"))
@@ -45,28 +42,29 @@ def sentence(answers: Answers) -> str:
         return "No twin of this robot has been identified yet. This page shows what was recorded."
     explained, missed = torque(answers), energy(answers)
     if explained and missed:
-        return f"The twin {_explains(explained, answers)} and {_misses(missed)}."
+        return f"The twin {_explains(explained, answers)} and {_misses(missed, answers)}."
     if explained:
         explains = _explains(explained, answers).rstrip(",")
         return f"The twin {explains}. No electrical power was measured, so its energy is not checked."
     if missed:
-        return f"The twin {_misses(missed)}. No joint torque was measured, so its torque is not checked."
+        return f"The twin {_misses(missed, answers)}. No joint torque was measured, so its torque is not checked."
     return "The twin was identified, but no measurement can check it."
 
 
 def _explains(judged: Judged, answers: Answers) -> str:
+    least = limits(answers)["torque_explained"]
     weak = [
         row["joint"]
         for row in answers["torque_fit_per_joint"].rows
-        if row["part"] == judged.row["part"] and row["r_squared"] < _POORLY
+        if row["part"] == judged.row["part"] and row["r_squared"] < least
     ]
     but = f", though little of {wording.listed(weak)}," if weak else ""
     return f"explains {wording.share(judged.row['r_squared'])} of joint-torque variance {judged.on}{but}"
 
 
-def _misses(judged: Judged) -> str:
+def _misses(judged: Judged, answers: Answers) -> str:
     error = wording.percent(judged.row["error_percent"])
-    seed = wording.percent(SEED_ENERGY_ERROR, 3)
+    seed = wording.percent(limits(answers)["seed_energy_error"], 3)
     return f"misses the energy {judged.on} by {error}; the seed paper (Yan et al., 2018) reached {seed}"
 
 

@@ -12,7 +12,7 @@ from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, LIKELY, Document
 from irtwin.errors import InputError
 from irtwin.json_text import parse_json
 from irtwin.knowledge.mapping import map_database
-from irtwin.knowledge.rules.running import infer
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import unrecorded
@@ -65,7 +65,7 @@ def render_alone(
     rows, documents = unrecorded(data_set, diagnosis, curves)
     with in_memory(rows) as engine:
         graph.replace(map_database(engine, graph.resources.paths("mappings")), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    infer(graph)
+    reason(graph)
     robot = graph.iri(robot_iri(identifier(data_set.robot.name)))
     render_gap(graph, robot, lambda path, checksum: documents[path], out, graph.resources)
 
