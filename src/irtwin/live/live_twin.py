@@ -357,7 +357,7 @@ class LiveTwin:
         """Make a run of a journal, in the database and in the graph, and drop the journal."""
         if len(samples):
             tables = keep(self._place, header, samples, {**counts, "stream_state": "ended"}, self._announce)
-            self._shown.show(header.run_id, shown, self._shown.mapped(tables))
+            self._shown.show(header.run_id, shown, self._shown.mapped(header.run_id, tables))
         remove(path)
 
     def _refresh(self) -> None:

@@ -8,11 +8,14 @@ from typing import cast
 from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
 
 from irtwin.knowledge.mapping import RowMapper, refresh
+from irtwin.knowledge.owl_rl.beside import Beside, Equality
+from irtwin.knowledge.owl_rl.closure import Contradiction
+from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SHACL, GRAPH_SOURCE, term
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_OWL_RL, GRAPH_SHACL, GRAPH_SOURCE, term
 from irtwin.live.live_run import Tables, activities
 from irtwin.providers.records import run_iri
 from irtwin.storage.database import Workspace
@@ -47,10 +50,20 @@ class ShownRuns:
         self._graph.change(shown - quads, quads - shown)
         self._changed = True
 
-    def mapped(self, tables: Tables) -> set[Quad]:
+    def mapped(self, run_id: str, tables: Tables) -> set[Quad]:
         """Return the quads of the rows of a run that is over, and what follows from them."""
         quads = {quad for it in tables.items() for quad in self.mapper.quads(*it)}
-        return quads | self._conclusions(quads, self._rules + self._rules_of_runs)
+        quads |= self._conclusions(quads, self._rules + self._rules_of_runs)
+        return quads | self.kinds(run_id, quads)
+
+    def kinds(self, run_id: str, quads: Iterable[Quad]) -> set[Quad]:
+        """Return what OWL concludes of a run from quads about it: of which kinds it is, and what leads to it."""
+        run = NamedNode(self._graph.iri(run_iri(run_id)))
+        try:
+            found = Beside(Ontology.of(self._graph).schema, {quad.triple for quad in quads}).worth_keeping()
+        except (Contradiction, Equality):  # told by `irtwin run`, which sets aside what clashes
+            return set()
+        return set(in_graph((it for it in found if run in (it.subject, it.object)), GRAPH_OWL_RL))
 
     def alarms(self, quads: Iterable[Quad]) -> set[Quad]:
         """Return what the rules of `rules/live_rules.ttl` conclude from a run's excursions or state among the quads."""

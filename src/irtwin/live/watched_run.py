@@ -55,6 +55,7 @@ class WatchedRun:
     _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
     _stood: float | None = None  # s, of which the alarms are those of `_idle`: once a second is enough
     _idle: set[Quad] = field(default_factory=set)
+    _kinds: set[Quad] = field(default_factory=set)  # which it is of stays the same
 
     @classmethod
     def begun(cls, folder: Path, state: State, joints: Sequence[str], plan: str | None, kind: str) -> Self:
@@ -120,8 +121,10 @@ class WatchedRun:
                     quads |= shown.alarms(quads) if rows else set()
                 if table == "live_state" and (stood := rows[0].get("standing_s")) != self._stood:
                     self._stood, self._idle = stood, set() if stood is None else shown.alarms(quads)
+                if table == "run" and not self._kinds:
+                    self._kinds = shown.kinds(self.header.run_id, quads)
                 self._mapped[table] = rows, quads
-        return self._idle.union(*(quads for _, quads in self._mapped.values()))
+        return self._idle.union(self._kinds, *(quads for _, quads in self._mapped.values()))
 
     def work_out(self, states: Sequence[State], known: KnownTwin | None) -> list[Stretch]:
         """Work out energy and gap from the next states, as far as they go."""
