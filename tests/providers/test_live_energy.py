@@ -146,7 +146,7 @@ def test_a_gap_that_lasts_raises_one_alarm_and_clears_it(
     ]  # fmt: skip
     (why,) = explain(graph, "? irt:Alarm_Reason ?")
     assert why.by == 'the rule "gap alarm", in SHACL'
-    assert {"irt:Excursion_Lasted", "irt:Peak_Residual", "irt:Gap_Alarm_Time"} <= {
+    assert {"irt:Excursion_Lasted", "irt:Peak_Residual", "irt:Limit_Value"} <= {
         one.what.split()[1] for one in why.because
     }
     found = graph.triples(f"{GRAPH_SHACL}gap_alarm")

@@ -49,3 +49,15 @@ def test_a_joint_that_the_twin_does_not_follow_is_named(graph: KnowledgeGraph):
     )
     text = sentence(answers(graph, factory.into(graph)))
     assert "on data it never saw, though little of joint_6, and misses" in text
+
+
+def test_a_limit_that_is_changed_in_the_graph_is_changed_on_the_page(graph: KnowledgeGraph):
+    factory = six_axis(graph)
+    graph.update(
+        """DELETE { ?limit irt:Limit_Value ?old } INSERT { ?limit irt:Limit_Value ?new } WHERE {
+            ?limit irt:Limit_Value ?old
+            VALUES (?limit ?new) { (limit:seed_energy_error 5.0e0) (limit:torque_explained 0.94e0) } }"""
+    )
+    text = sentence(answers(graph, factory))
+    assert "though little of joint_4, joint_5 and joint_6," in text
+    assert text.endswith("(Yan et al., 2018) reached 5.00 %.")

