@@ -95,25 +95,23 @@ def known(data_set: DataSet, model: Model) -> None:
 def _judged(
     found: Playing, data_set: DataSet, changes: Sequence[tuple[str, int, float, float]], true: np.ndarray
 ) -> str:
-    played = found.document.played
-    assert played is not None
     wanted = {(data_set.robot.joint_names[joint], name) for name, joint, *_ in changes}
     first = found.document.causes[0].parameters[0].name if found.document.causes else "none"
     within = 0
-    for one in played.numbers:
-        value = true[NAMES.index(one.name), data_set.robot.joint_names.index(one.joint)]
-        within += one.interval95 is not None and one.interval95[0] <= value <= one.interval95[1]
+    numbers = [one for cause in found.document.causes for one in cause.parameters]
+    for one in numbers:
+        change = true[NAMES.index(one.name), data_set.robot.joint_names.index(one.joint)] - one.simulator
+        within += one.interval95 is not None and one.interval95[0] <= change <= one.interval95[1]
     says = ", ".join(f"{name} of {joint}" for joint, name in sorted(wanted)) or "no difference"
     extra = _named(found) - wanted
     return (
         f"{says}: {found.document.verdict}, first {first}, {len(_named(found) & wanted)} of {len(wanted)} found, "
-        f"{within} of {len(played.numbers)} within their intervals, {len(extra)} not there {sorted(extra) or ''}"
+        f"{within} of {len(numbers)} within their intervals, {len(extra)} not there {sorted(extra) or ''}"
     )
 
 
 def _named(found: Playing) -> set[tuple[str, str]]:
-    assert found.document.played is not None
-    return {(one.joint, one.name) for one in found.document.played.numbers}
+    return {(one.joint, one.name) for cause in found.document.causes for one in cause.parameters}
 
 
 def _of(data_set: DataSet, names: Sequence[str]) -> DataSet:

@@ -54,9 +54,9 @@ from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone, render_gap
 from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
-from irtwin.simulator.differences import differences, written
-from irtwin.simulator.model import read_model
-from irtwin.simulator.playing import Playing, to_be_played
+from irtwin.simulator.differences import written
+from irtwin.simulator.model import Model, read_model
+from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.simulated_runs import with_simulated_runs
 from irtwin.storage import series_place
@@ -134,7 +134,7 @@ def diagnose(
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
     in their shapes, and its numbers as the prior. `simulator` is the file of a model of MuJoCo: what it says of the
     observed motions is held against the robot, as runs of a simulator are; of runs with commands and no torque, these
-    are played through it (`document.played`). `withhold` takes effects out of the twin and leaves them in the
+    are played through it (channel "position"). `withhold` takes effects out of the twin and leaves them in the
     catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is
     kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
     all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
@@ -153,37 +153,34 @@ def diagnose(
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = _read(Path(dataset), repair, announce, commanded=simulator is not None)
-    if simulator is not None and to_be_played(data_set):
-        lacking = {"a twin": twin, "a report": report, "a twin's file": twin_file, "a motion": motion_file}
-        _check_alone(data_set, lacking | {"a workspace": workspace})
-        return _by_playing(data_set, Path(simulator), json_file, simulator_file, announce)
+    model = None if simulator is None else read_model(Path(simulator), data_set.robot)
+    lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
+    _check_asked(data_set, lacking | {"an effect to withhold": withhold or None})
     data_set = _with_cutoff(data_set, cutoff)
     if kept_in is not None and Workspace.is_there(kept_in, database):
         with Workspace(kept_in, database) as place:  # what hinders it is said before minutes of work
             check_before(place)
             check_name(place, data_set.robot.name)
             data_set = followed(data_set, place.facts_about(identifier(data_set.robot.name)))
-    model = None if simulator is None else read_model(Path(simulator), data_set.robot)
-    data_set = with_simulated_runs(data_set, model, announce)
-    found = gap.diagnose(data_set, twin=given, withhold=withhold, seed=seed, progress=announce)
-    if model and simulator_file:
-        write(simulator_file, written(model, differences(model, found.document)))
-    if json_file is not None:
-        write(json_file, (json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n").encode())
-    if twin_file is not None and found.twin is not None:
-        _say_doubt(found.twin, announce)
-        write(twin_file, to_json(found.twin).encode())
-    if motion_file is not None:
-        announce(f"  {save_motion(found, motion_file)}")
-    if report is not None:
-        announce("Writing the report")
-        render_alone(data_set, found.document, found.curves, report, resources.resources_of(kept_in))
-    if kept_in is not None:
+    data_set, found = _found(data_set, model, given, withhold, seed, announce)
+    if kept_in is not None:  # first, as a damaged workspace is to leave no file beside its error
         announce("Storing the diagnosis")
         with Workspace(kept_in, database) as place:
             with rewriting(place, graph_url, announce) as graph:
                 _store(place, graph, data_set, found, announce)
             _write_gap_report(place, graph_url, identifier(data_set.robot.name))
+    if model and simulator_file:
+        write(simulator_file, found.written() if isinstance(found, Playing) else written(model, found.document))
+    if json_file is not None:
+        write(json_file, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
+    if twin_file is not None and found.twin is not None:
+        _say_doubt(found.twin, announce)
+        write(twin_file, to_json(found.twin).encode())
+    if motion_file is not None and isinstance(found, Diagnosis):
+        announce(f"  {save_motion(found, motion_file)}")
+    if report is not None:
+        announce("Writing the report")
+        render_alone(data_set, found.document, found.curves, report, resources.resources_of(kept_in))
     return found
 
 
@@ -200,35 +197,42 @@ def _with_cutoff(data_set: DataSet, cutoff: float | None) -> DataSet:
     return replace(data_set, cutoff=checked_cutoff(cutoff, signals, "cutoff"))
 
 
-def _check_alone(data_set: DataSet, lacking: Mapping[str, object]) -> None:
+def _check_asked(data_set: DataSet, lacking: Mapping[str, object]) -> None:
     """Raise InputError where something is given or asked for that a diagnosis by playing lacks."""
     for name, value in lacking.items():
-        if value is not None:
+        if data_set.is_commanded and value is not None:
             raise InputError(
-                f"{data_set.folder}: has commands and no torque: {name} is of no use for it; it gives --json and "
-                "--save-simulator"
+                f"{data_set.folder}: has commands and no torque: {name} is of no use for it; leave that out"
             )
 
 
-def _by_playing(
-    data_set: DataSet, simulator: Path, json_file: Path | None, simulator_file: Path | None, announce: Announce
-) -> Playing:
-    """Play the runs' commands through a model; write what was found, and the model with the robot's numbers."""
-    played = diagnose_by_playing(data_set, read_model(simulator, data_set.robot), announce)
-    if simulator_file is not None:
-        write(simulator_file, played.written())
-    if json_file is not None:
-        write(json_file, (json.dumps(played.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
-    return played
+def _found(
+    data_set: DataSet,
+    model: Model | None,
+    twin: Twin | None,
+    withhold: Sequence[str],
+    seed: int,
+    announce: Announce,
+) -> tuple[DataSet, Diagnosis | Playing]:
+    """Return the diagnosis, and the data set with the runs of a simulator, if any were made."""
+    if model is not None and data_set.is_commanded:
+        return data_set, diagnose_by_playing(data_set, model, announce)
+    if model is not None:
+        data_set = with_simulated_runs(data_set, model, announce)
+    found = gap.diagnose(data_set, twin=twin, simulator=model, withhold=withhold, seed=seed, progress=announce)
+    return data_set, found
 
 
-def _store(place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis, announce: Announce) -> None:
+def _store(
+    place: Workspace, graph: KnowledgeGraph, data_set: DataSet, found: Diagnosis | Playing, announce: Announce
+) -> None:
     check_name(place, data_set.robot.name)
     robot_id = identifier(data_set.robot.name)
     closed = None if found.twin is None else to_json(found.twin)
+    motion = motion_text(found) if isinstance(found, Diagnosis) else None
     with staged(place, robot_id) as apart:
         ingest(apart, data_set, facts=place.facts_about(robot_id))
-        record(apart, robot_id, found.document, found.curves, closed, motion_text(found))
+        record(apart, robot_id, found.document, found.curves, closed, motion)
     graph.load_ontology()
     map_rows(place, graph)
     conclude(graph, announce)

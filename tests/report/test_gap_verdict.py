@@ -12,7 +12,7 @@ def answers(scope, simulated=False, referenced=True):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
         "diagnosis": [
-            {"verdict": "ambiguous", "reason": None, "floor_from": "repeats"}
+            {"verdict": "ambiguous", "reason": None, "floor_from": "repeats", "tracking_error": None}
             | {"against_simulator": simulated, "referenced": referenced}
         ],
         "findings": [

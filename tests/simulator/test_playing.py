@@ -10,11 +10,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
-from tests import servo_arm
+from tests import gap_cases, servo_arm
 from tests.data_sets import irtwin
 
-from irtwin.document.document import Document
-from irtwin.report.gap.played import line
+from irtwin.document.document import Change, Document
+from irtwin.report.gap.headline import line
 
 
 def logs(folder, change=None, text=servo_arm.MODEL, runs=("a", "b"), **numbers):
@@ -36,7 +36,9 @@ def told(tmp_path_factory):
     folder = tmp_path_factory.mktemp("playing")
     data, model = logs(folder, stiffness=(20.0, 10.0))
     new, out = folder / "new.xml", folder / "out.json"
-    said = irtwin("diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out)
+    said = irtwin(
+        "diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out, "--workspace", folder / "w"
+    )
     return said, data, model, new, out
 
 
@@ -44,8 +46,11 @@ def told(tmp_path_factory):
 def test_the_number_that_differs_is_told_and_written(told):
     said, data, model, new, _ = told
     assert said.status == 0, said.err
-    assert "attributed: the simulator misses the robot by" in said.out
-    assert re.search(r"with the robot's servo stiffness it misses it by 0.9\d* mrad", said.out), said.out
+    assert "attributed: Drive of elbow differs from the simulator’s" in said.out
+    assert re.search(r"numbers in the simulator close 9\d % of the mean square of its tracking error", said.out)
+    assert re.search(r"tracking error \(RMSE\) │ 0\.\d+ │ 0\.0009\d* │", said.out), said.out
+    assert re.search(r"stiffness │ +15 │ +10(\.\d)? │ +-[45]", said.out), said.out
+    assert "s since it was begun anew" in said.out
     changed = servo_arm.read(data, new)[2].numbers
     assert changed[0] == pytest.approx([20.0, 10.0], rel=0.02)
     assert len(set(model.read_text().splitlines()) - set(new.read_text().splitlines())) == 1
@@ -54,27 +59,38 @@ def test_the_number_that_differs_is_told_and_written(told):
 @pytest.mark.slow
 def test_the_document_says_simulator_robot_and_change(told):
     document = Document.from_json(json.loads(told[4].read_text()))
-    (number,) = document.played.numbers
-    assert (number.effect, number.joint, number.simulator, number.unit) == ("servo_stiffness", "elbow", 15.0, "N m/rad")
-    assert number.robot - number.simulator == pytest.approx(number.change)
-    assert number.interval95[0] < 10.0 < number.interval95[1]
     (cause,) = document.causes
     assert (cause.id, cause.joints, cause.likely) == ("servo_stiffness@elbow", ("elbow",), True)
-    played = document.played
-    assert played.after < 1.2e-3 < played.before
-    assert played.held_out == pytest.approx(played.after, rel=0.2)
-    assert [one.seconds for one in played.restarted] == [0.1, 0.2, 0.3, 0.4, 0.5]
-    assert all(run.after.flange < run.before.flange for run in played.runs.values())
+    (number,) = cause.parameters
+    assert (number.joint, number.simulator, number.unit) == ("elbow", 15.0, "N m/rad")
+    assert number.robot - number.simulator == pytest.approx(number.value)
+    assert number.interval95[0] < -5.0 < number.interval95[1]
+    assert document.simulator == "arm"
+    assert document.gap.position["elbow"].rmse > document.shrink.position_rmse.after
+    assert document.shrink.position_rmse.after < 1.2e-3 < document.shrink.position_rmse.before
+    assert [one.seconds for one in document.horizons] == [0.1, 0.2, 0.3, 0.4, 0.5]
+    (finding,) = document.findings
+    assert finding.share_interval95[0] < finding.share <= finding.share_interval95[1]
 
 
 @pytest.mark.slow
-def test_a_simulator_that_is_right_agrees(told):
-    document = Document.from_json(json.loads(told[4].read_text()))
-    right = replace(document, verdict="no_gap", played=replace(document.played, before=1.04e-3, numbers=()))
-    assert line(right) == "no_gap: the simulator agrees with the robot, to 1.04 mrad."
-    wrong = replace(right, verdict="unexplained")
-    assert line(wrong).startswith(
-        "unexplained: the simulator misses the robot by 1.04 mrad, and no number of its servos"
+def test_the_page_of_a_workspace_says_it_too(told):
+    page = (told[1].parent / "w" / "reports" / "arm.gap.html").read_text()
+    for said in ("Tracking error of each run", "differs from the simulator’s", "servo stiffness", "Simulator</th>"):
+        assert said in page
+    said = irtwin("adopt", "arm", "--workspace", told[1].parent / "w")
+    assert said.status == 2
+    assert "its diagnosis (attributed) added nothing to the twin" in said.err
+
+
+def test_a_simulator_that_is_right_agrees():
+    change = Change(before=1.04e-3, after=1.04e-3, noise_floor=None, interval95_after=None)
+    document = gap_cases.document("no_gap")
+    right = replace(
+        document, findings=(), causes=(), shrink=replace(document.shrink, by_cause=(), position_rmse=change)
+    )
+    assert line(right, "simulated") == (
+        "no_gap: There is no gap: the simulator agrees with the robot, to 1.04 mrad RMS."
     )
 
 
@@ -104,8 +120,8 @@ def test_logs_without_commands_are_refused(tmp_path):
 
 
 def test_what_needs_torque_is_refused(tmp_path):
-    said = refused(tmp_path, "--report", tmp_path / "page.html")
-    assert "has commands and no torque: a report is of no use for it; it gives --json and --save-simulator" in said
+    said = refused(tmp_path, "--save-twin", tmp_path / "twin.json")
+    assert "has commands and no torque: a twin's file is of no use for it; leave that out" in said
 
 
 def test_a_model_of_other_joints_is_refused(tmp_path):

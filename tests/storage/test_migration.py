@@ -46,6 +46,7 @@ from irtwin.storage.revisions.versions import (
     r0015_supply_states,
     r0017_metered_loads,
     r0018_asserted_facts,
+    r0019_simulators,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -94,7 +95,8 @@ AFTER_0_1 = {  # columns that revisions have added
     "energy_share": ("lower_j", "upper_j", "inseparable"),
     "run_price": ("saving_j", "saving_lower_j", "saving_upper_j"),
     "robot": ("cutoff_hz",),
-    "gap_diagnosis": ("unexplained_because", "cutoff_hz", "cutoff_why"),
+    "gap_diagnosis": ("unexplained_because", "cutoff_hz", "cutoff_why", "simulator_model"),
+    "gap_cause_parameter": ("simulator_value", "robot_value"),
     "gap_cause": ("gain", "log_odds"),
     "gap_cause_competitor": ("probability",),
     "activity_use": ("relation",),
@@ -137,6 +139,7 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
             connection.execute(text("DROP TABLE supply_state"))
             connection.execute(text("DROP TABLE metered_load"))
             connection.execute(text("DROP TABLE asserted_fact"))
+            connection.execute(text("DROP TABLE gap_horizon"))
             connection.execute(text("DROP TABLE individuals"))
             connection.execute(text("DROP TABLE alembic_version"))
         else:
@@ -175,6 +178,7 @@ def test_each_revision_follows_another() -> None:
     assert r0015_supply_states.down_revision == r0014_inseparable.revision
     assert r0017_metered_loads.down_revision == r0015_supply_states.revision
     assert r0018_asserted_facts.down_revision == r0017_metered_loads.revision
+    assert r0019_simulators.down_revision == r0018_asserted_facts.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:

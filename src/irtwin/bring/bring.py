@@ -234,8 +234,7 @@ def found_in(folder: Path) -> tuple[tuple[str, ...], str | None]:
     for finding in checked.findings:
         state = "cure first" if finding.stops else "mended when it is read" if finding.mended else "to be looked at"
         lines.append(f"{finding.fault} ({state}): {finding.say}")
-    measured = any(run.signals.torque is not None or run.signals.power is not None for run in data_set.runs)
-    command = f"irtwin run {folder}" if measured else f"irtwin diagnose {folder} --simulator MODEL.xml"
+    command = f"irtwin diagnose {folder} --simulator MODEL.xml" if data_set.is_commanded else f"irtwin run {folder}"
     return tuple(dict.fromkeys(lines)), command if checked.sound else None
 
 

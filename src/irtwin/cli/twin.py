@@ -25,7 +25,6 @@ from irtwin.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from irtwin.document.document import Document
     from irtwin.signals.finding import Finding
 
 
@@ -225,9 +224,7 @@ def diagnose(
     from irtwin.report.gap import summary
     from irtwin.report.gap.headline import line, refused
     from irtwin.report.terminal import show
-    from irtwin.simulator.differences import differences, not_held
-    from irtwin.simulator.model import read_model
-    from irtwin.simulator.playing import Playing
+    from irtwin.simulator.differences import not_held
 
     if save_simulator and not simulator:
         raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
@@ -251,17 +248,15 @@ def diagnose(
         simulator_file=save_simulator,
         announce=announce,
     )
-    if isinstance(found, Playing):
-        _show_played(found.document)
-        return
     click.echo(line(found.document, found.against))
     for said in (*refused(found.document), *summary.filtered(found.document)):
         click.echo(said)
-    tables = [summary.gap(found.document), summary.causes(found.document)]
-    if simulator:
-        model = read_model(simulator, found.description)
-        tables.append(summary.simulator(differences(model, found.document)))
-    for table in tables:
+    for table in (
+        summary.gap(found.document),
+        summary.runs(found.curves),
+        summary.horizons(found.document),
+        summary.causes(found.document),
+    ):
         if table:
             click.echo()
             show(table, counted=False)
@@ -269,17 +264,6 @@ def diagnose(
         click.echo(f"\n{said}")
     for said in summary.next_steps(found.document):
         click.echo(f"\n{said}")
-
-
-def _show_played(document: Document) -> None:
-    """Print a diagnosis by playing."""
-    from irtwin.report.gap import played
-    from irtwin.report.terminal import show
-
-    click.echo(played.line(document))
-    for table in played.tables(document):
-        click.echo()
-        show(table, counted=False)
 
 
 @click.command()

@@ -64,19 +64,23 @@ class Followed:
 
 @part("Gap_Run_Change", of="change_of", ranked=True, unit_of="measure", constants=(("Change_Part", "run"),))
 class RunError:
-    """RMSE (N m of a joint, W of the robot) of a run that was left out of the fit, without and with the causes."""
+    """RMSE of a run that was left out of the fit, without and with the causes, in the measure's unit.
+
+    `of`: "position" of a joint or over all of them, "flange", of its place; None: torque or power, of a joint or robot.
+    """
 
     run: Run = told("change_in_Run")
     joint: Joint | None = told("located_in_Joint")
     before: float | None = told("Change_Before")
     after: float | None = told("Change_After")
     floor: float | None = told("Noise_Floor", column="noise_floor")
+    of: str | None = None
 
     @property
     @tells("Change_Measure")
     def measure(self) -> str:
         """What is measured of it."""
-        return "power_rmse" if self.joint is None else "torque_rmse"
+        return f"{self.of or ('power' if self.joint is None else 'torque')}_rmse"
 
 
 @dataclass(frozen=True, kw_only=True)

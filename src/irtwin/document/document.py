@@ -1,7 +1,8 @@
 """The document of a diagnosis: what JSON, database, graph and page all say.
 
-Torque is in N m (N of a prismatic joint), power in W. A "channel" is torque or power. What a field is in database and
-graph stands beside it (`told`).
+Torque is in N m (N of a prismatic joint), power in W, position in rad (m of a prismatic joint). A "channel" is torque
+or power; or position, where a simulator was told the commands of logs: its residual is the tracking error, what the
+robot's positions have beyond the simulator's. What a field is in database and graph stands beside it (`told`).
 """
 
 from __future__ import annotations
@@ -14,9 +15,8 @@ from typing import Annotated, Any
 from irtwin.document import form
 from irtwin.document.experiment import Experiment
 from irtwin.document.form import Between, OneOf
-from irtwin.document.played import Played
 from irtwin.document.told import Names, part, tells, told
-from irtwin.document.words import ONTOLOGY, Channel, Effect, Explained, Joint, Regime, Run
+from irtwin.document.words import ONTOLOGY, Channel, Effect, Joint, Measured, Regime, Run
 from irtwin.errors import InputError
 
 Share = Annotated[float, Between(0, 1)]
@@ -60,19 +60,24 @@ class SizeAt(Size):
 
 @part()
 class Gap:
-    """The gap before anything is added: torque by joint, power, and the error of the twin's energy, %."""
+    """The gap before anything is added: torque or position by joint, power, and the error of the twin's energy, %."""
 
     energy_error_percent: float | None = told("Energy_Error_Before")
     torque: Mapping[Joint, Size] | None = None
     power: Size | None = None
+    position: Mapping[Joint, Size] | None = None
 
     @property
     @tells()
     def sizes(self) -> tuple[SizeAt, ...]:
         """The sizes, each with its place."""
-        torque = [SizeAt(channel="torque", joint=at, place=at, **vars(one)) for at, one in (self.torque or {}).items()]
+        joints = [
+            SizeAt(channel=channel, joint=at, place=at, **vars(one))
+            for channel, sizes in (("torque", self.torque), ("position", self.position))
+            for at, one in (sizes or {}).items()
+        ]
         power = [SizeAt(channel="power", joint=None, place="robot", **vars(one)) for one in (self.power,) if one]
-        return (*torque, *power)
+        return (*joints, *power)
 
 
 @part("Gap_Location", of="location_of", ranked=True)
@@ -83,7 +88,7 @@ class Location:
     `concentration`: its share of its joint's excess over its share of the samples; intervals are over runs.
     """
 
-    channel: Channel = told("located_in_Channel")
+    channel: Measured = told("located_in_Channel")
     joint: Joint | None = told("located_in_Joint")
     regime: Regime | None = told("located_in_Regime")
     follows: str | None = told("Follows_Variable")
@@ -105,13 +110,19 @@ class Location:
 
 @part("Gap_Cause_Parameter", of="parameter_of_Cause", ranked=True)
 class Parameter:
-    """A parameter of a cause, in its `unit`; joint None: of the whole robot."""
+    """A parameter of a cause, in its `unit`; joint None: of the whole robot.
+
+    Where a simulator's model has the number, `simulator` is its, `robot` the robot's, and `value` how far these are
+    apart.
+    """
 
     name: str = told("Cause_Parameter_Name")
     joint: Joint | None = told("caused_in_Joint")
     value: float = told("Cause_Parameter_Value")
     unit: str = told()
     interval95: Interval | None = told("Cause_Parameter")
+    simulator: float | None = told("Simulator_Value", column="simulator_value", default=None)
+    robot: float | None = told("Robot_Value", column="robot_value", default=None)
 
 
 @part("Gap_Disturbance_Quantity", of="quantity_of_Disturbance", ranked=True)
@@ -142,7 +153,7 @@ class Evidence:
     `runs` and `window` (s of the clock): where it acts in some runs, or for a while, only.
     """
 
-    channel: Explained = told("located_in_Channel")
+    channel: Channel = told("located_in_Channel")
     share_of_what_is_closed: float | None = told("Share_Of_Closed", column="share_of_closed")
     closed_where_it_acts: float = told("Closed_Where_It_Acts")
     gain: float = told("Gain")
@@ -211,7 +222,7 @@ class Finding:
     family: Family = told("has_Family")
     joints: tuple[Joint, ...] = told("found_in_Joint")
     scope: Scope = told("has_Scope")
-    channel: Explained = told("located_in_Channel")
+    channel: Channel = told("located_in_Channel")
     confidence: Share = told("Confidence")
     share: float = told("Closed_Share")
     share_interval95: Interval = told("Closed_Share")
@@ -370,7 +381,7 @@ class Closeable:
 
 @part()
 class Shrink:
-    """How far the gap shrinks on runs outside the fit: torque in N m, power in W, energy in %."""
+    """How far the gap shrinks on runs outside the fit: torque in N m, power in W, position in rad, energy in %."""
 
     held_out_runs: tuple[Run, ...] = told("judged_on", table="gap_held_out")
     noise_floor_from: FloorSource | None = told("Noise_Floor_From")
@@ -380,6 +391,7 @@ class Shrink:
     closed_fraction: ClosedFraction | None = told()
     by_cause: tuple[CauseChange, ...]
     yardstick: Mapping[Channel, Closeable] = told("located_in_Channel")
+    position_rmse: Change | None = None
 
     @property
     @tells()
@@ -387,10 +399,28 @@ class Shrink:
         """What all causes change together; and each alone, and all without it."""
         found = [
             ChangeBy(measure=measure, part="together", cause=None, place="all", **vars(change))
-            for measure in ("torque_rmse", "power_rmse", "energy_error_percent")
+            for measure in ("torque_rmse", "power_rmse", "position_rmse", "energy_error_percent")
             if (change := getattr(self, measure)) is not None
         ]
         return (*found, *(change for one in self.by_cause for change in one.changes))
+
+
+@part("Gap_Horizon", of="change_of", ranked=True, unit_of="measure", constants=(("Change_Part", "horizon"),))
+class Horizon:
+    """Tracking error from one horizon to the next, `seconds` after runs were begun anew as the robot was, in rad.
+
+    `before`: of the simulator; `after`: with the causes.
+    """
+
+    seconds: float = told("Horizon")
+    before: float = told("Change_Before")
+    after: float = told("Change_After")
+
+    @property
+    @tells("Change_Measure")
+    def measure(self) -> str:
+        """What is measured."""
+        return "position_rmse"
 
 
 @part("Gap_Diagnosis")
@@ -400,7 +430,8 @@ class Document:
     `findings` and `causes` are ordered by what they close, the largest first.
     `unexplained_because`: why the verdict is `unexplained`. The causes leave much of the gap; only a number that cannot
     be true would close it; runs of one motion differ by what no effect explains; or no cause that matters is likely.
-    `played`: where a simulator was told the commands of logs without torque; its causes are in the channel "position".
+    `simulator`: the model that the runs were held against. Where their commands were played through it, `horizons`: how
+    its tracking error grows.
     """
 
     verdict: Verdict = told("has_Verdict")
@@ -417,7 +448,8 @@ class Document:
     refused: tuple[Refused, ...] | None = told(default=None)
     torque_scale: TorqueScale | None = told(default=None)
     cutoff: Cutoff | None = told(default=None)
-    played: Played | None = None
+    simulator: str | None = told("Simulator_Model", column="simulator_model", default=None)
+    horizons: tuple[Horizon, ...] | None = told(default=None)
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

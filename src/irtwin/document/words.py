@@ -9,8 +9,8 @@ from irtwin.document.told import Names
 
 ONTOLOGY = "https://w3id.org/irtwin"
 
-Channel = Annotated[str, OneOf("torque", "power"), Names(f"{ONTOLOGY}/channel/{{}}", "channel")]
-Explained = Annotated[str, OneOf("torque", "power", "position"), Names(f"{ONTOLOGY}/channel/{{}}", "channel")]
+Measured = Annotated[str, OneOf("torque", "power"), Names(f"{ONTOLOGY}/channel/{{}}", "channel")]
+Channel = Annotated[str, OneOf("torque", "power", "position"), Names(f"{ONTOLOGY}/channel/{{}}", "channel")]
 Effect = Annotated[str, Names(f"{ONTOLOGY}/effect/{{}}", "effect")]
 Joint = Annotated[str, Names("joint/{robot_id}/{}", "joint")]
 Regime = Annotated[str, Names(f"{ONTOLOGY}/regime/{{}}")]
@@ -21,6 +21,9 @@ UNITS = {  # of what is measured or set, by its word; where that is of a joint, 
     "torque_rmse": "N m",
     "power": "W",
     "power_rmse": "W",
+    "position": "rad",
+    "position_rmse": "rad",
+    "flange_rmse": "m",
     "energy_error_percent": "%",
     "pose": "rad",
     "held_pose": "rad",

@@ -42,6 +42,7 @@ from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
 from irtwin.gap.search import Search, check_observed, twin_equations, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
+from irtwin.gap.writing import Simulator
 from irtwin.identification.progress import Told
 from irtwin.identification.threads import one_blas_thread
 from irtwin.identification.two_processes import begun
@@ -82,6 +83,7 @@ class Diagnosis:
     refusals: Refusals = NOTHING_REFUSED
     scale: TorqueScale | None = None  # of torque, where it was measured
     cutoff: Cutoff | None = None  # of the filter that all runs passed
+    simulator: Simulator | None = None
 
     @property
     def verdict(self) -> str:
@@ -103,6 +105,8 @@ class Diagnosis:
         named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
         written = tuple(writing.cause(robot, *one, self.scale, self.thresholds.criterion) for one in named)
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
+        if self.simulator is not None:
+            written = tuple(writing.beside(self.simulator, one) for one in written)
         causes = apart.causes(written)
         found = writing.findings(robot, self.channels, named, written, self.thresholds.matters)
         found = apart.findings(found, causes, self.thresholds.matters)
@@ -127,6 +131,7 @@ class Diagnosis:
             refused=tuple(map(writing.refused, self.refusals.refused)) or None,
             torque_scale=None if self.scale is None else writing.torque_scale(self.scale),
             cutoff=self.cutoff,
+            simulator=None if self.simulator is None else self.simulator.name,
         )
 
     @property
@@ -144,6 +149,7 @@ def diagnose(
     data_set: DataSet,
     *,
     twin: Twin | None = None,
+    simulator: Simulator | None = None,
     withhold: Sequence[str] = (),
     unknown: Sequence[str] = (),
     thresholds: Thresholds = DEFAULT,
@@ -154,7 +160,8 @@ def diagnose(
 
     `twin` is what the gap is held against: its effects in their shapes, and its numbers as the prior; None: the effects
     that the data set names. `withhold` takes effects out of it and leaves them in the catalogue; `unknown` are those
-    that the search is not to know; `thresholds` decide what is said; `progress` is told each step. Raises InputError on
+    that the search is not to know. `simulator` is the model whose runs are among those of the data set: its numbers
+    stand beside the robot's. `thresholds` decide what is said; `progress` is told each step. Raises InputError on
     an effect that the catalogue lacks or the twin has not, on a twin of another robot, and where the data set cannot be
     diagnosed.
     """
@@ -269,6 +276,7 @@ def diagnose(
         refusals=refusals,
         scale=scale,
         cutoff=case.cutoff,
+        simulator=simulator,
     )
 
 

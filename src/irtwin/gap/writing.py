@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from irtwin.gap.isolation.quantities import quantities
 from irtwin.gap.isolation.refusal import Refused
 from irtwin.gap.localisation.locations import Location
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
+from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Criterion, Matters
@@ -28,6 +30,17 @@ from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import TorqueScale
 
 _TOLD = 0.01  # probability of a rival that is listed
+
+
+class Simulator(Protocol):
+    """A simulator's model of the robot."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    def numbers(self, joint: str) -> Mapping[str, float]:
+        """Return a joint's numbers, by what MJCF calls them."""
 
 
 def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> document.Gap:
@@ -175,6 +188,19 @@ def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | 
     if one.of_bodies:  # most of a body's numbers do not show: those that do
         stated = [each for each in stated if each.interval95 and each.interval95[0] * each.interval95[1] > 0]
     return tuple(stated)
+
+
+def beside(simulator: Simulator, cause: document.Cause) -> document.Cause:
+    """Return a cause with the simulator's numbers beside the robot's; a number below zero is zero in both."""
+
+    def told(one: document.Parameter) -> document.Parameter:
+        name = catalogue()[cause.effect].in_mjcf.get(one.name)
+        if name is None or one.joint is None or cause.scope != CHANGED:
+            return one
+        own = simulator.numbers(one.joint)[name]
+        return replace(one, simulator=own, robot=max(0.0, own + one.value))
+
+    return replace(cause, parameters=tuple(map(told, cause.parameters)))
 
 
 def refused(one: Refused) -> document.Refused:

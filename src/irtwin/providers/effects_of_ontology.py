@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from irtwin.document.words import ONTOLOGY
 from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import EFFECT
 
-_DESCRIBED = "SELECT ?effect { ?effect a irt:Effect ; rdfs:label ?label ; irt:has_Channel ?channel }"
+_DESCRIBED = f"""SELECT ?effect {{
+    ?effect a irt:Effect ; rdfs:label ?label ; irt:has_Channel ?channel
+    FILTER(?channel != <{ONTOLOGY}/channel/position>)  # a simulator's, and no twin's
+}}"""
 
 
 def check_effects(graph: KnowledgeGraph) -> None:

@@ -61,6 +61,11 @@ class Run:
     pieces: int | None = None  # how many of them
     cycles: int | None = None  # how often its programme ran
 
+    @property
+    def says_effort(self) -> bool:
+        """Whether it has torque or power; a run without has commands."""
+        return self.signals.torque is not None or self.signals.power is not None
+
 
 @dataclass(frozen=True)
 class DataSet:
@@ -86,6 +91,11 @@ class DataSet:
     torque_scale_uncertainty: float | None = None  # share by which logged torque may be off, 95 %
     cutoff: float | None = None  # Hz, of the filter that all runs pass; None: it is to be found
     sha256: Mapping[Path, str] = field(default_factory=dict)  # of `dataset.toml` and the URDF, as they were read
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether no run has torque or power, so that its commands are all there is."""
+        return not any(run.says_effort for run in self.runs)
 
 
 def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool = False) -> DataSet:

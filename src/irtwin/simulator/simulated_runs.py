@@ -14,14 +14,12 @@ from irtwin.signals.log import DataSet, Run
 from irtwin.simulator.model import Model
 
 
-def with_simulated_runs(data_set: DataSet, model: Model | None, tell: Tell | None = None) -> DataSet:
+def with_simulated_runs(data_set: DataSet, model: Model, tell: Tell | None = None) -> DataSet:
     """Return the data set with a simulated run beside each observed one: its motion, and the torque of the model.
 
-    Without a model it stays as it is. A model carries no payload; what the robot carried is known, and the twin has it.
+    A model carries no payload; what the robot carried is known, and the twin has it.
     Raises InputError where the data set has simulated runs, or no torque was measured, or in some runs alone.
     """
-    if model is None:
-        return data_set
     if any(run.role == "simulated" for run in data_set.runs):
         raise InputError(f"{data_set.folder}: has simulated runs of its own; leave these out, or the simulator's model")
     observed = [run for run in data_set.runs if run.role == "observed"]
@@ -30,7 +28,7 @@ def with_simulated_runs(data_set: DataSet, model: Model | None, tell: Tell | Non
             f"{data_set.folder}: no run has torque to hold the simulator against; log tau_JOINT or i_JOINT"
         )
     for run in data_set.runs:
-        if run.signals.torque is None and run.signals.power is None:
+        if not run.says_effort:
             raise InputError(f"{run.file}: has commands and no torque, where other runs have torque; leave it out")
     cutoff = cutoff_for(data_set.robot, observed, data_set.cutoff, tell)
     simulated = tuple(_simulated(run, data_set, model, cutoff.hz) for run in observed)

@@ -46,8 +46,7 @@ def closing(
     """Return what squares `closed` (G, g) on groups left out are worth; floor, and noise that is left: (g,) RMS.
 
     acting: (G,) whether the causes act in a group at all. Equations count by their mean square over the floor's, those
-    that have a gap. The interval is Student's, of a ratio of sums over groups (linearised): groups are few, and of
-    groups drawn anew some sets have no gap to be a share of.
+    that have a gap.
     """
     before, rows = held_out.before, np.maximum(held_out.rows.sum(axis=0), 1)
     mean = before.sum(axis=0) / rows
@@ -56,14 +55,25 @@ def closing(
     gap = mean > least
     above = ((before - least * held_out.rows) / level / rows)[:, gap].sum(axis=1)
     won = (closed / level / rows)[:, gap].sum(axis=1)
-    whole = float(above.sum())
-    value = min(float(won.sum()) / whole, 1.0) if whole > 0 else 0.0
-    half, groups = 0.0, len(before)
-    if groups > 1 and whole > 0:
-        error = float(np.sqrt(np.sum((won - value * above) ** 2) * groups / (groups - 1))) / whole
-        half = float(student_t.ppf(0.975, groups - 1)) * error
+    value, interval = share(won, above)
     squares = closed.sum(axis=0) / rows
     where = closed[acting].sum(axis=0) / np.maximum(held_out.rows[acting].sum(axis=0), 1)
     floors = None if floor is None else float(np.sqrt(np.max(np.maximum(where, 0.0) / floor**2)))
     size = float((squares / (noise if floor is None else floor) ** 2).sum())
-    return Closing(value, (value - half, min(value + half, 1.0)), floors, size)
+    return Closing(value, interval, floors, size)
+
+
+def share(part: np.ndarray, whole: np.ndarray) -> tuple[float, tuple[float, float]]:
+    """Return which share of the whole a part is, each a sum over groups (G,), at most 1, with its 95 % interval.
+
+    The interval is Student's, of a ratio of sums (linearised): groups are few, and of groups drawn anew some sets have
+    no whole. It has no width where there is one group, or no whole.
+    """
+    total, groups = float(whole.sum()), len(whole)
+    if total <= 0:
+        return 0.0, (0.0, 0.0)
+    value, half = min(float(part.sum()) / total, 1.0), 0.0
+    if groups > 1:
+        error = float(np.sqrt(np.sum((part - value * whole) ** 2) * groups / (groups - 1))) / total
+        half = float(student_t.ppf(0.975, groups - 1)) * error
+    return value, (value - half, min(value + half, 1.0))

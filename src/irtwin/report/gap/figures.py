@@ -32,9 +32,12 @@ def figures(answers: Answers, curves: Curves) -> dict[str, Figure]:
     for place, curve in enumerate(curves.follows):
         unit = "W" if curve.channel == "power" else effort_unit(curve.joint, answers)
         drawn[f"follows_{place}"] = follows(curve, unit, effect_names(answers))
-    for name, joint in (("runs_torque", foremost_joint(answers)), ("runs_power", None)):
-        if name == "runs_power" or joint is not None:
-            drawn[name] = runs([row for row in answers["run_changes"].rows if row["joint"] == joint])
+    for measure, joint in (("torque", foremost_joint(answers)), ("power", None), ("position", None), ("flange", None)):
+        wanted = (f"{measure}_rmse", joint)
+        drawn[f"runs_{measure}"] = runs(
+            [row for row in answers["run_changes"].rows if (row["measure"], row["joint"]) == wanted]
+        )
+    drawn["horizons"] = horizons(answers["horizons"].rows)
     drawn["by_cause"] = by_cause(answers)
     drawn["budget"] = budget(answers)
     if curves.experiment is not None:
@@ -191,6 +194,24 @@ def runs(rows: Sequence[Row]) -> Figure | None:
         )
     yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis}}
+
+
+def horizons(rows: Sequence[Row]) -> Figure | None:
+    """Draw how tracking error grows after a run is begun anew, before and after; None where nothing was played."""
+    if not rows:
+        return None
+    unit = rows[0]["unit"]
+    data = [
+        {
+            "type": "scatter", "mode": "lines+markers", "name": name, "x": [row["seconds"] for row in rows],
+            "y": [row[part] for row in rows], "line": {"color": colour, "width": 2.5},
+            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
+        }
+        for name, part, colour in (("simulator", "before", BEFORE), ("with the robot’s numbers", "after", AFTER))
+    ]  # fmt: skip
+    xaxis = {"type": "linear", "title": {"text": "time since begun anew, s"}, "rangemode": "tozero"}
+    yaxis = {"title": {"text": f"tracking error, {unit}"}, "rangemode": "tozero"}
+    return {"data": data, "layout": {"xaxis": xaxis, "yaxis": yaxis}}
 
 
 def by_cause(answers: Answers) -> Figure | None:

@@ -96,14 +96,19 @@ def sentence(
     differ: str = "",
     has_floor: bool = True,
     against: str | None = None,
+    misses: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known; `against`: the role of the runs that it is held against, if any.
+    `has_floor`: whether a noise floor is known; `against`: the role of the runs that it is held against, if any;
+    `misses`: the tracking error of a simulator that was told the robot's commands, if one was.
     """
     if verdict == "no_gap":
+        if misses is not None:
+            beside = f" Not named: {counted(findings)}." if findings else ""
+            return f"There is no gap: the simulator agrees with the robot, to {misses}.{beside}"
         if not findings and not has_floor:
             return (
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from irtwin.document.document import Document, Finding
 from irtwin.report.gap import findings
-from irtwin.report.gap.verdict import closes, differing, where
+from irtwin.report.gap.verdict import closes, differing, misses, where
 from irtwin.report.wording import listed
 
 
@@ -12,18 +12,19 @@ def line(diagnosis: Document, against: str | None) -> str:
     """Return the verdict and what the page says of it; `against`: role of the runs compared with, if any."""
     told = [_told(one, against) for one in diagnosis.findings]
     place = next(iter(diagnosis.locations), None)
-    closed = diagnosis.shrink.closed_fraction
+    closed, tracking = diagnosis.shrink.closed_fraction, diagnosis.shrink.position_rmse
     said = findings.sentence(
         diagnosis.verdict,
         told,
         "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime), place.share),
-        None if closed is None else closes(closed.value, closed.interval95),
+        None if closed is None else closes(closed.value, closed.interval95, tracking is not None),
         diagnosis.unexplained_because,
         differing(
             [(one.kind, one.channel, one.joint) for one in diagnosis.not_repeating or () if not one.explained_by]
         ),
         diagnosis.shrink.noise_floor_from is not None,
         against,
+        None if tracking is None else misses(tracking.before),
     )
     return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
 

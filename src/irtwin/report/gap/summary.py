@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from irtwin.document.curves import Curves, RunError
 from irtwin.document.document import Cause, Document
 from irtwin.knowledge.store.table import Row, Table
-from irtwin.simulator.differences import Difference
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _STEPS = 3  # motions to log that are told
 
 
 def gap(diagnosis: Document) -> Table:
-    """Return the gap on runs outside the fit: torque and power as RMSE, energy as its error."""
+    """Return the gap on runs outside the fit: torque, power and position as RMSE, energy as its error."""
     changes = (
         ("torque (RMSE)", diagnosis.shrink.torque_rmse, "N m"),  # of joints that slide, N
         ("power (RMSE)", diagnosis.shrink.power_rmse, "W"),
+        ("tracking error (RMSE)", diagnosis.shrink.position_rmse, "rad"),  # of joints that slide, m
         ("energy (error)", diagnosis.shrink.energy_error_percent, "%"),
     )
     rows: list[Row] = [
@@ -33,6 +34,27 @@ def gap(diagnosis: Document) -> Table:
     return Table(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
 
 
+def runs(curves: Curves) -> Table:
+    """Return the tracking error of each run that was played, over its joints and at the flange."""
+    columns = ("run", "tracking error, rad", "with the causes", "flange, m", "with the causes, m")
+    of_run: dict[str, list[RunError]] = {}
+    for one in curves.runs:
+        if one.joint is None and one.of:
+            of_run.setdefault(one.run, []).append(one)
+    rows = [
+        (run, *(None if value is None else _short(value) for one in some for value in (one.before, one.after)))
+        for run, some in of_run.items()
+    ]
+    return Table(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+
+
+def horizons(diagnosis: Document) -> Table:
+    """Return how tracking error grows after a run is begun anew as the robot was."""
+    columns = ("s since it was begun anew", "tracking error, rad", "with the causes, rad")
+    rows = [(one.seconds, _short(one.before), _short(one.after)) for one in diagnosis.horizons or ()]
+    return Table(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+
+
 def filtered(diagnosis: Document) -> list[str]:
     """Return a line on the filter that all runs passed; none where nobody said it."""
     cutoff = diagnosis.cutoff
@@ -40,9 +62,15 @@ def filtered(diagnosis: Document) -> list[str]:
 
 
 def causes(diagnosis: Document) -> Table:
-    """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals."""
-    columns = ("cause", "joints", "sure, %", "parameter", "value", "95 % from", "to", "unit")
-    return Table(columns, tuple(_rows_of_causes(diagnosis)))
+    """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals.
+
+    Beside a simulator's model the value is the change from its number to the robot's.
+    """
+    rows = tuple(_rows_of_causes(diagnosis))
+    beside = diagnosis.simulator is not None
+    value = ("simulator", "robot", "change") if beside else ("value",)
+    columns = ("cause", "joints", "sure, %", "parameter", *value, "95 % from", "to", "unit")
+    return Table(columns, tuple({**row, "change": row["value"]} if beside else row for row in rows))
 
 
 def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
@@ -54,39 +82,21 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
             "joints": ", ".join(cause.joints) or "whole robot",
             "sure, %": round(100 * cause.confidence),
         }
-        nothing = dict.fromkeys(("parameter", "value", "95 % from", "to", "unit"))
+        nothing = dict.fromkeys(("parameter", "simulator", "robot", "value", "95 % from", "to", "unit"))
         if not cause.parameters:
             yield first | nothing
         for one in cause.parameters:
             lower, upper = one.interval95 or (None, None)
             yield first | {
                 "parameter": f"{one.name} of {one.joint}" if one.joint and len(cause.joints) > 1 else one.name,
+                "simulator": None if one.simulator is None else _short(one.simulator),
+                "robot": None if one.robot is None else _short(one.robot),
                 "value": _short(one.value),
                 "95 % from": None if lower is None else _short(lower),
                 "to": None if upper is None else _short(upper),
                 "unit": "" if one.unit == "1" else one.unit,
             }
             first = dict.fromkeys(first)  # said once
-
-
-def simulator(found: Sequence[Difference]) -> Table:
-    """Return each number that the simulator's model has wrong, beside the robot's with its 95 % interval."""
-    columns = ("number", "joint", "simulator", "robot", "95 % from", "to", "unit")
-    rows: list[Row] = []
-    for one in found:
-        lower, upper = one.interval95 or (None, None)
-        rows.append(
-            {
-                "number": one.name,
-                "joint": one.joint,
-                "simulator": _short(one.simulator),
-                "robot": _short(one.robot),
-                "95 % from": None if lower is None else _short(lower),
-                "to": None if upper is None else _short(upper),
-                "unit": one.unit,
-            }
-        )
-    return Table(columns, tuple(rows))
 
 
 def not_held(causes: Sequence[Cause]) -> list[str]:

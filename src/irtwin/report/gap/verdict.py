@@ -17,17 +17,19 @@ def sentence(answers: Answers) -> str:
     judged = answers["diagnosis"].rows[0]
     place, closed = answers["locations"].first, answers["closed"].first
     ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
+    played = judged["tracking_error"] is not None
     return findings.sentence(
         wording.local_name(judged["verdict"]),
         told(answers),
         "" if place is None else where(place["channel"], place["joint"], place["regime"], place["share"]),
-        None if closed is None else closes(closed["closed"], ends),
+        None if closed is None else closes(closed["closed"], ends, played),
         judged["reason"] and wording.local_name(judged["reason"]),
         differing([
             (one["kind"], one["channel"], one["joint"]) for one in answers["disturbances"].rows if not one["cause"]
         ]),
         judged["floor_from"] is not None,
         _against(judged),
+        misses(judged["tracking_error"]) if played else None,
     )  # fmt: skip
 
 
@@ -85,10 +87,18 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
     return said if not more else f"{said}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
-def closes(share: float, interval: Sequence[float] | None) -> str:
-    """Say how much of a gap closes."""
+def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
+    """Say how much of a gap closes; `played`: of a simulator's tracking error."""
     within = "" if interval is None else f" {findings.within(interval)}"
+    if played:
+        what = f"{wording.part(share)} of the mean square of its tracking error"
+        return f" The robot’s numbers in the simulator close {what} on held-out runs{within}."
     return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
+
+
+def misses(error: float) -> str:
+    """Say a tracking error, rad."""
+    return f"{1e3 * error:.3g} mrad RMS"
 
 
 def effect_name(row: Row, variable: str = "effect") -> str:

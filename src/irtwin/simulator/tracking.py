@@ -1,0 +1,161 @@
+"""Tracking error: what a robot's positions have beyond a model's, by run, by horizon and by what differs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import factorial
+
+import numpy as np
+
+from irtwin.identification.progress import Tell
+from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import placements
+from irtwin.signals.log import Run
+from irtwin.simulator.choice import Choice
+from irtwin.simulator.play import Stretch, each, play, whole
+from irtwin.simulator.servos import NAMES, Servos
+
+_FOLDS = 3
+_BEGUN_ANEW, _MOST = 0.5, 60  # s; how often in a run
+_HORIZONS = (0.1, 0.2, 0.3, 0.4, 0.5)  # s
+_POSES = 500  # of a run, of which the flange's place is told
+
+OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (9, n)
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Tracking error of a run played as a whole: mean `squares` (n,) by joint, rad^2; `flange`, m, RMS."""
+
+    squares: np.ndarray
+    flange: float
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Mean squares (G, n) of what groups of stretches leave, by which names' numbers are the robot's, not the model's.
+
+    A group is a run; a stretch where there is one run.
+    """
+
+    names: tuple[str, ...]
+    squares: Mapping[frozenset[str], np.ndarray]
+
+    @property
+    def before(self) -> np.ndarray:
+        """What the model leaves."""
+        return self.squares[frozenset()]
+
+    @property
+    def after(self) -> np.ndarray:
+        """What the robot's numbers leave."""
+        return self.squares[frozenset(self.names)]
+
+    def alone(self, name: str) -> np.ndarray:
+        """What is left with the numbers of one name alone."""
+        return self.squares[frozenset([name])]
+
+    def without(self, name: str) -> np.ndarray:
+        """What is left with all numbers but those of one name."""
+        return self.squares[frozenset(self.names) - {name}]
+
+    def closed(self, names: Sequence[str], of: Sequence[Sequence[str]]) -> np.ndarray:
+        """Return what some names close (G,), summed over joints, averaged over the orders in which parts `of` join."""
+        others, found = [part for part in of if part != names], np.zeros(len(self.before))
+        for count in range(len(others) + 1):
+            weight = factorial(count) * factorial(len(others) - count) / factorial(len(of))
+            for some in combinations(others, count):
+                there = frozenset(name for part in some for name in part)
+                found += weight * (self.squares[there] - self.squares[there | set(names)]).sum(axis=1)
+        return found
+
+
+def held_out(chosen: Choice, runs: Sequence[Run]) -> OfRun:
+    """Return for each run numbers that other runs alone say; of one run alone its own."""
+    folds = min(_FOLDS, len(runs))
+    found: dict[str, np.ndarray] = {}
+    for fold in range(folds):
+        names = {run.name for run in runs[fold::folds]}
+        left_out = np.array([one.run.name in names for one in chosen.fit.stretches])
+        found |= dict.fromkeys(names, chosen.without(left_out) if folds > 1 else chosen.numbers)
+    return found
+
+
+def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun, tell: Tell) -> list[Tracked]:
+    """Play runs as a whole, each with its numbers."""
+    found = []
+    for run in runs:
+        tell(f"  run {run.name}")
+        left = run.signals.q - play(own, [numbers[run.name]], [whole(run)])[0][0]
+        some = slice(None, None, max(1, len(left) // _POSES))
+        places = [placements(robot, q[some])[:, :3, 3] for q in (run.signals.q, run.signals.q - left)]
+        flange = float(np.sqrt(((places[0] - places[1]) ** 2).sum(axis=1).mean()))
+        found.append(Tracked((left**2).mean(axis=0), flange))
+    return found
+
+
+def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[tuple[float, float, float]]:
+    """Return horizons, s, with the tracking error from the one before: of the model, and with the numbers of runs."""
+    left: list[list[np.ndarray]] = [[], []]
+    times = []
+    for run in runs:
+        stretches = each(run, _BEGUN_ANEW, _MOST)
+        times += [one.time for one in stretches]
+        for way, played in enumerate(play(own, [own.numbers, numbers[run.name]], stretches)):
+            left[way] += [(one.q - q) ** 2 for one, q in zip(stretches, played, strict=True)]
+    time = np.concatenate(times)
+    squares = [np.concatenate(way).mean(axis=1) for way in left]
+    found = []
+    for low, high in zip((0.0, *_HORIZONS), _HORIZONS, strict=False):
+        inside = (time >= low) & (time < high)
+        if inside.any():
+            before, after = (float(np.sqrt(way[inside].mean())) for way in squares)
+            found.append((high, before, after))
+    return found
+
+
+def parts(chosen: Choice, numbers: OfRun, families: Sequence[Sequence[str]]) -> Parts:
+    """Play the stretches with each name's numbers alone, with all but them, and with those of any families."""
+    names = tuple(name for family in families for name in family)
+    sets = {frozenset[str](), frozenset(names)}
+    sets |= {one for name in names for one in (frozenset([name]), frozenset(names) - {name})}
+    sets |= {
+        frozenset(name for family in some for name in family)
+        for count in range(len(families))
+        for some in combinations(families, count)
+    }
+    wanted, rows = sorted(sets, key=sorted), []
+    stretches = chosen.fit.stretches
+    for same in _alike(stretches, numbers):
+        some = [stretches[place] for place in same]
+        own = chosen.fit.servos.numbers
+        told = [np.where(_rows(one), numbers[some[0].run.name], own) for one in wanted]
+        rows += list(zip(same, np.moveaxis(_squares(chosen.fit.servos, told, some), 1, 0), strict=True))
+    squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, n)
+    runs = [one.run.name for one in stretches]
+    group = [runs.index(name) for name in runs] if len(set(runs)) > 1 else list(range(len(runs)))
+    means = np.array(
+        [squares[[at for at, of in enumerate(group) if of == one]].mean(axis=0) for one in sorted(set(group))]
+    )
+    return Parts(names, {one: means[:, place] for place, one in enumerate(wanted)})
+
+
+def _alike(stretches: Sequence[Stretch], numbers: OfRun) -> list[list[int]]:
+    """Return places of stretches, those of runs with the same numbers together."""
+    found: dict[bytes, list[int]] = {}
+    for place, one in enumerate(stretches):
+        found.setdefault(numbers[one.run.name].tobytes(), []).append(place)
+    return list(found.values())
+
+
+def _rows(names: frozenset[str]) -> np.ndarray:
+    return np.array([name in names for name in NAMES])[:, None]
+
+
+def _squares(own: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch]) -> np.ndarray:
+    played = play(own, numbers, stretches)
+    return np.array([
+        [((one.q - q) ** 2).mean(axis=0) for one, q in zip(stretches, way, strict=True)] for way in played
+    ])  # fmt: skip

@@ -1,0 +1,245 @@
+"""The document of a diagnosis by playing, and what a page draws of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+
+import numpy as np
+from scipy.special import expit
+
+from irtwin.document import document as said
+from irtwin.document.cause_ids import cause_ids
+from irtwin.document.curves import Curves, RunError
+from irtwin.effects.catalogue import catalogue
+from irtwin.gap.isolation.closing import share
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.gap.writing import folded
+from irtwin.robot.description import Robot
+from irtwin.simulator.choice import Choice
+from irtwin.simulator.servos import NAMES
+from irtwin.simulator.tracking import Parts, Tracked
+
+AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differs
+_ATTRIBUTED = 0.5  # of the mean square that closes on motions held out, from which the numbers explain the gap
+_LEAST = 1e-14  # rad^2 (m^2), a mean square as good as none
+_NOT_HELD = "dead_band"  # no number of MuJoCo's servos
+_SHARE_OF = "the mean square of the tracking error"
+
+Horizons = Sequence[tuple[float, float, float]]
+
+
+@cache
+def effects() -> Mapping[str, tuple[str, str, str, str]]:
+    """Return effect, family, unit of a joint that turns, and of one that slides, of each number."""
+    known = {number: effect.id for effect in catalogue().values() for number in effect.in_mjcf.values()}
+    return {
+        "stiffness": ("servo_stiffness", "drive", "N m/rad", "N/m"),
+        "damping": (known["damping"], "friction", "N m s/rad", "N s/m"),
+        "friction": (known["frictionloss"], "friction", "N m", "N"),
+        "holding": ("friction_creep", "friction", "1", "1"),
+        "armature": (known["armature"], "bodies", "kg m^2", "kg"),
+        "offset": ("command_offset", "sensing", "rad", "m"),
+        "delay": ("command_delay", "sensing", "s", "s"),
+        "torque_limit": ("servo_torque_limit", "drive", "N m", "N"),
+        "dead_band": ("servo_dead_band", "drive", "rad", "m"),
+    }
+
+
+def families(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return names by their families, in their order."""
+    of: dict[str, list[str]] = {}
+    for name in names:
+        of.setdefault(effects()[name][1], []).append(name)
+    return [tuple(some) for some in of.values()]
+
+
+def document(
+    robot: Robot,
+    simulator: str,
+    runs: Sequence[str],
+    chosen: Choice,
+    parts: Parts,
+    before: Sequence[Tracked],
+    after: Sequence[Tracked],
+    horizons: Horizons,
+) -> said.Document:
+    """Return the document; `before`, `after`: each run played as a whole, by the model and by numbers of other runs."""
+    squares = [np.array([one.squares for one in some]) for some in (before, after)]
+    names = sorted(parts.names, key=lambda name: -parts.without(name).sum())
+    causes = _causes(robot, chosen, parts, names)
+    findings = _findings(robot, dict(zip(names, causes, strict=True)), parts)
+    named = any(finding.matters for finding in findings)
+    closed, interval = share((squares[0] - squares[1]).sum(axis=1), squares[0].sum(axis=1))
+    verdict = _verdict(named, closed, _rms(squares[0]))
+    return said.Document(
+        verdict=verdict,
+        robot=robot.name,
+        gap=said.Gap(
+            energy_error_percent=None,
+            position={
+                joint: said.Size(rmse=float(np.sqrt(mean)), noise_floor=None, excess=None)
+                for joint, mean in zip(robot.joint_names, squares[0].mean(axis=0), strict=True)
+            },
+        ),
+        locations=(),
+        findings=findings,
+        causes=folded(causes, findings),
+        not_testable=(),
+        shrink=said.Shrink(
+            held_out_runs=tuple(runs) if len(runs) > 1 else (),
+            noise_floor_from=None,
+            torque_rmse=None,
+            power_rmse=None,
+            energy_error_percent=None,
+            closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
+            by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
+            yardstick={},
+            position_rmse=_together(*squares),
+        ),
+        next_experiment=None,
+        unexplained_because="much_is_left" if verdict == "unexplained" else None,
+        simulator=simulator,
+        horizons=tuple(said.Horizon(seconds=at, before=one, after=other) for at, one, other in horizons),
+    )
+
+
+def curves(robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Curves:
+    """Return what a page draws: the tracking error of each run."""
+    return Curves(follows=(), runs=tuple(_errors(robot, runs, before, after)), experiment=None)
+
+
+def _errors(
+    robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]
+) -> Iterator[RunError]:
+    for run, one, other in zip(runs, before, after, strict=True):
+        found: dict[tuple[str, str | None], tuple[float, float]] = {}
+        found["position", None] = _rms(one.squares), _rms(other.squares)
+        found["flange", None] = one.flange, other.flange
+        for place, joint in enumerate(robot.joint_names):
+            found["position", joint] = _rms(one.squares[place]), _rms(other.squares[place])
+        for (of, at), (left, then) in found.items():
+            yield RunError(run=run, joint=at, before=left, after=then, floor=None, of=of)
+
+
+def _verdict(named: bool, closed: float, before: float) -> str:
+    if not named:
+        return "no_gap" if before < AGREES else "unexplained"
+    return "attributed" if closed >= _ATTRIBUTED else "unexplained"
+
+
+def _together(before: np.ndarray, after: np.ndarray) -> said.Change:
+    """Return how far tracking error falls, of mean squares (runs, n)."""
+    of_run = after.mean(axis=1)
+    lower, upper = share(of_run, np.ones(len(of_run)))[1]
+    ends = [float(np.sqrt(max(end, 0.0))) for end in (lower, upper)]
+    return said.Change(
+        before=_rms(before),
+        after=_rms(after),
+        noise_floor=None,
+        interval95_after=(ends[0], ends[1]) if len(after) > 1 else None,
+    )
+
+
+def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) -> tuple[said.Cause, ...]:
+    rows = [NAMES.index(name) for name in names]
+    joints = [[robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row])] for row in rows]
+    ids = cause_ids([(effects()[name][0], on) for name, on in zip(names, joints, strict=True)], robot.joint_names)
+    return tuple(
+        said.Cause(
+            id=one,
+            effect=effects()[name][0],
+            joints=tuple(on),
+            scope="changed",
+            confidence=float((1 - DEFAULT.criterion.unknown) * expit(chosen.odds[row].max())),
+            parameters=tuple(_parameters(robot, chosen, name)),
+            indistinguishable_from=(),
+            evidence=_evidence(chosen, parts, name),
+        )
+        for one, name, row, on in zip(ids, names, rows, joints, strict=True)
+    )
+
+
+def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
+    at = chosen.differs[NAMES.index(name)]
+    everywhere, left = (max(float(some.sum()), _LEAST) for some in (parts.without(name), parts.after))
+    without, after = (max(float(some[:, at].sum()), _LEAST) for some in (parts.without(name), parts.after))
+    return said.Evidence(
+        channel="position",
+        share_of_what_is_closed=None,
+        closed_where_it_acts=1 - after / without,
+        gain=everywhere / left - 1,
+        log_odds=float(chosen.odds[NAMES.index(name)].max()),
+        probability_of_rivals={},
+    )
+
+
+def _parameters(robot: Robot, chosen: Choice, name: str) -> Iterator[said.Parameter]:
+    row, own = NAMES.index(name), chosen.fit.servos.numbers
+    _, _, turning, sliding = effects()[name]
+    for place in np.flatnonzero(chosen.differs[row]):
+        simulator, robots = float(own[row, place]), float(chosen.numbers[row, place])
+        held = name != _NOT_HELD
+        lower, upper = chosen.interval[:, row, place] - simulator
+        yield said.Parameter(
+            name=name,
+            joint=robot.joint_names[place],
+            value=robots - simulator,
+            unit=turning if robot.joints[place].unit == "rad" else sliding,
+            interval95=(float(lower), float(upper)) if upper > lower else None,
+            simulator=simulator if held else None,
+            robot=robots if held else None,
+        )
+
+
+def _change(cause: said.Cause, name: str, parts: Parts) -> said.CauseChange:
+    before, alone, without, after = (
+        tuple(map(float, np.sqrt(some.mean(axis=0))))
+        for some in (parts.before, parts.alone(name), parts.without(name), parts.after)
+    )
+    return said.CauseChange(
+        cause=cause.id,
+        effect=cause.effect,
+        joints=cause.joints,
+        scope=cause.scope,
+        channel="position",
+        share=None,
+        rmse_before=before,
+        rmse_alone=alone,
+        rmse_when_left_out=without,
+        rmse_with_all=after,
+    )
+
+
+def _findings(robot: Robot, causes: Mapping[str, said.Cause], parts: Parts) -> tuple[said.Finding, ...]:
+    """Return the causes by family, the one that closes most first."""
+    of, whole = families(parts.names), parts.before.sum(axis=1)
+    found = []
+    for some in of:
+        own = [cause for name, cause in causes.items() if name in some]
+        value, interval = share(parts.closed(some, of), whole)
+        family = effects()[some[0]][1]
+        on = tuple(joint for joint in robot.joint_names if any(joint in cause.joints for cause in own))
+        found.append(
+            said.Finding(
+                id=cause_ids([(family, on)], robot.joint_names)[0],
+                family=family,
+                joints=on,
+                scope="changed",
+                channel="position",
+                confidence=max(cause.confidence for cause in own),
+                share=value,
+                share_interval95=interval,
+                share_of=_SHARE_OF,
+                matters=value >= DEFAULT.matters.share,
+                members=tuple(
+                    said.Member(cause=one.id, effect=one.effect, family=family, confidence=one.confidence)
+                    for one in own
+                ),
+            )
+        )
+    return tuple(sorted(found, key=lambda one: -one.share))
+
+
+def _rms(squares: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(squares)))
