@@ -31,6 +31,14 @@ def test_equal_models_have_no_number_that_differs(arm):
     assert not chosen(arm, arm[2].numbers).differs.any()
 
 
+def test_a_limit_of_torque_and_a_dead_band_are_found(arm):
+    true = servo_arm.changed(arm[2], torque_limit=(0.8, arm[2].numbers[7, 1]), dead_band=(0.0, 0.02))
+    found = chosen(arm, true)
+    assert (found.differs == (true != arm[2].numbers)).all()
+    assert found.numbers[7, 0] == pytest.approx(0.8, rel=0.1)
+    assert found.numbers[8, 1] == pytest.approx(0.02, rel=0.2)
+
+
 def test_the_numbers_that_differ_are_found_with_their_values(arm):
     true = servo_arm.changed(arm[2], stiffness=(20.0, 10.0), friction=(0.15, 0.05))
     found = chosen(arm, true)

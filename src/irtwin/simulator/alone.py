@@ -37,7 +37,7 @@ class Alone:
     begun: np.ndarray
 
     def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
-        """Return, for each set of numbers (7, n) and each stretch, the positions (N, n) at its samples."""
+        """Return, for each set of numbers (9, n) and each stretch, the positions (N, n) at its samples."""
         most = max(1, _AT_ONCE // self.load.size)
         found: list[list[np.ndarray]] = []
         for first in range(0, len(numbers), most):
@@ -59,10 +59,9 @@ class Alone:
         """Return positions (steps + 1, v, p, n) under the commands told (steps, v, p, n)."""
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
         at, dof = servos.actuators, servos.model.speeds
-        stiffness, damping, friction, holding, armature, _, _ = np.moveaxis(numbers, 1, 0)[:, :, None, :]
+        stiffness, damping, friction, holding, armature, _, _, limit, band = np.moveaxis(numbers, 1, 0)[:, :, None, :]
         joint, servo = servos.dampings(damping)
-        limited = compiled.actuator_forcelimited[at] == 1
-        least, most = np.where(limited, compiled.actuator_forcerange[at].T, [[-np.inf], [np.inf]])
+        least, most = servos.limits(limit)
         changed = holding != servos.numbers[NAMES.index("holding")]
         firm = np.where(changed, holding, compiled.dof_solimp[dof, 1])
         back = 2 / (firm * np.maximum(compiled.dof_solref[dof, 0], 2 * step))
@@ -78,7 +77,9 @@ class Alone:
         for row in range(len(told)):
             inverse = 1 / (self.inertia[row] + armature)
             followed += share * (told[row] - followed)
-            force = np.minimum(np.maximum(stiffness * (followed - q) - servo * v, least), most)
+            off = followed - q
+            off -= np.minimum(np.maximum(off, -band), band)
+            force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
             force -= joint * v + self.load[row]
             held = (force * inverse + back * v) / (inverse + soft)
             force -= np.minimum(np.maximum(held, -friction), friction)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from irtwin.gap.thresholds import Criterion
 from irtwin.identification.progress import Tell
@@ -17,13 +18,14 @@ _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be bes
 _AGAIN = 2  # passes after numbers were given back
 _NEARLY = 3.0  # times what a number has to gain, by its slopes: beyond, it is not tried without
 _NORMAL = 1.96
+_SAME = 1e-9  # of the chart
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Numbers of the robot and which of them differ: `differs` (7, n); `odds` (7, n), natural logarithms, that they do.
+    """Numbers of the robot and which of them differ: `differs` (9, n); `odds` (9, n), natural logarithms, that they do.
 
-    `interval` (2, 7, n): ends of 95 % of each number, the number itself where it is the simulator's.
+    `interval` (2, 9, n): ends of 95 % of each number, the number itself where it is the simulator's.
     """
 
     fit: Fit
@@ -35,11 +37,11 @@ class Choice:
 
     @property
     def numbers(self) -> np.ndarray:
-        """The robot's numbers (7, n)."""
+        """The robot's numbers (9, n)."""
         return self.fit.servos.of_chart(self.played.at)
 
     def without(self, left_out: np.ndarray) -> np.ndarray:
-        """Return the numbers (7, n) that fit when stretches (p,) are left out, by one step from those of all."""
+        """Return the numbers (9, n) that fit when stretches (p,) are left out, by one step from those of all."""
         at = self.played.at.copy()
         for joint in range(at.shape[1]):
             rows, normal, right = _equations(self.fit, self.played, self.slopes, self.differs, joint, ~left_out)
@@ -51,7 +53,7 @@ def choose(fit: Fit, tell: Tell | None = None) -> Choice:
     """Fit all numbers, then give back to the simulator what the evidence is no worse without, the least first."""
     fit, best = _all_free(fit, tell)
     own = fit.servos.chart(fit.servos.numbers)
-    differs = best.at != own
+    differs = ~np.isclose(best.at, own, rtol=0, atol=_SAME)
     needed = np.zeros_like(differs)
     while True:
         fit = fit.about(best.at)
@@ -77,12 +79,12 @@ def choose(fit: Fit, tell: Tell | None = None) -> Choice:
 
 def _all_free(fit: Fit, tell: Tell | None) -> tuple[Fit, Played]:
     """Return the fit with what its misfit and certainty are, and all numbers fitted."""
-    free = np.isin(np.arange(len(NAMES)), SMOOTH)[:, None] & np.ones(fit.floor.shape, dtype=bool)
+    free = np.isin(np.arange(len(NAMES)), SMOOTH)[:, None] & fit.servos.can_differ
     best = fit.begun(tell)
     for _ in range(2):
         usual = np.sqrt(np.median(best.squares, axis=0))
         fit = replace(fit, floor=np.maximum(usual, _LEAST), certainty=_certainty(best)).about(best.at)
-        best = fit.solved(fit.played(best.at), free, tell=tell)
+        best = fit.solved(fit.limited(fit.played(best.at)), free, tell=tell)
     return fit, best
 
 
@@ -99,7 +101,7 @@ def _certainty(best: Played) -> np.ndarray:
 
 
 def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much the cost rises (7, n) where a number is given back, and by how much it has to, to differ.
+    """Return by how much the cost rises (9, n) where a number is given back, and by how much it has to, to differ.
 
     The latter is what the number could have been besides, and which of all numbers it is.
     """
@@ -118,7 +120,11 @@ def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tup
 
 
 def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np.ndarray:
-    """Return the ends of 95 % (2, 7, n) of the numbers, by how stretches disagree, and by what is left of each."""
+    """Return the ends of 95 % (2, 9, n) of the numbers, by how stretches disagree, and by what is left of each.
+
+    Numbers that were given back may differ all the same: without gravity's load, motion alone says little of the scale
+    of stiffness, damping and friction together.
+    """
     spread = np.zeros(differs.shape)
     count = len(fit.stretches)
     for joint in range(differs.shape[1]):
@@ -126,8 +132,28 @@ def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np
         inverse = np.linalg.inv(normal)
         each = slopes.right[:, joint][:, [SMOOTH.index(row) for row in rows]]
         between = inverse @ (each.T @ each) @ inverse * count / max(count - len(rows), 1)
-        spread[rows, joint] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)))
+        doubt = _doubt(fit, best, slopes, differs, joint)
+        spread[rows, joint] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)) + doubt)
     return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-_NORMAL, _NORMAL)])
+
+
+def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int) -> np.ndarray:
+    """Return what a joint's numbers that were given back add to the variance of those that differ.
+
+    Each adds what freeing it would, as likely as the data leave it that it differs.
+    """
+    rows, normal, _ = _equations(fit, best, slopes, differs, joint)
+    before, found = np.diag(np.linalg.inv(normal)), np.zeros(len(rows))
+    for row in (one for one in SMOOTH if one not in rows):
+        freed = differs.copy()
+        freed[row, joint] = True
+        some, normal, right = _equations(fit, best, slopes, freed, joint)
+        variance, step = np.diag(np.linalg.inv(normal)), np.linalg.solve(normal, right)
+        own, others = some.index(row), [some.index(one) for one in rows]
+        worth = np.log(len(NAMES)) + np.log(LIKELY[row, 0] ** 2 / variance[own]) / 2
+        chance = expit(step[own] ** 2 / variance[own] / 2 - worth)
+        found += chance * (np.maximum(variance[others] - before, 0.0) + step[others] ** 2)
+    return found
 
 
 def _equations(

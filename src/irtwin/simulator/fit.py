@@ -15,14 +15,25 @@ from irtwin.simulator.servos import HOLDS, NAMES, Servos
 SMOOTH = tuple(NAMES.index(name) for name in NAMES if name != "holding")  # rows that least squares finds
 _HOLDING = NAMES.index("holding")
 _SETTLED = 0.3  # s after which where a stretch began is forgotten
-_STEP = {"offset": 0.002, "delay": 0.004}  # of a difference quotient; 0.05 of the others, in the chart
-_FARTHEST = {"offset": 0.05, "delay": 0.02}  # that one step goes; 1 of the others
-_LIKELY = {"offset": 0.1, "delay": 0.05, "armature": 0.5}  # standard deviation from the simulator's; 3 of the others
+_STEP = {
+    "offset": 0.002,
+    "delay": 0.004,
+    "dead_band": 0.001,
+}  # of a difference quotient; 0.05 of the others, in the chart
+_FARTHEST = {"offset": 0.05, "delay": 0.02, "dead_band": 0.01}  # that one step goes; 1 of the others
+_LIKELY = {
+    "offset": 0.1,
+    "delay": 0.05,
+    "armature": 0.5,
+    "dead_band": 0.02,
+}  # standard deviation from the simulator's; 3 of the others
 _TIMES = (1.0, 0.3, 0.1, 0.03, 0.01)  # the simulator's stiffness, where it is begun
 _SETTLES = 0.06  # s, damping over stiffness there
 _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
 _DAMPINGS = (0.2, 1.0, 8.0, 64.0)  # times that of the pass before
 _PASSES, _WORTH = 12, 0.05
+_LIMITS = (0.9, 0.6, 0.4, 0.25, 0.15)  # of the torque that a servo without limit would have given, tried as limits
+_NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
 
 
 def _rows(values: dict[str, float], other: float) -> np.ndarray:
@@ -34,9 +45,9 @@ STEP, FARTHEST, LIKELY = _rows(_STEP, 0.05), _rows(_FARTHEST, 1.0), _rows(_LIKEL
 
 @dataclass(frozen=True)
 class Played:
-    """What is left of stretches beside numbers (7, n): squares (p, n), rad^2, means over each stretch; `remainders`."""
+    """What is left of stretches beside numbers (9, n): squares (p, n), rad^2, means over each stretch; `remainders`."""
 
-    at: np.ndarray  # (7, n), in the chart
+    at: np.ndarray  # (9, n), in the chart
     remainders: tuple[np.ndarray, ...]  # a stretch: (N, n), robot less model
     squares: np.ndarray
 
@@ -73,7 +84,7 @@ class Fit:
         return self.alone.stretches
 
     def played(self, at: np.ndarray) -> Played:
-        """Play numbers (7, n) of the chart."""
+        """Play numbers (9, n) of the chart."""
         return self.all_played([at])[0]
 
     def all_played(self, many: Sequence[np.ndarray]) -> list[Played]:
@@ -86,11 +97,11 @@ class Fit:
         ]
 
     def rolled(self, at: np.ndarray) -> Played:
-        """Play numbers (7, n) of the chart by the whole model."""
+        """Play numbers (9, n) of the chart by the whole model."""
         return self._left(at, play(self.servos, [self.servos.of_chart(at)], self.stretches)[0])
 
     def about(self, at: np.ndarray) -> Fit:
-        """Return the fit that plays as the whole model at numbers (7, n) of the chart, with slopes of single joints."""
+        """Return the fit that plays as the whole model at numbers (9, n) of the chart, with slopes of single joints."""
         whole = play(self.servos, [self.servos.of_chart(at)], self.stretches)[0]
         single = self.alone.play([self.servos.of_chart(at)])[0]
         return replace(self, beyond=tuple(one - other for one, other in zip(whole, single, strict=True)))
@@ -111,7 +122,7 @@ class Fit:
         return np.asarray(self.certainty / 2 * np.log1p(one.squares / self.floor**2).sum(axis=0))
 
     def away(self, at: np.ndarray) -> np.ndarray:
-        """Return how far numbers (7, n) are from the simulator's, in standard deviations of what is likely."""
+        """Return how far numbers (9, n) are from the simulator's, in standard deviations of what is likely."""
         off = (at - self.servos.chart(self.servos.numbers)) / LIKELY
         off[_HOLDING] = 0.0
         return np.asarray(off)
@@ -130,7 +141,7 @@ class Fit:
         return Slopes(np.array(normal), np.array(right))
 
     def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES, tell: Tell | None = None) -> Played:
-        """Return numbers with those that are free (7, n) fitted, by Levenberg's way, each joint with its own damping.
+        """Return numbers with those that are free (9, n) fitted, by Levenberg's way, each joint with its own damping.
 
         A joint keeps what it has where nothing better is found.
         """
@@ -152,7 +163,7 @@ class Fit:
     def _steps(
         self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], free: np.ndarray, damping: np.ndarray
     ) -> np.ndarray:
-        """Return the step (7, n) of all numbers, none of those that are not free."""
+        """Return the step (9, n) of all numbers, none of those that are not free."""
         likely, steps = LIKELY[rows, 0], np.zeros(at.shape)
         for joint in range(at.shape[1]):
             own = np.flatnonzero(free[rows, joint])
@@ -177,10 +188,21 @@ class Fit:
             mixed([one.squares for one in tried]),
         )
 
+    def limited(self, best: Played) -> Played:
+        """Return numbers with the limits of torque that are better, if any: one that is never reached has no slope."""
+        numbers, row = self.servos.of_chart(best.at), NAMES.index("torque_limit")
+        off = [np.abs(one.commands(one.time, 1e-3, numbers) - one.q).max(axis=0) for one in self.stretches]
+        found = best
+        for shares, about in ((_LIMITS, numbers[0] * np.max(off, axis=0)), (_NEARER, None)):
+            middle = self.servos.of_chart(found.at)[row] if about is None else about
+            tried = [np.where(np.arange(len(NAMES))[:, None] == row, middle * share, numbers) for share in shares]
+            found = self.best((found, *self.all_played([self.servos.chart(one) for one in tried])))
+        return found
+
     def begun(self, tell: Tell | None = None) -> Played:
         """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
         own, tried = self.servos.numbers, []
-        free = np.ones(own.shape, dtype=bool)
+        free = self.servos.can_differ.copy()
         free[[NAMES.index("stiffness"), NAMES.index("holding")]] = False
         for times in _TIMES:
             stiffness = own[0] * times

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from irtwin.simulator.mjcf_file import MjcfFile, read_mjcf
 if TYPE_CHECKING:
     import mujoco
 
+_SECOND = " beside its servo"
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
 
 
@@ -93,8 +94,24 @@ def read_model(path: Path, robot: Robot) -> Model:
     )
 
 
-def _compiled(file: MjcfFile) -> tuple[mujoco.MjModel, np.ndarray]:
-    """Return the compiled model without the delays of its actuators, and these."""
+@dataclass(frozen=True)
+class Paired:
+    """A model with a second actuator at each of the robot's joints, idle, told the commands of the first."""
+
+    compiled: mujoco.MjModel
+    second: np.ndarray  # (n,) actuators
+    joints: np.ndarray  # (n,)
+
+
+def pair(model: Model) -> Paired:
+    """Return a model with second actuators."""
+    compiled, _ = _compiled(model.file, model.joints)
+    second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints]
+    return Paired(compiled, np.array(second), np.array([compiled.joint(joint).id for joint in model.joints]))
+
+
+def _compiled(file: MjcfFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjModel, np.ndarray]:
+    """Return the compiled model without the delays of its actuators, and these; `paired`: joints with a second one."""
     try:
         import mujoco
     except ModuleNotFoundError as error:
@@ -105,9 +122,19 @@ def _compiled(file: MjcfFile) -> tuple[mujoco.MjModel, np.ndarray]:
         delays = np.array([one.delay for one in spec.actuators], dtype=float)
         for one in spec.actuators:
             one.delay, one.nsample = 0.0, 0
+        for joint in paired:
+            _add_second(spec, joint, mujoco)
         return spec.compile(), delays
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
+
+
+def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:
+    first = next(one for one in spec.actuators if one.target == joint)
+    second = spec.add_actuator(name=f"{joint}{_SECOND}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    second.ctrllimited, second.ctrlrange = first.ctrllimited, first.ctrlrange
+    second.forcelimited, second.forcerange = True, (-1.0, 1.0)
 
 
 def _drop_pictures(spec: mujoco.MjSpec, mujoco: Any) -> None:

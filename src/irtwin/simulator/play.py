@@ -44,7 +44,7 @@ class Stretch:
     def commands(self, begin: np.ndarray, step: float, numbers: np.ndarray) -> np.ndarray:
         """Return the commands (N, n) in force, on average, over steps that begin at times (N,), s since its beginning.
 
-        Each command is in force until the next comes; delay and offset of `numbers` (7, n) are in them.
+        Each command is in force until the next comes; delay and offset of `numbers` (9, n) are in them.
         """
         time, told = self.run.signals.time, self.run.signals.command
         assert told is not None
@@ -77,7 +77,7 @@ def each(run: Run, seconds: float, most: int | None = None) -> list[Stretch]:
 def play(
     servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], step: float | None = None
 ) -> list[list[np.ndarray]]:
-    """Return, for each set of numbers (7, n) and each stretch, the positions (N, n) of the model at its samples.
+    """Return, for each set of numbers (9, n) and each stretch, the positions (N, n) of the model at its samples.
 
     `step`, s, is that of the simulation, None the model's own. Joints that the robot lacks are told zero.
     """
@@ -93,11 +93,12 @@ def _played(
     import mujoco
     from mujoco.rollout import rollout
 
-    compiled = servos.model.compiled
+    paired = any(one[NAMES.index("dead_band")].any() for one in numbers)
+    compiled = servos.paired.compiled if paired else servos.model.compiled
     size = mujoco.mj_stateSize(compiled, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     datas = [mujoco.MjData(compiled) for _ in os.sched_getaffinity(0)]
     states = [_state(servos, one, size) for one in stretches]
-    models = [servos.compiled(one, step) for one in numbers]
+    models = [servos.compiled(one, step, paired) for one in numbers]
     pairs = [(one, place) for one in range(len(numbers)) for place in range(len(stretches))]
     at_once = max(1, _MOST // (steps * size))
     begin, after = np.arange(steps) * step, np.arange(1, steps + 1) * step
@@ -105,7 +106,9 @@ def _played(
         some = pairs[first : first + at_once]
         told = np.zeros((len(some), steps, compiled.nu))
         for row, (one, place) in enumerate(some):
-            told[row][:, servos.actuators] = stretches[place].commands(begin, step, numbers[one])
+            commands = stretches[place].commands(begin, step, numbers[one])
+            for drives in (servos.actuators, *([servos.paired.second] if paired else [])):
+                told[row][:, drives] = commands
         found, _ = rollout([models[one] for one, _ in some], datas, np.array([states[at] for _, at in some]), told)
         for row, (_, place) in enumerate(some):
             begun, time = states[place][1 + servos.model.positions], stretches[place].time

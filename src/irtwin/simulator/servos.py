@@ -5,59 +5,99 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.simulator.mjcf_file import Tag
-from irtwin.simulator.model import Model
+from irtwin.simulator.model import Model, Paired, pair
 
 if TYPE_CHECKING:
     import mujoco
 
-NAMES = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay")
+NAMES = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band")
 _IN_JOINT = {"frictionloss": "friction", "armature": "armature"}  # attribute and name
+_UNLIMITED = np.array([[-1e12], [1e12]])  # N m
+_FARTHEST = 2 * np.pi  # rad that a joint is off: a servo without limit gives no more torque than there
 HOLDS = 0.9999  # impedance of friction that lets a joint at rest creep no more: the most that MuJoCo takes
 _NEAR_ZERO = {
     "stiffness": 0.01,
     "damping": 0.1,
     "friction": 0.1,
     "armature": 0.01,
-}  # times inertia, s^-2, s^-1, s^-2, 1
+    "torque_limit": 0.01,
+}  # times inertia, s^-2, s^-1, s^-2, 1, s^-2
 
 
 @dataclass(frozen=True)
 class Servos:
-    """A model's servos in the order of its joints; numbers of them are (7, n), a row a name of NAMES.
+    """A model's servos in the order of its joints; numbers of them are (9, n), a row a name of NAMES.
 
     stiffness N m/rad; damping N m s/rad, of servo and joint together; friction N m; holding: the impedance of that
-    friction, 0 to 1; armature kg m^2; offset rad, added to a command; delay s. N and m where a joint slides.
+    friction, 0 to 1; armature kg m^2; offset rad, added to a command; delay s; torque_limit N m, the most of the servo;
+    dead_band rad, how far a joint is off before its servo pulls. N and m where a joint slides.
     """
 
     model: Model
     actuators: np.ndarray  # (n,)
-    numbers: np.ndarray  # (7, n), the model's own
-    scale: np.ndarray  # (7, n), below which a number is as good as zero
+    numbers: np.ndarray  # (9, n), the model's own
+    scale: np.ndarray  # (9, n), below which a number is as good as zero
 
     def chart(self, numbers: np.ndarray) -> np.ndarray:
-        """Return numbers (..., 7, n) in coordinates in which equal steps matter alike: logarithms, but near zero."""
+        """Return numbers (..., 9, n) in coordinates in which equal steps matter alike: logarithms, but near zero."""
         return np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
 
     def of_chart(self, coordinates: np.ndarray) -> np.ndarray:
-        """Return the numbers of coordinates (..., 7, n); those that cannot be below zero are not."""
+        """Return the numbers of coordinates (..., 9, n); those that cannot be below zero are not."""
         free = np.isnan(self.scale)
-        free[NAMES.index("delay")] = False
+        free[[NAMES.index("delay"), NAMES.index("dead_band")]] = False
         held = np.where(free, coordinates, np.maximum(coordinates, 0.0))
         return np.where(np.isnan(self.scale), held, self.scale * np.expm1(np.where(np.isnan(self.scale), 0.0, held)))
 
-    def compiled(self, numbers: np.ndarray, step: float) -> mujoco.MjModel:
-        """Return the compiled model with numbers (7, n) of its own; offset and delay are the commands' to have."""
+    @cached_property
+    def can_differ(self) -> np.ndarray:
+        """Whether numbers (9, n) can be others: a servo whose commands are filtered has no dead band here."""
+        found = np.ones(self.numbers.shape, dtype=bool)
+        found[NAMES.index("dead_band")] = self.model.compiled.actuator_actnum[self.actuators] == 0
+        return found
+
+    @cached_property
+    def paired(self) -> Paired:
+        """The model with a second actuator beside each servo, which takes from its pull what a dead band does."""
+        return pair(self.model)
+
+    def limits(self, torque_limit: np.ndarray) -> np.ndarray:
+        """Return the least and most torque (2, ..., n) of servos: the model's, where the limit (..., n) is."""
+        compiled, at = self.model.compiled, self.actuators
+        own = np.where(compiled.actuator_forcelimited[at] == 1, compiled.actuator_forcerange[at].T, _UNLIMITED)
+        changed = torque_limit != self.numbers[NAMES.index("torque_limit")]
+        return np.array([np.where(changed, side * torque_limit, end) for side, end in zip((-1, 1), own, strict=True)])
+
+    def compiled(self, numbers: np.ndarray, step: float, paired: bool) -> mujoco.MjModel:
+        """Return the compiled model with numbers (9, n) of its own; offset and delay are the commands' to have.
+
+        A dead band needs the model that is `paired`.
+        """
         import mujoco
 
-        one, at, dof = copy.copy(self.model.compiled), self.actuators, self.model.speeds
+        one, at, dof = (
+            copy.copy(self.paired.compiled if paired else self.model.compiled),
+            self.actuators,
+            self.model.speeds,
+        )
         one.opt.timestep = step
-        stiffness, damping, friction, holding, armature, _, _ = numbers
+        stiffness, damping, friction, holding, armature, _, _, limit, band = numbers
+        ends = self.limits(limit)
+        if paired:
+            second, joints = self.paired.second, self.paired.joints
+            one.actuator_gainprm[second, 0], one.actuator_biasprm[second, 1] = -stiffness, stiffness
+            one.actuator_forcerange[second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
+            one.actuator_forcelimited[at] = 0
+            one.jnt_actfrclimited[joints], one.jnt_actfrcrange[joints] = 1, ends.T
+        else:
+            one.actuator_forcelimited[at], one.actuator_forcerange[at] = 1, ends.T
         in_joint, in_servo = self.dampings(damping)
         one.actuator_gainprm[at, 0], one.actuator_biasprm[at, 1] = stiffness, -stiffness
         one.actuator_biasprm[at, 0], one.actuator_biasprm[at, 2] = 0.0, -in_servo
@@ -76,7 +116,7 @@ class Servos:
         return kept, damping - kept
 
     def written(self, numbers: np.ndarray, differs: np.ndarray) -> bytes:
-        """Return the model's file with those of numbers (7, n) that differ (7, n); all else stays, byte for byte."""
+        """Return the model's file with those of numbers (9, n) that differ (9, n); all else stays, byte for byte."""
         changes: dict[Tag, dict[str, float | str | None]] = {}
         file = self.model.file
         in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
@@ -91,7 +131,7 @@ class Servos:
                 of_joint["solimpfriction"] = f"{told['holding']!r} {told['holding']!r}"
             if of_joint:
                 changes[file.tag(["joint"], "name", joint)] = of_joint
-            if own["stiffness"] or own["damping"] or own["offset"] or own["delay"]:
+            if any(own[name] for name in ("stiffness", "damping", "offset", "delay", "torque_limit")):
                 tag = file.tag(["position", "general"], "joint", joint)
                 changes[tag] = self._of_servo(tag, place, told, own, float(in_servo[place]))
         return file.changed(changes)
@@ -114,6 +154,8 @@ class Servos:
         else:
             changed |= {"kp": told["stiffness"]} if own["stiffness"] else {}
             changed |= {"kv": damping, "dampratio": None} if own["damping"] else {}
+        if own["torque_limit"]:
+            changed["forcerange"] = f"{-told['torque_limit']!r} {told['torque_limit']!r}"
         if own["delay"]:
             samples = int(np.ceil(told["delay"] / self.model.compiled.opt.timestep)) + 1
             changed |= {"delay": told["delay"], "nsample": str(samples)}
@@ -155,6 +197,10 @@ def servos(model: Model) -> Servos:
             compiled.dof_armature[dof],
             compiled.actuator_biasprm[at, 0] / stiffness,
             model.delays[at],
+            np.where(
+                compiled.actuator_forcelimited[at] == 1, compiled.actuator_forcerange[at, 1], _FARTHEST * stiffness
+            ),
+            np.zeros(len(at)),
         ]
     )
     data = mujoco.MjData(compiled)
