@@ -1,0 +1,219 @@
+"""Cases: the model of an arm with position servos, and logs of an arm that differs from it in ways that are known.
+
+The arm is moved at 500 Hz by MuJoCo's equations, its servos by those written here, not by what is measured. Its log is
+that of a controller: commands and positions at 100 Hz, with noise of encoders.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from closed_loop.machine import Machine, build
+from closed_loop.models import SOURCES, read_model
+from closed_loop.programmes import exciting, working
+
+SEED = 330_000_000
+STEP, EVERY = 0.002, 5  # s; steps from one sample of the log to the next
+SECONDS, RUNS, HELD_OUT = 8.0, 6, 2
+NOISE = 3e-4  # rad
+ARMS = tuple(SOURCES)
+KINDS = (
+    "armature", "damping", "friction", "stiffness", "payload", "delay", "backlash", "torque_limit", "offset",
+)  # fmt: skip
+NULLS, PAIRS = 1 / 8, 1 / 4  # shares of the cases
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A number that the arm has another of; a payload, kg, is the whole robot's."""
+
+    kind: str
+    joint: int | None
+    simulator: float
+    robot: float
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Numbers of an arm with servos, each (n,); payload in kg."""
+
+    stiffness: np.ndarray
+    damping: np.ndarray
+    servo_damping: np.ndarray
+    friction: np.ndarray
+    armature: np.ndarray
+    torque_limit: np.ndarray
+    offset: np.ndarray
+    delay: np.ndarray
+    backlash: np.ndarray  # rad to either side
+    payload: float = 0.0
+
+    def with_(self, differences: tuple[Difference, ...]) -> Arm:
+        """Return the arm with other numbers."""
+        found = {name: np.copy(value) for name, value in vars(self).items()}
+        for one in differences:
+            if one.joint is None:
+                found[one.kind] = one.robot
+            else:
+                found[one.kind][one.joint] = one.robot
+        return Arm(**{**found, "payload": float(found["payload"])})
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case before it is made."""
+
+    name: str
+    arm: str
+    seed: int
+    count: int  # of differences
+
+
+def plans(count: int, seed: int = SEED) -> Iterator[Case]:
+    """Yield cases in an order that tells nothing: nulls, pairs, and else one difference."""
+    rng = np.random.default_rng(seed)
+    nulls, pairs = round(NULLS * count), round(PAIRS * count)
+    counts = rng.permutation([0] * nulls + [2] * pairs + [1] * (count - nulls - pairs))
+    for number, of in enumerate(counts):
+        yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of))
+
+
+def make(case: Case, models: Path, folder: Path) -> list[Difference]:
+    """Write the model, the data set and apart the runs that are held out; return the label."""
+    rng = np.random.default_rng([case.seed, 7])
+    machine = build(read_model(models, case.arm), case.seed)
+    own = _drawn(machine, rng)
+    kinds = rng.choice(KINDS, case.count, replace=False)
+    differences = tuple(_difference(str(kind), own, rng) for kind in kinds)
+    text, robot = _mjcf(machine, own), own.with_(differences)
+    for part in ("data", "held_out"):
+        (folder / case.name / part / "runs").mkdir(parents=True)
+        (folder / case.name / part / "robot.urdf").write_text(machine.urdf, encoding="utf-8")
+        (folder / case.name / part / "dataset.toml").write_text(_described(machine, part == "data"), encoding="utf-8")
+    (folder / case.name / "model.xml").write_text(text, encoding="utf-8")
+    model = mujoco.MjModel.from_xml_string(_mjcf(machine, robot))
+    for run in range(RUNS):
+        programme = (exciting if run % 2 else working)(machine, SECONDS, rng)
+        every = round(STEP * EVERY / machine.step)
+        told = programme.q[::every]
+        q = simulate(model, robot, told)
+        part = "data" if run < RUNS - HELD_OUT else "held_out"
+        columns = {"time": np.arange(len(told)) * STEP * EVERY}
+        for k, name in enumerate(machine.model.joints):
+            columns[f"q_{name}"] = q[:, k] + NOISE * rng.standard_normal(len(q))
+            columns[f"cmd_{name}"] = told[:, k].copy()
+        pq.write_table(pa.table(columns), folder / case.name / part / "runs" / f"run_{run}.parquet")
+    return list(differences)
+
+
+def simulate(model: mujoco.MjModel, arm: Arm, told: np.ndarray) -> np.ndarray:
+    """Return the positions (N, n) of an arm that is told commands (N, n), each until the next."""
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION  # its servos are those below
+    data = mujoco.MjData(model)
+    data.qpos[:] = told[0]
+    late = np.round(arm.delay / STEP).astype(int)
+    found, columns = np.empty_like(told), np.arange(told.shape[1])
+    settling = round(1.0 / STEP)  # the log begins when the robot stands
+    for row in range(-settling, len(told) * EVERY):
+        if row >= 0 and row % EVERY == 0:
+            found[row // EVERY] = data.qpos
+        command = told[np.maximum(row - late, 0) // EVERY, columns] + arm.offset
+        off = command - data.qpos
+        off = np.sign(off) * np.maximum(np.abs(off) - arm.backlash, 0.0)
+        torque = arm.stiffness * off - arm.servo_damping * data.qvel
+        data.qfrc_applied[:] = np.clip(torque, -arm.torque_limit, arm.torque_limit)
+        mujoco.mj_step(model, data)
+    return found
+
+
+def labels(found: dict[str, tuple[Case, list[Difference]]], joints: dict[str, tuple[str, ...]]) -> str:
+    """Return the labels of cases as JSON."""
+    told = {
+        name: {
+            "arm": case.arm,
+            "differences": [
+                asdict(one) | {"joint": None if one.joint is None else joints[name][one.joint]} for one in some
+            ],
+        }
+        for name, (case, some) in found.items()
+    }
+    return json.dumps(told, indent=1, sort_keys=True) + "\n"
+
+
+def _drawn(machine: Machine, rng: np.random.Generator) -> Arm:
+    torque, n = machine.model.torque, len(machine.model.joints)
+    armature = machine.real.dof_armature.copy()
+    inertia = machine.inertia
+    stiffness = inertia * (2 * np.pi * rng.uniform(2.0, 4.0, n)) ** 2 + torque * rng.uniform(4.0, 8.0, n)
+    return Arm(
+        stiffness=stiffness,
+        damping=machine.real.dof_damping.copy(),
+        servo_damping=2 * rng.uniform(0.5, 0.9, n) * np.sqrt(stiffness * inertia),
+        friction=machine.real.dof_frictionloss.copy(),
+        armature=armature,
+        torque_limit=1.5 * torque,
+        offset=np.zeros(n),
+        delay=np.zeros(n),
+        backlash=np.zeros(n),
+    )
+
+
+def _difference(kind: str, own: Arm, rng: np.random.Generator) -> Difference:
+    joint = int(rng.integers(len(own.stiffness)))
+    if kind == "payload":
+        return Difference(kind, None, 0.0, float(own.torque_limit[1] * rng.uniform(0.01, 0.03)))
+    before = float(getattr(own, kind)[joint])
+    sign = float(rng.choice([-1.0, 1.0]))
+    after = {
+        "armature": before * rng.uniform(2.0, 4.0),
+        "damping": before * rng.uniform(3.0, 8.0),
+        "friction": before * rng.choice([0.3, 2.0, 3.0]),
+        "stiffness": before * rng.choice([0.6, 0.75, 1.4, 1.7]),
+        "delay": float(rng.choice([0.01, 0.02, 0.04])),
+        "backlash": rng.uniform(0.003, 0.015),
+        "torque_limit": before * rng.uniform(0.15, 0.3),
+        "offset": sign * rng.uniform(0.005, 0.03),
+    }[kind]
+    return Difference(kind, joint, before, float(after))
+
+
+def _mjcf(machine: Machine, arm: Arm) -> str:
+    """Return the arm's model with its numbers and position servos."""
+    root = ElementTree.fromstring(machine.model.spec)
+    ElementTree.SubElement(root, "option", timestep=str(STEP))
+    actuator = ElementTree.SubElement(root, "actuator")
+    own = {str(joint.get("name")): joint for joint in root.iter("joint") if joint.get("name")}
+    for k, name in enumerate(machine.model.joints):
+        own[name].attrib |= {
+            "armature": repr(float(arm.armature[k])),
+            "damping": repr(float(arm.damping[k])),
+            "frictionloss": repr(float(arm.friction[k])),
+        }
+        limit = float(arm.torque_limit[k])
+        ElementTree.SubElement(
+            actuator, "position", name=name, joint=name, kp=repr(float(arm.stiffness[k])),
+            kv=repr(float(arm.servo_damping[k])), forcerange=f"{-limit!r} {limit!r}",
+        )  # fmt: skip
+    if arm.payload:
+        load = next(body for body in root.iter("body") if body.get("name") == "load")
+        inertial = load.find("inertial")
+        assert inertial is not None
+        inertial.attrib |= {"mass": repr(arm.payload), "diaginertia": " ".join([repr(arm.payload * 2e-3)] * 3)}
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _described(machine: Machine, fitted: bool) -> str:
+    runs = range(RUNS - HELD_OUT) if fitted else range(RUNS - HELD_OUT, RUNS)
+    lines = ["[robot]", f'name = "{machine.model.name}"', 'urdf = "robot.urdf"', "simulated = true"]
+    lines += [f'\n[[run]]\nfile = "runs/run_{run}.parquet"' for run in runs]
+    return "\n".join(lines) + "\n"

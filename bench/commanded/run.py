@@ -1,0 +1,163 @@
+"""`python -m commanded.run MODELS FOLDER [--count 24]`: make sealed cases, then diagnose and score them.
+
+MODELS is where `pip download --no-deps robosuite gymnasium-robotics -d MODELS` put its wheels. The first call makes the
+cases, writes `labels.json` in FOLDER_labels and prints its SHA-256: commit that. The second diagnoses those that are
+not yet diagnosed, one after another, and writes `RESULTS_COMMANDED.md`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closed_loop.models import read_model as read_arm
+from commanded.cases import NOISE, labels, make, plans
+from irtwin.errors import InputError
+from irtwin.signals.log import read_data_set
+from irtwin.simulator.model import read_model
+from irtwin.simulator.play import play, whole
+from irtwin.simulator.playing import diagnose
+from irtwin.simulator.servos import servos
+
+EFFECTS = {  # what each kind is called by a diagnosis
+    "armature": "rotor_inertia", "damping": "viscous_friction", "friction": "coulomb_friction",
+    "stiffness": "servo_stiffness", "payload": "payload", "delay": "command_delay", "backlash": "servo_dead_band",
+    "torque_limit": "servo_torque_limit", "offset": "command_offset",
+}  # fmt: skip
+OUT = Path(__file__).parents[1] / "RESULTS_COMMANDED.md"
+Label = Mapping[str, Any]
+
+
+def seal(models: Path, folder: Path, count: int) -> None:
+    """Make the cases and apart their labels; print the checksum of these."""
+    made, joints = {}, {}
+    for case in plans(count):
+        made[case.name] = case, make(case, models, folder)
+        joints[case.name] = read_arm(models, case.arm).joints
+        print(f"made {case.name}", flush=True)
+    apart = Path(f"{folder}_labels")
+    apart.mkdir()
+    (apart / "labels.json").write_text(labels(made, joints), encoding="utf-8")
+    print(f"sha256 of the labels: {_sum(apart / 'labels.json')}; commit it, then call this again")
+
+
+def judge(folder: Path) -> dict[str, Any]:
+    """Diagnose a case; return its document, and what its written model leaves of the runs that were held out, rad."""
+    begin = time.process_time()
+    data_set = read_data_set(folder / "data", commanded=True)
+    model = read_model(folder / "model.xml", data_set.robot)
+    found = diagnose(data_set, model, lambda line: None)
+    new = folder / "written.xml"
+    new.write_bytes(found.written())
+    left = {}
+    for name, file in (("before", folder / "model.xml"), ("after", new)):
+        own = servos(read_model(file, data_set.robot))
+        runs = read_data_set(folder / "held_out", commanded=True).runs
+        squares = [((run.signals.q - play(own, [own.numbers], [whole(run)])[0][0]) ** 2).mean() for run in runs]
+        left[name] = float(np.sqrt(np.mean(squares)))
+    return {"document": found.document.to_json(), "left": left, "seconds": time.process_time() - begin}
+
+
+def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of a case is right: first cause, its joint, numbers within their intervals, all that differs."""
+    causes = [one for one in found["document"]["causes"] if not one.get("folded_away")]
+    wanted = {EFFECTS[one["kind"]]: one for one in label["differences"]}
+    first = causes[0] if causes else None
+    right = (first["effect"] in wanted) if first and wanted else not first and not wanted
+    joint = bool(first and right and first["joints"] == [wanted[first["effect"]]["joint"]])
+    within = [
+        number["interval95"][0] <= wanted[cause["effect"]]["robot"] - number["simulator"] <= number["interval95"][1]
+        for cause in causes
+        for number in cause["parameters"]
+        if cause["effect"] in wanted and number["joint"] == wanted[cause["effect"]]["joint"] and number["interval95"]
+    ]
+    return {
+        "first": right,
+        "joint": joint or (right and not wanted),
+        "within": within,
+        "all": set(wanted) <= {one["effect"] for one in causes},
+        "else": sorted({one["effect"] for one in causes} - set(wanted)),
+    }
+
+
+def page(told: Mapping[str, Label], found: Mapping[str, Mapping[str, Any]], checksum: str) -> str:
+    """Return the results as Markdown."""
+    judged = {name: score(told[name], one) for name, one in found.items()}
+    single = [name for name in judged if len(told[name]["differences"]) == 1]
+    pairs = [name for name in judged if len(told[name]["differences"]) == 2]
+    nulls = [name for name in judged if not told[name]["differences"]]
+    within = [one for judgement in judged.values() for one in judgement["within"]]
+    near = [name for name in judged if found[name]["left"]["after"] <= 1.2 * NOISE]
+    lines = [
+        "# What a model that is told commands has wrong",
+        "",
+        f"`python -m commanded.run MODELS FOLDER`; sha256 of the labels {checksum}. {len(judged)} of {len(told)} cases",
+        "were diagnosed. Left: RMS on held-out motions by the model as given, and with the numbers found; the true arm",
+        f"leaves its noise, {1e3 * NOISE:g} mrad.",
+        "",
+        f"- one difference: first cause right {_of(single, judged, 'first')}, its joint {_of(single, judged, 'joint')}",
+        f"- two: both named {_of(pairs, judged, 'all')}; none: nothing named {_of(nulls, judged, 'first')}",
+        f"- numbers within their interval: {sum(within)} of {len(within)}",
+        f"- held-out motions within 1.2 of what the true arm leaves: {len(near)} of {len(judged)}",
+        "",
+        "| case | arm | differs | verdict | first | right | joint | else | left, mrad | then | s |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, one in judged.items():
+        differs = ", ".join(f"{each['kind']} {each['joint'] or ''}".strip() for each in told[name]["differences"])
+        causes, left = found[name]["document"]["causes"], found[name]["left"]
+        first = f"{causes[0]['effect']} {', '.join(causes[0]['joints'])}" if causes else "-"
+        lines.append(
+            f"| {name} | {told[name]['arm']} | {differs or 'nothing'} | {found[name]['document']['verdict']} | {first} "
+            f"| {_yes(one['first'])} | {_yes(one['joint'])} | {', '.join(one['else']) or '-'} "
+            f"| {1e3 * left['before']:.2f} | {1e3 * left['after']:.2f} | {found[name]['seconds']:.0f} |"
+        )
+    return "\n".join([*lines, ""])
+
+
+def _of(names: list[str], judged: Mapping[str, Mapping[str, Any]], what: str) -> str:
+    return f"{sum(judged[name][what] for name in names)} of {len(names)}"
+
+
+def _yes(right: bool) -> str:
+    return "yes" if right else "no"
+
+
+def _sum(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def main() -> None:
+    """Make the cases, or diagnose and score them."""
+    parser = argparse.ArgumentParser(prog="python -m commanded.run", description=__doc__)
+    parser.add_argument("models", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--count", type=int, default=24)
+    arguments = parser.parse_args()
+    file = Path(f"{arguments.folder}_labels") / "labels.json"
+    if not file.exists():
+        seal(arguments.models, arguments.folder, arguments.count)
+        return
+    told, found = json.loads(file.read_text(encoding="utf-8")), {}
+    for name in told:
+        out = arguments.folder / name / "found.json"
+        if not out.exists():
+            try:
+                out.write_text(json.dumps(judge(arguments.folder / name)), encoding="utf-8")
+            except InputError as error:
+                print(f"{name}: {error}", flush=True)
+                continue
+        found[name] = json.loads(out.read_text(encoding="utf-8"))
+        print(name, score(told[name], found[name]), found[name]["left"], flush=True)
+        OUT.write_text(page(told, found, _sum(file)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
