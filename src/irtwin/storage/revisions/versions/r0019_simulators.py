@@ -5,7 +5,7 @@ from alembic import op
 
 revision = "0019"
 down_revision = "0018"
-TABLES = "ed2e3f21fd4e5a3a"
+TABLES = "2dbc6504738b6e8b"
 
 
 def upgrade() -> None:
