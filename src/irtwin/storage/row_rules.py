@@ -58,7 +58,7 @@ def check_rows(connection: Connection, where: str) -> None:
         try:
             for row in connection.execute(select(table).execution_options(yield_per=1000)).mappings():
                 check_row(table, dict(row))
-        except ValueError as error:
+        except (ValueError, TypeError) as error:  # a type: a number where a moment is read from text
             raise _changed(where, table.name, str(error)) from None
     if connection.dialect.name == "sqlite":  # which another program may open without asking for foreign keys
         for name, _, parent, _ in connection.exec_driver_sql("PRAGMA foreign_key_check"):
