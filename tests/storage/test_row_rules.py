@@ -17,7 +17,7 @@ from irtwin.storage import engine
 from irtwin.storage.database import Workspace
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
-from irtwin.storage.schema import Activity, Base, Individuals, Joint, Robot, Run, Series
+from irtwin.storage.schema import Base, Individuals, Joint, Robot, Run, Series
 
 SERIES = {
     "series_id": "a" * 64,
@@ -92,14 +92,15 @@ def of(table: type[Base]) -> Table:
         (Robot, "weight_kg", "x"),
         (Robot, "weight_kg", b"\xff"),
         (Robot, "weight_kg", "9e999"),
-        (Activity, "started", 1e-310),
+        (Run, "started", 1e-310),
     ],
 )
 def test_a_workspace_whose_rows_another_program_changed_is_not_opened(
     tmp_path: Path, table: type[Base], column: str, value: object
 ) -> None:
     with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
-        session.execute(insert(of(table)), [row_of(table)])
+        for one in dict.fromkeys([Robot, table]):
+            session.execute(insert(of(one)), [row_of(one)])
     with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
         database.execute(f"UPDATE {of(table).name} SET {column} = ?", (value,))
         database.commit()
