@@ -57,7 +57,7 @@ def test_each_form_of_answer(server, query: str, accept: str, media_type: str, b
     response = post(server, query, QUERY, Accept=accept)
     assert response.status_code == 200
     assert response.headers["content-type"] == media_type
-    assert response.headers["vary"] == "Accept"
+    assert response.headers["vary"].partition(",")[0] == "Accept"  # and the packing, where it is packed
     assert response.content.startswith(begins)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import SplitResult, quote, unquote, urlencode, urlsplit
 
 from pyoxigraph import (
+    BlankNode,
     DefaultGraph,
     NamedNode,
     Quad,
@@ -118,8 +119,13 @@ class SparqlServer:
         return (Quad(row["s"], row["p"], row["o"], graph) for row in rows)
 
     def holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
-        """Yield the quads of named graphs that say one of the triples, which have no blank nodes."""
-        wanted = list(triples)
+        """Yield the quads of named graphs that say one of the triples; a blank node is any, as a server has its own."""
+        wanted, blank = [], []
+        for one in triples:
+            (blank if any(isinstance(term, BlankNode) for term in one) else wanted).append(one)
+        for one in blank:
+            for row in cast(QuerySolutions, self.query(f"SELECT DISTINCT ?g {{ GRAPH ?g {{ {one} }} }}")):
+                yield Quad(*one, row["g"])
         for start in range(0, len(wanted), _AT_ONCE):
             values = " ".join(f"({t.subject} {t.predicate} {t.object})" for t in wanted[start : start + _AT_ONCE])
             query = f"SELECT ?s ?p ?o ?g {{ VALUES (?s ?p ?o) {{ {values} }} GRAPH ?g {{ ?s ?p ?o }} }}"
