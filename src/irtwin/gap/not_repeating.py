@@ -224,7 +224,8 @@ def _around(others: Sequence[_One], own: Sequence[_One], shares: Sequence[float]
 
 
 def _quantity(one: Quantity) -> document.Quantity:
-    return document.Quantity(**vars(parameter(one)))
+    own = parameter(one)
+    return document.Quantity(own.name, own.joint, own.value, own.unit, own.interval95)
 
 
 def _log_odds(p: float) -> float:
