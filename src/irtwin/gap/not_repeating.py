@@ -225,7 +225,7 @@ def _around(others: Sequence[_One], own: Sequence[_One], shares: Sequence[float]
 
 def _quantity(one: Quantity) -> document.Quantity:
     own = parameter(one)
-    return document.Quantity(own.name, own.joint, own.value, own.unit, own.interval95)
+    return document.Quantity(name=own.name, joint=own.joint, value=own.value, unit=own.unit, interval95=own.interval95)
 
 
 def _log_odds(p: float) -> float:

@@ -120,12 +120,12 @@ class SparqlServer:
 
     def holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
         """Yield the quads of named graphs that say one of the triples; a blank node is any, as a server has its own."""
-        wanted, blank = [], []
-        for one in triples:
-            (blank if any(isinstance(term, BlankNode) for term in one) else wanted).append(one)
+        every = list(triples)
+        blank = [one for one in every if any(isinstance(term, BlankNode) for term in one)]
+        wanted = [one for one in every if one not in blank]
         for one in blank:
             for row in cast(QuerySolutions, self.query(f"SELECT DISTINCT ?g {{ GRAPH ?g {{ {one} }} }}")):
-                yield Quad(*one, row["g"])
+                yield Quad(one.subject, one.predicate, one.object, row["g"])
         for start in range(0, len(wanted), _AT_ONCE):
             values = " ".join(f"({t.subject} {t.predicate} {t.object})" for t in wanted[start : start + _AT_ONCE])
             query = f"SELECT ?s ?p ?o ?g {{ VALUES (?s ?p ?o) {{ {values} }} GRAPH ?g {{ ?s ?p ?o }} }}"
