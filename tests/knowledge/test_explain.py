@@ -43,7 +43,7 @@ def all_within(explanation: Explanation) -> Iterator[Explanation]:
 def test_rules_conclusion_is_followed_down_to_files(reasoned: KnowledgeGraph) -> None:
     found = only(reasoned, "id:twin/Arm_A.t1 irt:fails_on ?")
     assert found.by == 'the rule "twin to identify again", in SHACL'
-    assert found.meaning is not None and "misses the energy" in found.meaning
+    assert found.meaning is not None and "energy it misses by more than the limit" in found.meaning
     assert {each.what for each in found.because} == {
         "id:run/Arm_A.check_1 irt:exceeds limit:energy_error",
         "id:run/Arm_A.check_1 irt:modelled_by id:twin/Arm_A.t1",

@@ -11,6 +11,7 @@ import pytest
 from sqlalchemy import select
 
 from irtwin.errors import InputError
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.providers.records import load_robot
 from irtwin.report.plant import curves, page, robot
@@ -45,6 +46,7 @@ def test_a_meters_log(tmp_path: Path) -> None:
         assert "  no twin, for a meter alone was logged: which joint, effect or motion takes it stays unknown" in said
         graph.load_ontology()
         map_rows(place, graph)
+        reason(graph)
         with place.reading() as session:
             energy = session.scalars(select(RunEnergy)).one()
             load = session.scalars(select(MeteredLoad)).one()
