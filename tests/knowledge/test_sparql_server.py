@@ -77,7 +77,7 @@ def test_construct_ask_bindings_and_faults(served: KnowledgeGraph) -> None:
     assert len(served.construct("CONSTRUCT { ?s irt:Run_Name ?n } WHERE { ?s irt:Run_Name ?n }")) == 5
     assert served.query("ASK { ?s a irt:Industrial_Robot }").rows == ({"answer": True},)
     robot = "https://w3id.org/irtwin/id/robot/Arm_A"
-    assert len(served.query("SELECT ?run { ?robot irt:has_RunProcess ?run }", {"robot": robot})) == 3
+    assert len(served.query("SELECT ?run { ?run irt:run_of ?robot }", {"robot": robot})) == 3
     with pytest.raises(InputError, match="not a SPARQL query"):
         served.query("SELECT * { ?s ?p }")
     with pytest.raises(InputError, match="not allowed"):
