@@ -262,7 +262,7 @@ def test_any_database_and_any_sparql_server_serve(small_data_set, tmp_path, new_
         assert irtwin(*worst).out == asked
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
     owl = tmp_path / "robots.owl"
     assert irtwin("export", "--owl", owl, "--workspace", workspace).status == 0

@@ -52,6 +52,7 @@ def test_hermit_concludes_what_the_native_engine_does(graph: KnowledgeGraph) -> 
     assert engines.worth_keeping(HERMIT, premises) >= engines.worth_keeping(NATIVE, premises)
 
 
+@pytest.mark.nightly
 @pytest.mark.system
 def test_hermit_alone_finds_every_type_that_the_native_engine_finds(graph: KnowledgeGraph) -> None:
     premises = asserted(graph)
@@ -74,6 +75,7 @@ def test_hermit_alone_finds_every_type_that_the_native_engine_finds(graph: Knowl
     assert {one for one in individuals if one.object not in types[one.subject]} == set()
 
 
+@pytest.mark.nightly
 @pytest.mark.system
 def test_hermit_finds_more_and_the_graph_says_who_did() -> None:
     graph = KnowledgeGraph()

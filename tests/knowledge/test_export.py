@@ -27,6 +27,7 @@ def exported(graph: KnowledgeGraph, tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.nightly
 def test_owlready2_opens_it_and_hermit_finds_it_consistent(exported: Path) -> None:
     world = owlready2.World()
     ontology = world.get_ontology(exported.as_uri()).load()

@@ -151,6 +151,7 @@ def test_set_wise_rules_give_what_pyshacl_gives(graph: KnowledgeGraph) -> None:
     assert of_rules == of_pyshacl == CONCLUSIONS | DOMINANT | ALARMS
 
 
+@pytest.mark.nightly
 def test_hermit_finds_two_robots_consistent(graph: KnowledgeGraph) -> None:
     owl_dl.classify(asserted(graph))
 

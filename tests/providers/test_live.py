@@ -36,7 +36,8 @@ NOON = 1772366400.0  # 2026-03-01T12:00:00Z
 UNSAID = (math.nan, math.nan)
 NOW = """SELECT ?state ?time ?count ?superseded ?q WHERE {
   ?run a irt:Live_Run ; irt:Current_State ?state ; irt:State_Time ?time ; irt:Sample_Count ?count ;
-    irt:Superseded_States ?superseded ; irt:has_Joint_State ?joint .
+    irt:Superseded_States ?superseded .
+  ?joint irt:state_of ?run .
   ?joint irt:of_Joint <https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/joint_a1> ; irt:Joint_Position ?q }"""
 
 TOOK_PLACE = """SELECT ?start ?end WHERE {

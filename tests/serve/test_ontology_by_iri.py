@@ -36,7 +36,7 @@ def test_each_module_is_at_its_iri_and_at_its_version_iri(server, file) -> None:
 def test_in_each_form_it_says_the_same(server, media_type: str) -> None:
     response = CLIENT.get(f"{server.url}/irtwin/robot", headers={"Accept": f"{media_type}, */*;q=0.1"})
     assert response.headers["content-type"].startswith(media_type)
-    assert response.headers["vary"] == "Accept"
+    assert response.headers["vary"].partition(",")[0] == "Accept"  # and the packing, where it is packed
     received = rdflib.Graph().parse(data=response.content, format=FORMATS[media_type])
     assert isomorphic(received, rdflib.Graph().parse(folder("ontology") / "robot.ttl"))
 
