@@ -3,6 +3,7 @@ import pyarrow as pa
 import pytest
 from tests.virtual.scene_data import embedded
 
+from irtwin.errors import InputError
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.explorer import Columns
 from irtwin.robot.urdf import parse_urdf
@@ -26,6 +27,6 @@ def test_the_scene_performs_the_modelled_series_from_their_start():
     assert second["torque"][-1, 0] == pytest.approx(3.0) and np.isnan(second["torque"][:, 1]).all()
 
 
-def test_a_series_without_a_joint_is_a_bug():
-    with pytest.raises(KeyError, match="q_b"):
+def test_a_series_without_a_joint_is_told():
+    with pytest.raises(InputError, match="the series of a run has no column 'q_b'"):
         draw_scene(parse_urdf(ARM, source="arm"), {}, [("run", Columns.of(pa.table(SERIES)))], 0)

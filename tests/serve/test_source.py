@@ -95,7 +95,8 @@ def test_one_that_is_gone_is_told_without_its_address(tmp_path: Path, capfd: pyt
         keeper.stop()
         told = []
         asked = {"text": "ASK {}", "default_graphs": [], "named_graphs": [], "base": "http://e/", "accept": ""}
-        update = Updates(source, TOKEN, Limits()).do(Operation("update", "CLEAR ALL"), "http://e/", f"Bearer {TOKEN}")
+        clear = Operation("update", "CLEAR ALL")
+        update = Updates(source, TOKEN, Limits()).do(clear, "http://e/", f"Bearer {TOKEN}", "me")
         for asking in (worker.ask({**asked, "at_once": False}), update):
             with pytest.raises(Refusal) as refusal:
                 await asking

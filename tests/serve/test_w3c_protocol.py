@@ -34,7 +34,8 @@ def served(new_graph: Callable[[], Path], start) -> Iterator[Server]:
 
 @pytest.fixture
 def w3c(served: Server) -> Server:
-    assert served.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}").status_code == 204
+    done = served.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
+    assert done.status_code == 204, done.text
     return served
 
 

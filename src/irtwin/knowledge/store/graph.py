@@ -380,7 +380,14 @@ class KnowledgeGraph:
         self, text: str, default_graphs: Sequence[str] = (), named_graphs: Sequence[str] = (), base: str | None = None
     ) -> None:
         """Do a SPARQL update in one transaction; raises InputError as `difference`."""
-        self.change(*self.difference(text, default_graphs, named_graphs, base))
+        removed, added = self.difference(text, default_graphs, named_graphs, base)
+        if has_blank_node(removed):  # which have no name to find them by
+            names = {quad.graph_name.value for quad in removed | added}  # type: ignore[union-attr]
+            concerned = names | set(self.graphs(*names))
+            held = {quad for quad in self.quads() if quad.graph_name.value in concerned}  # type: ignore[union-attr]
+            self.replace(held - removed | added, *concerned)
+        else:
+            self.change(removed, added)
         self.flush()
 
     @telling
