@@ -15,7 +15,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID, IRT, XSD
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE, IRT, XSD
 from irtwin.storage import gap_schema as gap
 from irtwin.storage import live_schema as live
 from irtwin.storage import schema
@@ -109,7 +109,7 @@ def fill(workspace: Workspace) -> None:
             *_prices(),
             *_diagnoses(),
             *_live_runs(),
-            *_facts(),
+            *_facts(workspace.base),
         ]:
             session.add(row)
             session.flush()
@@ -123,9 +123,9 @@ NOTES = (
 )
 
 
-def _facts() -> Iterator[Base]:
+def _facts(base: str) -> Iterator[Base]:
     yield AssertedFact(
-        fact_id="1", about_robot="Arm_B", subject=f"{ID}run/Arm_B.work_2", predicate=f"{IRT}Payload", value="1.0",
+        fact_id="1", about_robot="Arm_B", subject=f"{base}run/Arm_B.work_2", predicate=f"{IRT}Payload", value="1.0",
         kind=f"{XSD}double", graph=f"{GRAPH_SOURCE}run_process", author="anna", time=_moment("2026-03-05 08:00"),
         replaced="0.0", place="run.payload_kg", row_key='{"run_id": "Arm_B.work_2"}',
     )  # fmt: skip

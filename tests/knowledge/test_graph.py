@@ -228,11 +228,11 @@ def test_broken_turtle_names_file_and_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "SELECT ?run WHERE { ?robot irt:has_RunProcess ?run }",
-        "SELECT ?run { ?robot irt:has_RunProcess ?run }",
-        "SELECT ?robot ?run WHERE { OPTIONAL { ?robot irt:has_RunProcess ?run } }",
+        "SELECT ?run WHERE { ?run irt:run_of ?robot }",
+        "SELECT ?run { ?run irt:run_of ?robot }",
+        "SELECT ?robot ?run WHERE { OPTIONAL { ?run irt:run_of ?robot } }",
         "SELECT ?run # WHERE {\n WHERE { { SELECT ?run ?arm WHERE { ?run irt:run_of ?arm } } FILTER(?arm = ?robot) }",
-        "CONSTRUCT { ?run a ?robot } WHERE { ?robot irt:has_RunProcess ?run }",
+        "CONSTRUCT { ?run a ?robot } WHERE { ?run irt:run_of ?robot }",
     ],
 )
 def test_binding_restricts_a_variable_that_need_not_be_asked_for(graph: KnowledgeGraph, text: str) -> None:

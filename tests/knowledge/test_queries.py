@@ -12,7 +12,7 @@ from irtwin.knowledge.store.table import Table
 
 
 def test_sparql_is_asked_as_it_is(graph: KnowledgeGraph) -> None:
-    assert ask(graph, "ASK { ?robot irt:has_Twin ?twin }")[0] == {"answer": True}
+    assert ask(graph, "ASK { ?twin irt:twin_of ?robot }")[0] == {"answer": True}
 
 
 def test_unknown_name_is_met_with_the_nearest(graph: KnowledgeGraph) -> None:

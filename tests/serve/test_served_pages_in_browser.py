@@ -137,7 +137,7 @@ def test_curves_zoom_and_mark_a_moment(page: tuple[Any, list[str]], plant: Serve
     page.evaluate("Plotly.relayout('curves', { 'xaxis.range': [7, 8] })")
     until(page, "document.getElementById('curves').data[0].x.length === 1001")
     page.fill("#moment", "2.5")
-    assert page.url.endswith("/run/Arm_A.fit_1#t=2.5")
+    until(page, "location.hash === '#t=2.5'")
     assert page.evaluate("document.getElementById('curves').layout.shapes.at(-1).x0") == 2.5
     page.goto(f"{plant.url}/compare?robot=Arm_A&by=run&a_run=Arm_A.fit_1&b_run=Arm_A.check_1")
     page.wait_for_selector("#curves .scatterlayer .trace", state="attached")
