@@ -16,7 +16,7 @@ def reach(body: str, head: str = "SELECT $this") -> Reach:
 
 def test_shipped_rules_look_backward_and_anywhere_by_few_predicates() -> None:
     found = locality.of_all_rules(shipped())
-    assert found.backward == {term(name) for name in ("joint_of", "of_Run", "total_of")}
+    assert found.backward == {term(name) for name in ("of_Run", "total_of")}
     assert found.anywhere == frozenset()
     assert found.unknown == frozenset()
 

@@ -66,13 +66,24 @@ def by_doing(
 
     Raises SyntaxError or RuntimeError where it fails.
     """
-    before, store = set(quads), Store()
-    store.bulk_extend(with_union(before))
-    store.update(text, base_iri=base, prefixes=prefixes)
-    union = {quad.triple for quad in store.quads_for_pattern(None, None, None, DefaultGraph())}
+    before = set(quads)
+
+    def done(without: Iterable[Quad] = ()) -> set[Quad]:
+        """Return the quads after the update, begun without some of the named graphs'."""
+        store = Store()
+        store.bulk_extend(with_union(before))
+        for quad in without:
+            store.remove(quad)
+        store.update(text, base_iri=base, prefixes=prefixes)
+        return set(store)
+
+    found = done()
+    union = {quad.triple for quad in found if quad.graph_name == DefaultGraph()}
     old = {quad.triple for quad in before}
-    lost = old - union
-    named = {quad for quad in store if quad.graph_name != DefaultGraph() and quad.triple not in lost}
+    # What the default graph lost goes from every named graph, but for those that the update itself puts it into.
+    lost = {quad for quad in before & found if quad.triple not in union}
+    named = {quad for quad in found if quad.graph_name != DefaultGraph()} - lost
+    named |= lost & done(lost) if lost else set()
     new = union - old - {quad.triple for quad in named}
     after = named | set(_in_graph(new))
     return before - after, after - before
