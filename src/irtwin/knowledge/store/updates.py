@@ -19,6 +19,7 @@ from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.union import with_union
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, PREFIXES
 
+_NO_GRAPH = re.compile(r"The graph <([^>]*)> does not exist")
 _DATA = re.compile(rf"(INSERT|DELETE){SPACE}DATA", re.IGNORECASE | re.ASCII)
 
 
@@ -68,13 +69,21 @@ def by_doing(
     """
     before = set(quads)
 
-    def done(without: Iterable[Quad] = ()) -> set[Quad]:
-        """Return the quads after the update, begun without some of the named graphs'."""
+    def done(without: Iterable[Quad] = (), empty: tuple[str, ...] = ()) -> set[Quad]:
+        """Return the quads after the update, begun without some of the named graphs', and with empty graphs."""
         store = Store()
         store.bulk_extend(with_union(before))
         for quad in without:
             store.remove(quad)
-        store.update(text, base_iri=base, prefixes=prefixes)
+        for name in empty:
+            store.add_graph(NamedNode(name))
+        try:
+            store.update(text, base_iri=base, prefixes=prefixes)
+        except RuntimeError as error:  # empty graphs are not kept, so each may be cleared
+            missing = _NO_GRAPH.search(str(error))
+            if missing is None or missing[1] in empty:
+                raise
+            return done(without, (*empty, missing[1]))
         return set(store)
 
     found = done()
