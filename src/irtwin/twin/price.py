@@ -25,7 +25,7 @@ class Figure:
     half_width: float | None
 
     def __str__(self) -> str:
-        by = "" if self.half_width is None else f" +- {self.half_width:.2g}"
+        by = "" if self.half_width is None else f" +- {float(f'{self.half_width:.2g}'):g}"
         return f"{self.value:.4g}{by}"
 
 
