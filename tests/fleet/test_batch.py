@@ -123,13 +123,25 @@ def test_folders_of_one_name_have_files_of_their_own() -> None:
     assert key("/plant/a/robot 1").startswith("robot_1-")
 
 
-@pytest.mark.parametrize("name", ["records", "diagnoses"])
-def test_a_link_out_of_the_batch_is_told_and_not_followed(name: str, tmp_path: Path, asked: list[str]) -> None:
-    batch = _batch(tmp_path, "good")
-    outside = tmp_path / "outside"
+def _leading_out(folder: Path, name: str) -> tuple[Batch, Path]:
+    """A batch whose folder of a name is a link, and where that leads."""
+    batch, outside = _batch(folder, "good"), folder / "outside"
     outside.mkdir()
     (batch.folder / name).symlink_to(outside)
-    with pytest.raises(InputError, match=f"the path '{name}/good-.*' leads outside"):
+    return batch, outside
+
+
+def test_records_that_a_link_leads_out_of_the_batch_end_it(tmp_path: Path, asked: list[str]) -> None:
+    batch, outside = _leading_out(tmp_path, "records")
+    with pytest.raises(InputError, match=r"the path 'records/good-.*' leads outside"):
         batch.work()
-        raise InputError(batch.records().__next__().said)
+    assert list(outside.iterdir()) == []
+
+
+def test_results_that_a_link_leads_out_of_the_batch_are_refused(tmp_path: Path, asked: list[str]) -> None:
+    batch, outside = _leading_out(tmp_path, "diagnoses")
+    batch.work()
+    (record,) = batch.records()
+    assert record is not None and record.state == "refused"
+    assert "the path 'diagnoses/good-" in record.said and "leads outside" in record.said
     assert list(outside.iterdir()) == []
