@@ -51,6 +51,7 @@ def values(graph: KnowledgeGraph) -> dict[str, list[int]]:
             {"": [1, 4], A: [1], B: [1], GRAPH_ASSERTED: [4]},
         ),
         ("DROP GRAPH <b>", {"": [1], A: [1]}),
+        ("DROP GRAPH <nowhere>", {"": [1, 2], A: [1], B: [1, 2]}),
         ("DROP ALL", {"": []}),
         ("INSERT DATA { <x> <p> 3 } ; DELETE DATA { <x> <p> 3 } ; # and back\n", {"": [1, 2], A: [1], B: [1, 2]}),
         (
@@ -102,8 +103,8 @@ def test_data_with_blank_nodes_goes_the_long_way(graph: KnowledgeGraph) -> None:
         ("LOAD <http://127.0.0.1:1/x>", "LOAD and SERVICE read from elsewhere"),
         ("load silent <file:///etc/passwd>", "LOAD and SERVICE read from elsewhere"),
         ("INSERT { ?s ?p ?o } WHERE { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", "LOAD and SERVICE read"),
-        ("DROP GRAPH <http://e/nowhere>", "nothing changed: The graph <http://e/nowhere> does not exist"),
-        ("INSERT DATA { <http://e/x> <http://e/p> 9 } ; DROP GRAPH <http://e/nowhere>", "nothing changed"),
+        ("CREATE GRAPH <http://e/a>", "nothing changed: The graph <http://e/a> already exists"),
+        ("INSERT DATA { <http://e/x> <http://e/p> 9 } ; CREATE GRAPH <http://e/a>", "nothing changed"),
     ],
 )
 def test_a_refused_update_changes_nothing(graph: KnowledgeGraph, text: str, message: str) -> None:

@@ -71,7 +71,11 @@ def test_who_has_not_is_refused(writable, authorization: str | None, status: int
         ("LOAD <file:///etc/passwd>", 400, "LOAD and SERVICE read from elsewhere"),
         ("LOAD <http://127.0.0.1:1/> INTO GRAPH <http://e/g>", 400, "LOAD and SERVICE read from elsewhere"),
         ("INSERT { ?s ?p ?o } WHERE { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }", 400, "LOAD and SERVICE"),
-        ("DROP GRAPH <http://e/nowhere>", 400, "nothing changed"),
+        (
+            "INSERT DATA { GRAPH <http://e/g> { <http://e/s> a <http://e/C> } } ; CREATE GRAPH <http://e/g>",
+            400,
+            "nothing",
+        ),
     ],
 )
 def test_an_update_that_fails_changes_nothing(writable, text: str, status: int, message: str) -> None:

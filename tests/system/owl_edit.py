@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 import jpype
-from tests.system.owl_api import start_java
+from owl_api import start_java
 
 
 def edit(file: str, subject: str, predicate: str, value: float) -> None:
