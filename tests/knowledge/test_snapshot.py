@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from pyoxigraph import Literal, NamedNode, Triple
 from tests.endpoint import make_graph
 
 from irtwin.errors import InputError
+from irtwin.knowledge.store import snapshot
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
 
@@ -72,6 +74,21 @@ def test_where_there_is_no_graph(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no graph here; run `irtwin run DATASET` into this workspace first"):
         Snapshot(tmp_path / "graph")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_graph_whose_files_never_hold_still_is_busy_and_not_damaged(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes = itertools.count()
+    monkeypatch.setattr(snapshot, "_belonging", lambda folder: ((str(next(changes)), 0, 0),))
+    monkeypatch.setattr(snapshot, "_PATIENCE", 0.0)
+    monkeypatch.setattr(snapshot, "_MOST_PATIENCE", 0.2)
+    for gone in (False, True):
+        if gone:
+            (folder / "CURRENT").write_text("MANIFEST-of-another-moment\n")
+            monkeypatch.setattr(snapshot, "check_files", lambda folder: None)
+        with pytest.raises(InputError, match="another process keeps changing the graph's files; try again"):
+            Snapshot(folder)
 
 
 def seen(snapshot: Snapshot) -> list[int]:

@@ -23,7 +23,8 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.linked import found, linked, published, remove_left_behind
 
 OLDEST = 0.5  # s; a view is not older than this when it answers
-_PATIENCE = 5.0  # s that a writer may go on changing the files while they are opened
+_PATIENCE = 5.0  # s after which files that nobody changed, and that cannot be read, are damaged
+_MOST_PATIENCE = 20.0  # s that a writer may go on changing the files while they are opened
 _NO_DATA = ("LOG", "LOCK")
 _WRITTEN_ON = ("MANIFEST-*", "*.log")  # the others are complete when they get their names
 
@@ -111,9 +112,9 @@ def _whole(source: Callable[[], Path], do: Callable[[Path, ExitStack], T]) -> tu
 
     Return what is to be closed in the end, and what was made.
     """
-    give_up = time.monotonic() + _PATIENCE
-    reason = "another process keeps changing its files"
-    while time.monotonic() < give_up:
+    begun = since = time.monotonic()
+    failed = None
+    while time.monotonic() - begun < _MOST_PATIENCE:
         folder = source()
         belonging = _belonging(folder)
         if not belonging and folder == source():
@@ -121,13 +122,16 @@ def _whole(source: Callable[[], Path], do: Callable[[Path, ExitStack], T]) -> tu
         with ExitStack() as view:
             try:
                 made = do(folder, view)
-            except (OSError, RuntimeError) as error:  # a file went meanwhile
-                reason = str(error)
+            except (OSError, RuntimeError) as error:
+                if failed != (folder, belonging):  # a file may have gone meanwhile
+                    failed, since = (folder, belonging), time.monotonic()
+                elif time.monotonic() - since > _PATIENCE:
+                    raise InputError(damaged(folder, str(error))) from error
             else:
                 if _belonging(folder) == belonging and folder == source():
                     return view.pop_all(), made
         time.sleep(0.01)
-    raise InputError(damaged(source(), reason))
+    raise InputError(f"{folder}: another process keeps changing the graph's files; try again")
 
 
 def _belonging(folder: Path) -> Stamp:
