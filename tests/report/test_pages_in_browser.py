@@ -10,14 +10,14 @@ from pyoxigraph import Literal, NamedNode, Quad
 from tests import gap_cases
 from tests.gap_pages import page_of as gap_page
 from tests.report.robots import PageOf, six_axis
-from tests.screens import faults, is_dark, narrow_and_dark
+from tests.screens import OF_THE_SCREEN, faults, is_dark, narrow_and_dark
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
 from irtwin.report.ontology.page import write_page
 
 pytestmark = pytest.mark.system
-SCREENS = [(1440, "light"), (400, "dark")]
+SCREENS = [(1440, "light", ()), (400, "dark", OF_THE_SCREEN)]  # with the rules by which each is read, all on the first
 LARGEST = 3_000_000  # bytes of a report
 
 
@@ -41,12 +41,12 @@ def energy(graph: KnowledgeGraph, page_of: PageOf, tmp_path: Path) -> Path:
 
 def test_the_energy_page(browser: Any, energy: Path) -> None:
     assert energy.stat().st_size < LARGEST
-    for width, scheme in SCREENS:
+    for width, scheme, rules in SCREENS:
         page = opened(browser, energy, width, scheme)
         page.wait_for_selector("#figure-torque .scatterlayer .trace")
         assert is_dark(page) == (scheme == "dark")
         assert page.evaluate("document.documentElement.scrollWidth") == width
-        assert faults(page) == [], (width, scheme)
+        assert faults(page, rules=rules) == [], (width, scheme)
         cut = "all => all.filter(it => it.offsetWidth > it.closest('.table').clientWidth).map(it => it.innerText)"
         assert page.eval_on_selector_all(".table caption", cut) == []
         buttons = page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
@@ -71,12 +71,12 @@ def test_the_gap_page(browser: Any, tmp_path: Path) -> None:
     gap_page(tmp_path, gap_cases.diagnosis("ambiguous"))
     file = tmp_path / "p.html"
     assert file.stat().st_size < LARGEST
-    for width, scheme in SCREENS:
+    for width, scheme, rules in SCREENS:
         page = opened(browser, file, width, scheme)
         page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
         assert is_dark(page) == (scheme == "dark")
         assert page.evaluate("document.documentElement.scrollWidth") == width
-        assert faults(page) == [], (width, scheme)
+        assert faults(page, rules=rules) == [], (width, scheme)
         page.context.close()
 
 
