@@ -132,6 +132,7 @@ def test_an_experiment_is_read_of_a_diagnosis_by_an_earlier_criterion(
         assert following is not None and any("hang a known mass" in line for line in following.words)
 
 
+@pytest.mark.nightly
 def test_rounds_go_on_until_the_limit_holds(improved: tuple[Path, Said]) -> None:
     workspace, said = improved
     assert said.status == 0, said.err

@@ -217,6 +217,7 @@ def watched(also_priced: tuple[Path, Said]) -> Path:
     return also_priced[0]
 
 
+@pytest.mark.nightly
 def test_a_motion_from_a_file_is_kept_as_well(also_priced: tuple[Path, Said]) -> None:
     workspace, priced = also_priced
     assert priced.status == 0, priced.err

@@ -28,7 +28,8 @@ POISONS: dict[str, dict[str, Any]] = {  # what of `data_set` is other than of a 
     "standby alone": {"tail": '[twin]\neffects = ["standby_power"]'},
     "one joint at rest": {"joints": 1, "change": with_signals(q=0.0)},
 }
-AT_NIGHT = ("no power", "standby alone", "one joint at rest")  # a run without power is in test_improvement, too
+# A run without power is in test_improvement, too.
+AT_NIGHT = ("one joint", "neither", "no power", "standby alone", "one joint at rest")
 
 
 @pytest.fixture

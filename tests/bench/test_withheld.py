@@ -44,6 +44,7 @@ def test_blocks_follow_on_and_close_the_circle():
     assert len(set(place.tolist())) > 300
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_sham_keeps_what_noise_remembers_and_loses_what_is_missing():
     sticks = logged(lambda motion: 6 * np.sign(motion.dq) * np.exp(-np.abs(motion.dq) / 0.1))

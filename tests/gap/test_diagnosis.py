@@ -122,6 +122,7 @@ def test_a_change_is_named_beside_the_reference_runs():
     assert Curves.from_json(json.loads(json.dumps(diagnosis.evidence))) == diagnosis.curves
 
 
+@pytest.mark.nightly
 def test_oil_that_thins_otherwise_than_before_is_a_change_which_the_twin_takes():
     def warmth(run):
         return 25.0 + 2 * (int(run.split("_")[1]) % 10)  # degC

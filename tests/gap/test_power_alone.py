@@ -69,6 +69,7 @@ def test_power_alone_lacks_what_stands_by():
     assert diagnosis.causes[0][1].effect == "standby_power"
 
 
+@pytest.mark.nightly
 def test_torque_in_some_runs_and_power_in_others():
     split = [["torque"], ["torque"], ["power"], ["power"]]
     grease = [*runs(split, "reference", count=8), *runs(split, added=lambda m: 3 * m.dq[:, 0], first=20, count=8)]

@@ -60,6 +60,7 @@ def test_robots_and_runs_are_what_the_others_mean(model: set[Triple], two_robots
     assert Triple(joint, part, robot) in inferred
 
 
+@pytest.mark.nightly
 @pytest.mark.system
 def test_hermit_finds_no_contradiction_and_no_class_empty(model: set[Triple]) -> None:
     owl_dl.classify(model | read(*FILES))  # or else it says which statements clash

@@ -169,6 +169,7 @@ KNOWING = KnowledgeGraph()
 KNOWING.replace(in_graph([Triple(NamedNode("a:a"), NamedNode("a:a"), NamedNode("a:a"))], GRAPH_SOURCE), GRAPH_SOURCE)
 
 
+@pytest.mark.nightly
 def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> None:
     filled = Workspace(tmp_path / "before")
     tests = Path(rows.__file__).parents[1]

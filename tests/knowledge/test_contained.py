@@ -148,6 +148,7 @@ def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(
     assert "statements contradict each other" in status.out
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> None:
     before = concluded(workspace)

@@ -77,6 +77,7 @@ def concluded(mapped: Path, place: Path) -> tuple[Inferences, tuple[Violation, .
         return inferred, violations, {quad for name in names for quad in graph.quads_in(name)}
 
 
+@pytest.mark.nightly
 def test_what_several_processes_conclude_and_find_wrong_is_what_one_does(
     mapped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
@@ -94,6 +95,7 @@ def test_what_several_processes_conclude_and_find_wrong_is_what_one_does(
     assert any(one.robot == individual("robot", "Arm_B") for one in violations)
 
 
+@pytest.mark.nightly
 def test_rules_that_never_end_are_told_by_a_process_too(mapped: Path, tmp_path: Path, workers: list[int]) -> None:
     place = tmp_path / "place"
     shutil.copytree(mapped, place)

@@ -46,6 +46,7 @@ def test_owlrl_concludes_what_the_native_engine_does_and_the_graph_says_which(gr
     assert engine_of(graph) == NATIVE
 
 
+@pytest.mark.nightly
 @pytest.mark.system
 def test_hermit_concludes_what_the_native_engine_does(graph: KnowledgeGraph) -> None:
     premises = asserted(graph)

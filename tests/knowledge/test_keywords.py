@@ -111,7 +111,7 @@ def test_an_update_may_hold_the_words(text: str) -> None:
     assert len(graph.triples()) == 1
 
 
-@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=[pytest.mark.slow, pytest.mark.nightly])])
 def test_a_family_of_texts_leaves_no_connection(elsewhere: Listener, count: int) -> None:
     graph = KnowledgeGraph()
     refused = 0
@@ -126,7 +126,7 @@ def test_a_family_of_texts_leaves_no_connection(elsewhere: Listener, count: int)
     assert refused > 0.75 * count  # the others hold no such clause, or one in a comment
 
 
-@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=[pytest.mark.slow, pytest.mark.nightly])])
 def test_a_family_of_harmless_texts_is_let_through(count: int) -> None:
     understood = 0
     for seed in range(count // 2):

@@ -215,6 +215,7 @@ def test_two_values_where_there_can_be_one_are_refused(graph: KnowledgeGraph) ->
         closure(graph.triples() | wrong)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_agrees_with_owlrl_on_two_robots(graph: KnowledgeGraph) -> None:
     """Apart from what is true of everything, and what is said of anonymous classes or literals."""

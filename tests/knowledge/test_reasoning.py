@@ -183,6 +183,7 @@ def test_hermit_finds_a_contradiction(
         owl_dl.classify(graph.triples() | {wrong})
 
 
+@pytest.mark.nightly
 def test_hermit_names_a_class_that_nothing_can_belong_to(graph: KnowledgeGraph) -> None:
     subclass = NamedNode("http://www.w3.org/2000/01/rdf-schema#subClassOf")
     wrong = Triple(NamedNode(term("Idle_Heavy_Run")), subclass, NamedNode(term("Series")))

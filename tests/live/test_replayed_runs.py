@@ -43,6 +43,7 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_pa
     assert "1 replayed" in irtwin("status", "--workspace", workspace).out
 
 
+@pytest.mark.nightly
 def test_what_a_simulator_wrote_is_no_consumption(small_run: Path, tmp_path: Path) -> None:
     data = Path(shutil.copytree(small_run / "data", tmp_path / "data"))
     text = (data / "dataset.toml").read_text(encoding="utf-8")

@@ -91,6 +91,7 @@ def test_description_is_the_campaigns(drawings: Drawings) -> None:
     assert (SHIPPED / "dataset.toml").read_text(encoding="utf-8") == text
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_plant_makes_the_first_log_again(drawings: Drawings) -> None:
     campaign = read_campaign("kuka_kr6_r700")

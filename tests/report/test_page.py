@@ -25,7 +25,7 @@ SCENE = Fragment(Markup('<div id="stub" style="height: 200px"></div>') + SCRIPTS
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     graph = KnowledgeGraph()
     graph.load_ontology()
-    six = six_axis(graph, runs=16)
+    six = six_axis(graph, runs=6)
     out = tmp_path_factory.mktemp("page") / "robot.html"
     render(graph, six.iri, six.read_series, out, draw_scene=lambda runs, opens: SCENE)
     return out

@@ -43,6 +43,7 @@ def test_it_catches_up_by_itself(left_behind: Path, tmp_path: Path) -> None:
         assert "irtwin-graph" not in get(server, "/").headers
 
 
+@pytest.mark.nightly
 def test_where_it_cannot_it_says_why_once_and_all_that_answers_says_that_it_is_behind(
     left_behind: Path, tmp_path: Path
 ) -> None:

@@ -46,6 +46,7 @@ def test_half_open_connections_give_way(server: Server) -> None:
             assert httpx.get(server.sparql, params={"query": "ASK {}"}, timeout=30).status_code == 200
 
 
+@pytest.mark.nightly
 def test_clients_that_do_not_read_hold_no_worker(patient: Server) -> None:
     query = urlencode({"query": LARGE})
     with ExitStack() as held:

@@ -86,6 +86,7 @@ def status(raw: socket.socket) -> bytes:
     return raw.recv(1 << 12).split(b" ")[1]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_their_limit(shared: Server) -> None:
     over = threading.Event()

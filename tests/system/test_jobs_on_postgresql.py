@@ -59,6 +59,7 @@ def live_run(plant: Plant) -> Run:
         return session.scalars(select(Run).where(Run.kind.in_(WATCHED_RUNS))).one()
 
 
+@pytest.mark.nightly
 def test_a_plan_is_held_against_the_run_that_was_watched(plant: Plant) -> None:
     (row,) = asking.ask("planned_against_measured", plant.folder)
     assert (row["plan"], row["run"]) == ("reach", live_run(plant).name)

