@@ -16,7 +16,7 @@ from irtwin.gap.regression.channel_equations import Torque, power_system, torque
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.moments import Moments, summed
-from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.signals.motion import Motion
 
 
@@ -34,7 +34,7 @@ class Library:
     @cached_property
     def moments(self) -> list[Moments]:
         """Each group's products of columns, held equation by equation."""
-        return list(self.system.moments(noise_before(self.system)))
+        return list(self.system.moments(self.system.noise_before))
 
     @cached_property
     def groups(self) -> list[np.ndarray]:

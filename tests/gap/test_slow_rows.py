@@ -15,8 +15,7 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.isolation.apart import Apart
-from irtwin.gap.isolation.shares import closed_squares
+from irtwin.gap.isolation.apart import Apart, closed_squares
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.held_out import left_out

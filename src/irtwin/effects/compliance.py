@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.effects.effect import (
+    NORMAL,
     Effect,
     JointEffect,
     Known,
@@ -197,7 +198,6 @@ def _free(load: np.ndarray, q: np.ndarray, dq: np.ndarray, rate: float, gap: flo
 class _Compliance(JointEffect):
     """What both share: a swing that the predicted load drives and that has died away after two seconds."""
 
-    channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
@@ -342,7 +342,7 @@ class JointElasticity(_Compliance):
             rotor = (known or {}).get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
             top = rotor if self.antiresonance == 0 else float(stiffness[robot.index(joint.name)])
             if top and value > 0:
-                sure = value - 1.96 * deviation > 0  # else K has no upper end
+                sure = value - NORMAL * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
                 found.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))

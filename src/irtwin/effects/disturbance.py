@@ -20,7 +20,6 @@ class PeriodicDisturbance(JointEffect):
     family: ClassVar[str] = "environment"
     disturbance: ClassVar[str | None] = "line"
     manual_test: ClassVar[str | None] = "holding one pose for a minute, twice, with pumps and fans around on, then off"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"f": (0.3, 500.0)}
 
     f: float = 1.0  # Hz

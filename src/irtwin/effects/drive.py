@@ -43,7 +43,6 @@ class RotorInertia(JointEffect):
 
     id: ClassVar[str] = "rotor_inertia"
     family: ClassVar[str] = "bodies"
-    channel: ClassVar[str] = "torque"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Ia": "armature"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -16,7 +16,7 @@ from irtwin.signals.motion import Motion
 Known = Mapping[tuple[str, str | None, str], float]
 """Coefficients of other effects: (effect, joint, name) -> value."""
 
-_NORMAL = 1.96  # standard deviations in half a 95 % interval
+NORMAL = 1.959963984540054  # standard deviations in half a 95 % interval of what is normal
 _REFERENCE = 1e-12  # below, a coefficient is none
 
 
@@ -139,7 +139,7 @@ class Effect(ABC):
     """
 
     id: ClassVar[str]
-    channel: ClassVar[str]
+    channel: ClassVar[str] = "torque"
     signal: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = None
     stage: ClassVar[int] = 0
@@ -301,7 +301,7 @@ def quantity(
     """Return `convert` (monotone) of a value and of the ends of its interval; no interval where one end has none."""
     ends: list[float] = []
     if deviation is not None and np.isfinite(deviation):
-        ends = sorted(convert(float(value + side * _NORMAL * deviation)) for side in (-1, 1))
+        ends = sorted(convert(float(value + side * NORMAL * deviation)) for side in (-1, 1))
     if not ends or not np.all(np.isfinite(ends)):
         return Quantity(name, joint, convert(float(value)), unit)
     return Quantity(name, joint, convert(float(value)), unit, ends[0], ends[1])

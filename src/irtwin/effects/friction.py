@@ -25,6 +25,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
 
+SLOW = 0.02  # rad/s, across which friction surely changes its sign, whatever its law
 _SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
 _TURNED = 2.0  # widths, where most of a turn is over
 _OVER = 3.0  # widths, where a turn is over
@@ -69,7 +70,6 @@ class CoulombFriction(JointEffect):
 
     id: ClassVar[str] = "coulomb_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Fc": "frictionloss"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -92,7 +92,6 @@ class ViscousFriction(JointEffect):
 
     id: ClassVar[str] = "viscous_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Fv": "damping"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -110,7 +109,6 @@ class StribeckFriction(JointEffect):
 
     id: ClassVar[str] = "stribeck_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"vs": (0.005, 0.2), "d": (0.5, 2.0)}
 
     vs: float = 0.05  # rad/s
@@ -155,7 +153,6 @@ class NonlinearViscousFriction(JointEffect):
 
     id: ClassVar[str] = "nonlinear_viscous_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (0.2, 3.0)}
 
     d: float = 2.0
@@ -186,7 +183,6 @@ class AsymmetricFriction(JointEffect):
 
     id: ClassVar[str] = "asymmetric_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return a and b."""
@@ -204,7 +200,6 @@ class LoadDependentFriction(JointEffect):
 
     id: ClassVar[str] = "load_dependent_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
 
@@ -239,7 +234,6 @@ class TemperatureDependentFriction(JointEffect):
     family: ClassVar[str] = "friction"
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
     manual_test: ClassVar[str | None] = "log joint temperatures, from a cold start"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
 
     k: float = 0.02  # 1/K
@@ -316,7 +310,6 @@ class PreslidingHysteresis(JointEffect):
 
     id: ClassVar[str] = "presliding_hysteresis"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     memory: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (1e-4, 0.2)}
 
@@ -363,7 +356,6 @@ class PositionDependentFriction(JointEffect):
 
     id: ClassVar[str] = "position_dependent_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fc a and Fc b."""

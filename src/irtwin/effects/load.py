@@ -52,7 +52,6 @@ class CableDrag(JointEffect):
     id: ClassVar[str] = "cable_drag"
     family: ClassVar[str] = "load"
     taken_off: ClassVar[str | None] = "with the hose package off"
-    channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k."""
@@ -73,7 +72,6 @@ class GravityCompensation(JointEffect):
 
     id: ClassVar[str] = "gravity_compensation"
     family: ClassVar[str] = "load"
-    channel: ClassVar[str] = "torque"
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the effect at the joint that makers balance: the first that gravity loads."""
@@ -111,7 +109,6 @@ class Payload(Effect):
     family: ClassVar[str] = "load"
     within_bodies: ClassVar[bool] = True
     taken_off: ClassVar[str | None] = "with the tool off"
-    channel: ClassVar[str] = "torque"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return mass, first moments and inertia in the flange frame."""
@@ -161,7 +158,6 @@ class BaseTilt(Effect):
 
     id: ClassVar[str] = "base_tilt"
     family: ClassVar[str] = "environment"
-    channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
 
@@ -204,7 +200,6 @@ class ExternalContact(Effect):
     family: ClassVar[str] = "environment"
     manual_test: ClassVar[str | None] = "the same motion with free space around the arm"
     taken_off: ClassVar[str | None] = "in free space"
-    channel: ClassVar[str] = "torque"
 
     start: float = -np.inf  # s
     stop: float = np.inf  # s

@@ -83,7 +83,6 @@ class LocalWear(LocalEffect):
 
     id: ClassVar[str] = "local_wear"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"q0": (-2 * np.pi, 2 * np.pi), "w": (0.01, 1.0)}
 
     w: float = 0.1  # rad or m, where the bump has fallen to 37 %
@@ -128,7 +127,6 @@ class JointLimitSpring(LocalEffect):
     id: ClassVar[str] = "joint_limit_spring"
     family: ClassVar[str] = "load"
     taken_off: ClassVar[str | None] = "with the hose package off"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"q0": (-2 * np.pi, 2 * np.pi)}
 
     side: float = 1.0  # 1: it acts above q0; -1: below

@@ -32,7 +32,6 @@ class TorqueRipple(JointEffect):
 
     id: ClassVar[str] = "torque_ripple"
     family: ClassVar[str] = "transmission"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"N": (1.0, 400.0)}
 
     N: float = 1.0  # per turn of the joint
@@ -79,7 +78,6 @@ class JointCoupling(Effect):
 
     id: ClassVar[str] = "joint_coupling"
     family: ClassVar[str] = "transmission"
-    channel: ClassVar[str] = "torque"
 
     def pair(self, robot: Robot) -> tuple[Joint, ...]:
         """Return the two joints; none on a robot of one."""

@@ -17,7 +17,7 @@ from irtwin.identification.descent import descend
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
 from irtwin.identification.own_body import OwnBody
-from irtwin.identification.threads import one_blas_thread
+from irtwin.identification.two_processes import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.csv_text import csv_text

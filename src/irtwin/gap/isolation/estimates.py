@@ -11,7 +11,6 @@ from scipy.linalg import block_diag
 from irtwin.gap.regression.joint_equations import JointEquations
 from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.estimators import Estimate, estimate
-from irtwin.identification.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -25,10 +24,10 @@ class BesidePower:
     columns: tuple[int, ...]
     noise: np.ndarray
 
-    def estimate(self, chosen: Sequence[int], tell: Tell | None = None) -> Estimate:
+    def estimate(self, chosen: Sequence[int]) -> Estimate:
         """Estimate the twin's terms of torque and `chosen` columns, as torque's equations count them, by both."""
         whole, torque = self.equations.whole, self.equations.torque
-        fitted = estimate_of(whole, self._columns(chosen), tell)
+        fitted = estimate_of(whole, self._columns(chosen))
         used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
         return fitted.of(used, fitted.noise[: len(torque.pattern)])
 
@@ -36,7 +35,7 @@ class BesidePower:
         return [*map(self.equations.in_whole, chosen), *self.columns]
 
 
-def estimate_of(system: System, chosen: Sequence[int], tell: Tell | None = None) -> Estimate:
+def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
     """Estimate the twin's terms and the causes' together, with bounds and intervals."""
     used = [*range(system.base), *chosen]
     terms = [system.all_terms[k] for k in used]
@@ -56,4 +55,4 @@ def estimate_of(system: System, chosen: Sequence[int], tell: Tell | None = None)
         blocks.append(replace(block, factors=tuple(factors)))
     rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
     signals = [*[0] * (len(pattern) - 1), 1] if system.beside_power else None
-    return estimate(blocks, pattern, terms, rows, signals, tell)
+    return estimate(blocks, pattern, terms, rows, signals)

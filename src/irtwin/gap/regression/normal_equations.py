@@ -395,11 +395,6 @@ def least_noise(squares: float) -> float:
     return max(_LEAST_NOISE * float(np.sqrt(squares)), _NO_NOISE)
 
 
-def noise_before(system: System) -> np.ndarray:
-    """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
-    return system.noise_before
-
-
 def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
     """Return the RMS (g,) that a fit to all runs leaves in observed ones; equations weighted by `noise` (g,)."""
     return system.rms(chosen, noise, range(system.groups), np.flatnonzero(system.group_observed))
