@@ -67,6 +67,13 @@ class Run:
         return self.signals.torque is not None or self.signals.power is not None
 
 
+def run_of(name: str, signals: Signals, **known: Any) -> Run:
+    """Return an observed run of which nothing is known but its samples, and what is given by the fields' names."""
+    nothing: dict[str, Any] = {"file": Path(name), "sha256": "", "role": "observed", "repeat_of": None}
+    nothing |= {"payload_mass": 0.0, "payload_com": (0.0, 0.0, 0.0), "started": None, "notes": {}}
+    return Run(name=name, signals=signals, **(nothing | known))
+
+
 @dataclass(frozen=True)
 class DataSet:
     """A robot and its runs; `effects` is what the twin is said to model, None for the baseline.
@@ -162,19 +169,8 @@ def read_log(
     """
     signals, dropped = read_signals(file, robot, repair=repair)
     pieces, sampled = as_sampled(signals, file)
-    run = Run(
-        name=file.stem,
-        file=file,
-        sha256=checksum(file),
-        role="observed",
-        payload_mass=payload_mass,
-        payload_com=payload_com,
-        repeat_of=None,
-        started=None,
-        notes={},
-        signals=signals,
-        performs=performs,
-    )
+    known = {"payload_mass": payload_mass, "payload_com": payload_com, "performs": performs}
+    run = run_of(file.stem, signals, file=file, sha256=checksum(file), **known)
     return DataSet(
         folder=file.parent,
         robot=robot,
