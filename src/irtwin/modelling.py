@@ -24,9 +24,8 @@ from irtwin.planning.plan import Plan, Task, nominal_twin
 from irtwin.planning.plan import plan as make_plan
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.urdf import read_urdf
-from irtwin.signals.channels import Signals, columns_of
+from irtwin.signals.channels import Signals, columns_of, csv_text
 from irtwin.signals.conditioning import condition
-from irtwin.signals.csv_text import csv_text
 from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled

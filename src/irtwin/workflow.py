@@ -53,8 +53,8 @@ from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone, render_gap
-from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
+from irtwin.signals.sampling import checked_cutoff
 from irtwin.simulator.differences import written
 from irtwin.simulator.model import Model, read_model, with_simulated_runs
 from irtwin.simulator.playing import Playing

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
-from irtwin.document.cause_ids import cause_ids
 from irtwin.document.curves import Curves
-from irtwin.document.document import Closeable, Cutoff, Document, Location, Untestable
+from irtwin.document.document import Closeable, Cutoff, Document, Location, Untestable, cause_ids
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect

@@ -9,8 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from irtwin.document import document
-from irtwin.document.cause_ids import cause_ids
-from irtwin.document.document import Closeable
+from irtwin.document.document import Closeable, cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor

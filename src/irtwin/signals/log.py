@@ -13,11 +13,10 @@ from irtwin.input_file import checksum, real_path
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
-from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.dh_table import robot_of_table
 from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
-from irtwin.signals.sampling import as_sampled, holes
+from irtwin.signals.sampling import as_sampled, checked_cutoff, holes
 from irtwin.signals.sources.bag_source import number_topics
 from irtwin.signals.toml_file import Table, shown, take
 from irtwin.toml_text import read_toml

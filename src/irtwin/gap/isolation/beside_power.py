@@ -12,9 +12,8 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.estimates import BesidePower
 from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
-from irtwin.gap.isolation.finding import Finding, Without, attributed, finding_of
+from irtwin.gap.isolation.finding import BesidePower, Finding, Without, attributed, finding_of
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity, Term, quantity
@@ -15,12 +16,12 @@ from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
-from irtwin.gap.isolation.estimates import BesidePower, estimate_of
 from irtwin.gap.isolation.structure_search import Attribution, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
+from irtwin.gap.regression.joint_equations import JointEquations
 from irtwin.gap.regression.normal_equations import System, observed_rms
-from irtwin.identification.estimators import Estimate
+from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
@@ -290,3 +291,48 @@ def _family(cause: Cause) -> str:
 
 def _by_size(finding: Finding, causes: Sequence[Cause]) -> tuple[Cause, ...]:
     return tuple(sorted(causes, key=lambda one: -finding.closing([one]).size))
+
+
+@dataclass(frozen=True)
+class BesidePower:
+    """Power beside torque: the `equations` of both, and what their search found of power.
+
+    columns: those of the causes of power, of `equations.whole`; noise: (n + 1,) what all causes left of each equation.
+    """
+
+    equations: JointEquations
+    columns: tuple[int, ...]
+    noise: np.ndarray
+
+    def estimate(self, chosen: Sequence[int]) -> Estimate:
+        """Estimate the twin's terms of torque and `chosen` columns, as torque's equations count them, by both."""
+        whole, torque = self.equations.whole, self.equations.torque
+        fitted = estimate_of(whole, self._columns(chosen))
+        used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
+        return fitted.of(used, fitted.noise[: len(torque.pattern)])
+
+    def _columns(self, chosen: Sequence[int]) -> list[int]:
+        return [*map(self.equations.in_whole, chosen), *self.columns]
+
+
+def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
+    """Estimate the twin's terms and the causes' together, with bounds and intervals."""
+    used = [*range(system.base), *chosen]
+    terms = [system.all_terms[k] for k in used]
+    source = [k - len(system.columns) if k >= system.changed else k for k in used]
+    pattern = system.pattern[:, source]
+    blocks = []
+    for block, observed in zip(system.blocks, system.observed, strict=True):
+        factors = []
+        for equation, factor in enumerate(block.factors):
+            place = {int(k): p for p, k in enumerate(np.flatnonzero(system.pattern[equation]))}
+            parts = [
+                factor[:, place[s]] * (observed or k < system.changed)
+                for k, s in zip(used, source, strict=True)
+                if s in place
+            ]
+            factors.append(np.column_stack([*parts, factor[:, -1]]))
+        blocks.append(replace(block, factors=tuple(factors)))
+    rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
+    signals = [*[0] * (len(pattern) - 1), 1] if system.beside_power else None
+    return estimate(blocks, pattern, terms, rows, signals)
