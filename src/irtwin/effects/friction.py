@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from irtwin.effects.effect import (
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Possible,
     Predicted,
     Quantity,
@@ -131,11 +131,9 @@ class StribeckFriction(JointEffect):
         """Return s exp(-(|dq|/vs)^d)."""
         return (direction(robot, motion.dq) * np.exp(-((np.abs(motion.dq) / self.vs) ** self.d)),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fs, vs and d."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         shapes = [
             shape
             for joint in self.acting(robot)
@@ -169,11 +167,9 @@ class NonlinearViscousFriction(JointEffect):
         """Return s |dq|^d."""
         return (direction(robot, motion.dq) * np.abs(motion.dq) ** self.d,)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k and d."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         return (*found, *(Quantity("d", joint.name, self.d, "1") for joint in self.acting(robot)))
 
 
@@ -257,13 +253,11 @@ class TemperatureDependentFriction(JointEffect):
             return (np.zeros_like(motion.dq),)
         return (motion.dq * np.expm1(-self.k * (motion.temperature - self.T0)) / self.k,)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, relative to the joint's Fv; the shape's k where Fv is not known."""
         found = []
-        for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True):
-            viscous = (known or {}).get(("viscous_friction", joint.name, "Fv"))
+        for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
+            viscous = given.known.get(("viscous_friction", joint.name, "Fv"))
             part = (ratio(value, viscous), ratio(deviation, viscous)) if viscous else (self.k, None)
             found.append(quantity("k", joint.name, part[0], "1/K", part[1]))
         return tuple(found)
@@ -293,12 +287,11 @@ class ChangedFrictionWithTemperature(TemperatureDependentFriction):
         (thinning,) = super().samples(robot, motion, predicted)
         return (thinning, np.zeros_like(motion.dq) if motion.temperature is None else motion.dq)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, relative to the joint's former Fv: (k (Fv + dFv) - k dFv)/Fv."""
         thinning = np.kron(np.eye(len(self.acting(robot))), [1.0, -self.k])
-        return super().parameters(robot, thinning @ values, thinning @ covariance @ thinning.T, known)
+        former = Coefficients(thinning @ given.values, thinning @ given.covariance @ thinning.T, given.known)
+        return super().parameters(robot, former)
 
 
 @dataclass(frozen=True)
@@ -343,9 +336,7 @@ class PreslidingHysteresis(JointEffect):
             left = lag[stop - 1]
         return lag
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return d."""
         return tuple(Quantity("d", joint.name, self.d, joint.unit) for joint in self.acting(robot))
 
@@ -367,15 +358,13 @@ class PositionDependentFriction(JointEffect):
         signs = direction(robot, motion.dq)
         return signs * np.cos(motion.q), signs * np.sin(motion.q)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return a and b, relative to the joint's Fc; nothing where that is not known."""
-        deviations = np.sqrt(np.diag(covariance))
+        deviations = given.deviations
         found = []
         for place, joint in enumerate(self.acting(robot)):
-            dry = (known or {}).get(("coulomb_friction", joint.name, "Fc"))
+            dry = given.known.get(("coulomb_friction", joint.name, "Fc"))
             for number, name in enumerate(("a", "b")) if dry else ():
                 at = 2 * place + number
-                found.append(quantity(name, joint.name, ratio(values[at], dry), "1", ratio(deviations[at], dry)))
+                found.append(quantity(name, joint.name, ratio(given.values[at], dry), "1", ratio(deviations[at], dry)))
         return tuple(found)

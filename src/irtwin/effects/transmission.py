@@ -8,16 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 from irtwin.effects.effect import (
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Predicted,
     Quantity,
     Term,
     force_unit,
     inertia_unit,
     quantity,
-    size,
 )
 from irtwin.effects.friction import sharp_sign
 from irtwin.robot.description import Joint, Robot
@@ -56,14 +55,12 @@ class TorqueRipple(JointEffect):
         """Return sin N q and cos N q."""
         return np.sin(self.N * motion.q), np.cos(self.N * motion.q)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return A and N."""
         found = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(2 * place, 2 * place + 2)
-            length, deviation = size(values[own], covariance[own, own])
+            length, deviation = given.size(own)
             found.append(quantity("A", joint.name, length, force_unit(joint), deviation))
             found.append(Quantity("N", joint.name, self.N, "1/rev"))
         return tuple(found)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import BASELINE
-from irtwin.effects.effect import NORMAL, Effect, JointEffect
+from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -182,8 +182,8 @@ def _quantities(robot: Robot, found: Sequence[Found], parameters: Sequence[Param
             if type(effect).parameters is Effect.parameters:
                 continue
             own = [place for place, (owner, _) in enumerate(terms) if owner is effect]
-            values, covariance = result.values[own], result.covariance[np.ix_(own, own)]
-            for each in effect.parameters(robot, values, covariance, known):
+            given = Coefficients(result.values[own], result.covariance[np.ix_(own, own)], known)
+            for each in effect.parameters(robot, given):
                 place = (each.joint, None, each.name, each.value, each.unit, each.lower, each.upper)
                 told.append(Parameter(effect.id, *place))
     return tuple(told)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Quantity, Term, quantity
+from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import Cause
@@ -240,8 +240,8 @@ def of_variant(robot: Robot, finding: Finding, one: Cause, number: int) -> list[
     effect = variant.effect.on(joint) if joint is not None and len(one.joints) > 0 else variant.effect
     if len(effect.terms(robot)) != len(places):
         return [_coefficient(term, found, place) for term, place in zip(variant.terms, places, strict=True)]
-    covariance = found.covariance[np.ix_(places, places)]
-    stated = effect.parameters(robot, found.values[places], covariance, known)
+    given = Coefficients(found.values[places], found.covariance[np.ix_(places, places)], known)
+    stated = effect.parameters(robot, given)
     return [each for each in stated if np.isfinite(each.value)]
 
 
