@@ -24,7 +24,7 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
@@ -192,7 +192,7 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
     made = [measure(ROBOT, m, noise=NOISE, seed=50 + k) for k, m in enumerate(planned)]
     made = [replace(m, torque=m.torque + stribeck(m)) for m in made]
     again = ground_of([*motions, *made], ["stribeck_friction", "nonlinear_viscous_friction"]).finding.system
-    total = projected(summed(again.moments(np.full(2, NOISE))).whole, [*range(again.base)])
+    total = projected(Summed(again.moments(np.full(2, NOISE))).whole, [*range(again.base)])
     shapes = {
         one.effect: [list(v.columns) for v in one.variants]
         for one in channel.finding.attribution.hypotheses

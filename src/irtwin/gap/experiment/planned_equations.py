@@ -20,7 +20,7 @@ from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Column
-from irtwin.gap.regression.moments import Moments, summed
+from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import scores
 from irtwin.gap.thresholds import Thresholds
@@ -79,7 +79,7 @@ class PlannedEquations:
 
     @cached_property
     def _total(self) -> Moments:
-        return summed(self._moments)
+        return Summed(self._moments)
 
     def products(self, programme: Programme, tried: Sequence[int | Column]) -> Products:
         """Return the products of the twin's columns and those tried.
@@ -115,7 +115,7 @@ class PlannedEquations:
         places = dict.fromkeys(range(base)) | {place: k for place, k in at.items() if k is not None}
         asked = np.array([place if k is None else k for place, k in places.items()])
         into = np.array(list(places))
-        found[np.ix_(into, into)] = summed(planned.moments(self.finding.attribution.noise)).among(asked, asked)
+        found[np.ix_(into, into)] = Summed(planned.moments(self.finding.attribution.noise)).among(asked, asked)
         return found
 
 

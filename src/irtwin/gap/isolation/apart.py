@@ -16,7 +16,7 @@ import numpy as np
 
 from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.held_out import HeldOut, held_out
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
 from irtwin.identification.progress import tell_step
 
@@ -118,7 +118,7 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     system, players = apart.system, apart.players
     judged = np.flatnonzero(system.group_observed)
     weighed = {True: system.moments(apart.noise), False: system.moments(system.noise_before)}
-    totals = {some: summed(moments) for some, moments in weighed.items()}
+    totals = {some: Summed(moments) for some, moments in weighed.items()}
 
     @cache
     def left(members: frozenset[int]) -> np.ndarray:

@@ -18,7 +18,7 @@ from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import curve, followed
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.hypotheses import CHANGED
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
 from irtwin.identification.progress import tell_step
@@ -200,10 +200,10 @@ def fitted_values(finding: Finding, *, reference: bool) -> Values:
     system = finding.system
     moments = system.moments(finding.rmse)
     if not reference:
-        whole = twin_values(system, system.solution((), summed(moments)))
+        whole = twin_values(system, system.solution((), Summed(moments)))
         return lambda run: whole
     groups = np.flatnonzero(~system.group_observed)
-    total = summed([moments[group] for group in groups])
+    total = Summed([moments[group] for group in groups])
     whole = twin_values(system, system.solution((), total))
     own: dict[str, np.ndarray] = {}
     for group in groups if len(groups) > 1 else ():

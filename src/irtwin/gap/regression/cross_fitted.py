@@ -11,7 +11,7 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import Torque, power_system
 from irtwin.gap.regression.groups import Grouping
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.identification.progress import tell_step
 from irtwin.signals.motion import Motion
@@ -27,7 +27,7 @@ class LeftOut:
     def __init__(self, stack: Stack, system: System):
         """Fit the twin's terms to the equations of torque without each group in turn."""
         moments = system.moments(system.noise_before)
-        total = summed(moments)
+        total = Summed(moments)
         self._stack = stack
         self._all = twin_values(system, system.solution((), total))
         self._without: dict[str, np.ndarray] = {}
@@ -69,7 +69,7 @@ class TwinPower:
         ones = [effect for effect in catalogue().values() if effect.drawn_at_rest]
         self.system = power_system(stack, motions, grouping, ones, torque, none)
         self.values = np.array([term.expected for _, term in stack.power_terms], dtype=float)
-        total = summed(self.system.moments(self.system.noise_before))
+        total = Summed(self.system.moments(self.system.noise_before))
         self.values[~stack.fixed] = twin_values(self.system, self.system.solution((), total))
         self._at_rest = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
 

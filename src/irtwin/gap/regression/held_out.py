@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student_t
 
-from irtwin.gap.regression.moments import Moments, summed
+from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.progress import tell_step
 
@@ -87,7 +87,7 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
 
 def left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
     """Return the squares that a fit with the chosen columns leaves of each judged group without it, (G, g)."""
-    total, found = summed(moments), []
+    total, found = Summed(moments), []
     for group in judged:
         tell_step(f"  how far the gap closes, group {group + 1} of {len(moments)} left out")
         found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
