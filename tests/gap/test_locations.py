@@ -96,7 +96,7 @@ def test_a_gap_has_its_joint_and_regime(function, regimes):
     assert first.concentration > 1
     assert first.false_discovery_rate < 0.05
     assert first.share_interval95[0] <= first.share <= first.share_interval95[1]
-    assert 0 < first.excess_interval[0] <= first.excess <= first.excess_interval[1]
+    assert 0 < first.excess_interval95[0] <= first.excess <= first.excess_interval95[1]
 
 
 def test_a_gap_in_one_run_of_many_is_not_sure():
