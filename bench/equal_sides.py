@@ -70,7 +70,7 @@ def beside_model(folder: Path, number: int, models: Path) -> Document:
     case = commanded.Case(folder.name, commanded.ARMS[number % len(commanded.ARMS)], 51_000_000 + number, 0)
     commanded.make(case, models, folder.parent)
     data_set = read_data_set(folder / "data", commanded=True)
-    return playing.diagnose(data_set, read_model(folder / "model.xml", data_set.robot), lambda line: None).document
+    return playing.diagnose(data_set, read_model(folder / "model.xml", data_set.robot)).document
 
 
 def pair(kind: str, number: int, folder: Path, models: Path, data_sets: list[Path]) -> Document:

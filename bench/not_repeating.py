@@ -224,7 +224,7 @@ def described(case: Case, found: Sequence[Disturbance]) -> list[Disturbance]:
     if not any(one.kind == LINE for one in found):
         return list(found)
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
-    plain = torque_system(stack, case.with_torque, case.grouping, (), None, lambda line: None)
+    plain = torque_system(stack, case.with_torque, case.grouping, (), None)
     _, taken = removed(case, stack, plain, found)
     told = {id(one.disturbance): one.quantities for one in taken}
     return [replace(one, quantities=told.get(id(one), one.quantities)) for one in found]

@@ -49,7 +49,7 @@ def farthest(runs: Sequence[Run]) -> list[str]:
 def split(data_set: DataSet, model: Model, names: Sequence[str]) -> None:
     """Fit some runs; print what the written model leaves of the others, mrad, and the time."""
     begin = time.perf_counter()
-    found = diagnose(_of(data_set, names), model, lambda line: None)
+    found = diagnose(_of(data_set, names), model)
     took = time.perf_counter() - begin
     with TemporaryDirectory() as folder:
         file = Path(folder) / "robot.xml"
@@ -64,7 +64,7 @@ def split(data_set: DataSet, model: Model, names: Sequence[str]) -> None:
 def halves(data_set: DataSet, model: Model) -> None:
     """Print what is named on every second run, and on the others, and on both."""
     names = [run.name for run in data_set.runs]
-    told = [_named(diagnose(_of(data_set, names[half::2]), model, lambda line: None)) for half in (0, 1)]
+    told = [_named(diagnose(_of(data_set, names[half::2]), model)) for half in (0, 1)]
     both = told[0] & told[1]
     print(f"  {len(told[0])} and {len(told[1])} numbers, {len(both)} in both; effects in both: ", end="")
     print(", ".join(sorted({name for _, name in both})))
@@ -88,7 +88,7 @@ def known(data_set: DataSet, model: Model) -> None:
         for run in data_set.runs[:6]:
             q = play(own, [true], [whole(run)])[0][0]
             runs.append(replace(run, signals=replace(run.signals, q=q + _NOISE * rng.standard_normal(q.shape))))
-        found = diagnose(replace(data_set, runs=tuple(runs)), base, lambda line: None)
+        found = diagnose(replace(data_set, runs=tuple(runs)), base)
         print(f"  {_judged(found, data_set, changes, true)}", flush=True)
 
 

@@ -20,8 +20,7 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import record
-from irtwin.signals.channels import Signals
-from irtwin.signals.csv_text import csv_text
+from irtwin.signals.channels import Signals, csv_text
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import read_signals

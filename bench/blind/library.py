@@ -15,8 +15,8 @@ from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, hypotheses
-from irtwin.gap.regression.moments import Moments, summed
-from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.gap.regression.moments import Moments, Summed
+from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.signals.motion import Motion
 
 
@@ -34,7 +34,7 @@ class Library:
     @cached_property
     def moments(self) -> list[Moments]:
         """Each group's products of columns, held equation by equation."""
-        return list(self.system.moments(noise_before(self.system)))
+        return list(self.system.moments(self.system.noise_before))
 
     @cached_property
     def groups(self) -> list[np.ndarray]:
@@ -81,7 +81,7 @@ class Explained:
         """Take what was chosen of a library of torque, and what its columns were built on."""
         self._stack, self._system = case.stack, library.system
         self._below, self._chosen, self._observed = left_out.below, chosen, case.observed
-        vector = self._system.solution([k for variant in chosen for k in variant.columns], summed(library.moments))
+        vector = self._system.solution([k for variant in chosen for k in variant.columns], Summed(library.moments))
         self._twin, self._values = twin_values(self._system, vector), vector * self._system.scale
         self._held: tuple[str, np.ndarray] | None = None
 

@@ -53,7 +53,7 @@ def judge(folder: Path) -> dict[str, Any]:
     begin = time.process_time()
     data_set = read_data_set(folder / "data", commanded=True)
     model = read_model(folder / "model.xml", data_set.robot)
-    found = diagnose(data_set, model, lambda line: None)
+    found = diagnose(data_set, model)
     new = folder / "written.xml"
     new.write_bytes(found.written())
     left = {}

@@ -15,10 +15,10 @@ from scipy.optimize import nnls
 
 from energy_twin.cases import Case, cases
 from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import NORMAL
 from irtwin.effects.stack import Stack
 from irtwin.gap.choice import identified
 from irtwin.identification.cutoff import cutoff_for
-from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import Split, energy, energy_error, split
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion

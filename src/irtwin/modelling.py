@@ -14,7 +14,6 @@ import pyarrow.parquet
 from irtwin.check.check import Checked, check, checked
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
-from irtwin.gap import predict as predicted
 from irtwin.gap.choice import identified
 from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.gap.thresholds import ScaleOfTorque
@@ -24,13 +23,13 @@ from irtwin.planning.plan import Plan, Task, nominal_twin
 from irtwin.planning.plan import plan as make_plan
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.urdf import read_urdf
-from irtwin.signals.channels import Signals, columns_of
+from irtwin.signals.channels import Signals, columns_of, csv_text
 from irtwin.signals.conditioning import condition
-from irtwin.signals.csv_text import csv_text
 from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled
 from irtwin.storage.files import check_place, write
+from irtwin.twin import predict as predicted
 from irtwin.twin.described import places, text_of
 from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit

@@ -22,8 +22,7 @@ from irtwin.planning.plan import nominal_twin
 from irtwin.providers.records import load_robot, load_twin
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
-from irtwin.signals.channels import Signals
-from irtwin.signals.csv_text import csv_text
+from irtwin.signals.channels import Signals, csv_text
 from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove, write

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -24,7 +24,7 @@ from irtwin.providers.records import (
 )
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import PLANNED, Run, check_plan
+from irtwin.signals.log import PLANNED, Run, check_plan, run_of
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
@@ -79,7 +79,7 @@ def plan(
         made = modelling.plan(twin, task, rate=rate)
         motion = made.motion
         signals = Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq)
-        return made, _run(name, signals, task.payload_mass, task.payload_com)
+        return made, run_of(name, signals, role=PLANNED, payload_mass=task.payload_mass, payload_com=task.payload_com)
 
     if out is not None:
         modelling.check_plan_file(out)
@@ -111,7 +111,8 @@ def predict(
         expected = modelling.expect(twin, motion, payload_mass=payload_mass, payload_com=payload_com)
         run = expected.run
         check_plan(run.signals, motion)
-        return expected, _run(name, run.signals.motion, run.payload_mass, run.payload_com)
+        carried = {"payload_mass": run.payload_mass, "payload_com": run.payload_com}
+        return expected, run_of(name, run.signals.motion, role=PLANNED, **carried)
 
     if out is not None:
         check_place(out)
@@ -165,8 +166,15 @@ def optimise(
         programme = programme_of(condition(known, twin.robot, twin.cutoff), str(place_of))
         times, was = CycleTimes(twin, programme, least_pause), float(programme.seconds.sum())
         best = times.in_time(cycle or was)
-        made = _run(name, best.motion, known.payload_mass, known.payload_com)
-        made = replace(made, time_scaling_of=known.name, time_scale=best.seconds / was)
+        made = run_of(
+            name,
+            best.motion,
+            role=PLANNED,
+            payload_mass=known.payload_mass,
+            payload_com=known.payload_com,
+            time_scaling_of=known.name,
+            time_scale=best.seconds / was,
+        )
         return Timings(twin.robot.joint_names, programme, best, times.curve()), made
 
     found, kept = _keep(robot, name, make, place_of, database, graph_url, announce)
@@ -198,18 +206,3 @@ def _keep(
             conclude(graph, announce)
         report = write_report(place, graph_url, robot_id)
         return made, Kept(robot_id, name, stored_price(place, run_id), report)
-
-
-def _run(name: str, signals: Signals, payload_mass: float, payload_com: tuple[float, float, float]) -> Run:
-    return Run(
-        name=name,
-        file=Path(name),
-        sha256="",
-        role=PLANNED,
-        payload_mass=payload_mass,
-        payload_com=payload_com,
-        repeat_of=None,
-        started=None,
-        notes={},
-        signals=signals,
-    )

@@ -19,6 +19,7 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
+from irtwin.identification.progress import telling
 from irtwin.knowledge.asserted.statements import map_facts
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import explain_one
@@ -52,13 +53,12 @@ from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_alone, render_gap
-from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.log import DataSet, read_data_set
+from irtwin.signals.sampling import checked_cutoff
 from irtwin.simulator.differences import written
-from irtwin.simulator.model import Model, read_model
+from irtwin.simulator.model import Model, read_model, with_simulated_runs
 from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
-from irtwin.simulator.simulated_runs import with_simulated_runs
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
@@ -162,7 +162,8 @@ def diagnose(
             check_before(place)
             check_name(place, data_set.robot.name)
             data_set = followed(data_set, place.facts_about(identifier(data_set.robot.name)))
-    data_set, found = _found(data_set, model, given, withhold, seed, announce)
+    with telling(announce):
+        data_set, found = _found(data_set, model, given, withhold, seed)
     if kept_in is not None:  # first, as a damaged workspace is to leave no file beside its error
         announce("Storing the diagnosis")
         with Workspace(kept_in, database) as place:
@@ -207,19 +208,14 @@ def _check_asked(data_set: DataSet, lacking: Mapping[str, object]) -> None:
 
 
 def _found(
-    data_set: DataSet,
-    model: Model | None,
-    twin: Twin | None,
-    withhold: Sequence[str],
-    seed: int,
-    announce: Announce,
+    data_set: DataSet, model: Model | None, twin: Twin | None, withhold: Sequence[str], seed: int
 ) -> tuple[DataSet, Diagnosis | Playing]:
     """Return the diagnosis, and the data set with the runs of a simulator, if any were made."""
     if model is not None and data_set.is_commanded:
-        return data_set, diagnose_by_playing(data_set, model, announce)
+        return data_set, diagnose_by_playing(data_set, model)
     if model is not None:
-        data_set = with_simulated_runs(data_set, model, announce)
-    found = gap.diagnose(data_set, twin=twin, simulator=model, withhold=withhold, seed=seed, progress=announce)
+        data_set = with_simulated_runs(data_set, model)
+    found = gap.diagnose(data_set, twin=twin, simulator=model, withhold=withhold, seed=seed)
     return data_set, found
 
 

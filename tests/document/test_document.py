@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from tests import gap_cases
 
 from irtwin.document import form
-from irtwin.document.cause_ids import cause_ids
 from irtwin.document.curves import Curves
-from irtwin.document.document import Cause, Document, Gap, Location, Shrink, schema
+from irtwin.document.document import Cause, Document, Gap, Location, Shrink, cause_ids, schema
 from irtwin.document.experiment import Experiment
 from irtwin.errors import InputError
 

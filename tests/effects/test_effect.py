@@ -10,7 +10,7 @@ import rdflib
 from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects.catalogue import BASELINE, catalogue
-from irtwin.effects.effect import Predicted
+from irtwin.effects.effect import Coefficients, Predicted
 from irtwin.effects.local import LocalEffect
 from irtwin.effects.rigid_body import NAMES
 from irtwin.effects.stack import Stack
@@ -101,7 +101,7 @@ def units(effect, robot):
     known |= {("viscous_friction", j, "Fv"): 1.0 for j in robot.joint_names}
     known |= {("rotor_inertia", j, "Ia"): 1.0 for j in robot.joint_names}
     known |= {("copper_loss", j, "R"): 1.0 for j in robot.joint_names}
-    found = effect.parameters(robot, np.ones(len(terms)), np.eye(len(terms)), known) if terms else ()
+    found = effect.parameters(robot, Coefficients(np.ones(len(terms)), np.eye(len(terms)), known)) if terms else ()
     return {each.name.partition("_")[0]: each.unit.replace("N m", "Nm") for each in found}
 
 

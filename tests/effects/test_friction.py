@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.synthetic import arm, swing
 
+from irtwin.effects.effect import Coefficients
 from irtwin.effects.friction import ChangedFrictionWithTemperature, StribeckFriction, TemperatureDependentFriction
 
 ROBOT = arm(2)
@@ -26,7 +27,7 @@ def test_a_change_may_be_equal_to_the_former_friction_at_any_temperature(equal_a
     thins = FV * WARM.dq[:, 1] * (np.exp(-CHANGE.k * (WARM.temperature[:, 1] - equal_at)) - 1)
     np.testing.assert_allclose(CHANGE.contribution(ROBOT, WARM, values)[:, 1], thins, atol=1e-9 * other)
     assert not CHANGE.contribution(ROBOT, WARM, values)[:, 0].any()
-    (k,) = CHANGE.parameters(ROBOT, values, np.zeros((2, 2)), {("viscous_friction", "joint_2", "Fv"): FV})
+    (k,) = CHANGE.parameters(ROBOT, Coefficients(values, np.zeros((2, 2)), {("viscous_friction", "joint_2", "Fv"): FV}))
     assert (k.name, k.value) == ("k", pytest.approx(CHANGE.k))
 
 

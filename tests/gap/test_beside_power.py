@@ -13,8 +13,7 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.beside_power import find_beside_power
-from irtwin.gap.isolation.estimates import estimate_of
-from irtwin.gap.isolation.finding import find
+from irtwin.gap.isolation.finding import estimate_of, find
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.thresholds import DEFAULT

@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.isolation.branches import branches, joined
 from irtwin.gap.isolation.closing import Closing
+from irtwin.gap.isolation.finding import branches, joined
 
 
 def cause(effect, *joints, scope="missing"):

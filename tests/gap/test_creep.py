@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from irtwin.gap.repeats.creep import creep
 from irtwin.gap.repeats.series import Series
+from irtwin.gap.repeats.slow import creep
 
 TIME = np.arange(1000) / 100
 COPPER = 1 + np.sin(2.2 * TIME) ** 2

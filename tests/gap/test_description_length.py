@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from irtwin.gap.repeats.description_length import saved
+from irtwin.gap.repeats.switching import saved
 
 
 def test_white_noise_is_worth_its_likelihood():

@@ -12,8 +12,7 @@ from tests.synthetic import arm, as_run, swing
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.isolation.explained import Explained as ExplainedPower
-from irtwin.gap.isolation.explained import ExplainedTorque
-from irtwin.gap.isolation.floor_left import floor_left
+from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(1)

@@ -12,10 +12,9 @@ from tests.synthetic import arm, rigid_torque, swing
 from irtwin.effects.transmission import JointCoupling
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.localisation.channel_residuals import ChannelResidual
-from irtwin.gap.localisation.excess_map import heat_map, joint_maps, level_of, robot_maps
+from irtwin.gap.localisation.excess_map import JOINT_REGIMES, heat_map, joint_maps, level_of, robot_maps
 from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import followed
-from irtwin.gap.localisation.regimes import JOINT_REGIMES
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import MISSING, Variant
 from irtwin.gap.regression.residuals import Trace
@@ -95,9 +94,9 @@ def test_a_gap_has_its_joint_and_regime(function, regimes):
     assert first.joint == "joint_2"
     assert first.regime in regimes
     assert first.concentration > 1
-    assert first.q < 0.05
-    assert first.share_interval[0] <= first.share <= first.share_interval[1]
-    assert 0 < first.excess_interval[0] <= first.excess <= first.excess_interval[1]
+    assert first.false_discovery_rate < 0.05
+    assert first.share_interval95[0] <= first.share <= first.share_interval95[1]
+    assert 0 < first.excess_interval95[0] <= first.excess <= first.excess_interval95[1]
 
 
 def test_a_gap_in_one_run_of_many_is_not_sure():
@@ -116,7 +115,7 @@ def test_a_cause_of_which_no_place_is_sure_has_those_to_which_it_adds():
     places = locate("torque", JOINTS, [None] * 3, seen, level, acting=acting, acts=acts)
     assert {place.joint for place in places} == {"joint_2"}
     assert places[0].regime in {"accelerating", "braking", "reversal"}
-    assert all(place.q > 0.05 for place in places)
+    assert all(place.false_discovery_rate > 0.05 for place in places)
 
 
 def test_the_joint_that_leaves_the_gap_open_is_named_though_no_place_of_it_is_sure():

@@ -33,7 +33,8 @@ def lines():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(progress, "_EVERY", 0.0)
         said: list[str] = []
-        diagnose(data_set(runs(robot=ROBOT), ROBOT, WITH_LOSS), withhold=["coulomb_friction"], progress=said.append)
+        with progress.telling(said.append):
+            diagnose(data_set(runs(robot=ROBOT), ROBOT, WITH_LOSS), withhold=["coulomb_friction"])
     return said
 
 

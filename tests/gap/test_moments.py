@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.gap.regression import moments as module
-from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, numbers, summed
+from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, Summed, numbers
 
 COLUMNS = 9  # and the measurement
 WEIGHTS = np.array([2.0, 0.5, 3.0])
@@ -48,8 +48,8 @@ def test_they_are_the_products_of_all_columns(count, used, seed):
     shifted[-1, :-1] -= less[:-1]
     for found, expected in (
         (one, first),
-        (summed([one, other]), first + second),
-        (summed([one, other]) - one, second),
+        (Summed([one, other]), first + second),
+        (Summed([one, other]) - one, second),
         (Shifted(one, less), shifted),
     ):
         np.testing.assert_allclose(found.whole, expected, atol=1e-9)

@@ -13,10 +13,9 @@ from irtwin.document.form import to_json
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
-from irtwin.gap.experiment.next_experiment import Proposal, next_experiment
-from irtwin.gap.experiment.planned_equations import PlannedEquations
+from irtwin.gap.experiment.next_experiment import curve, next_experiment
+from irtwin.gap.experiment.planned_equations import PlannedEquations, fitted, projected, unimitated
 from irtwin.gap.experiment.programmes import programmes
-from irtwin.gap.experiment.separation import fitted, projected, unimitated
 from irtwin.gap.isolation.apart import Apart
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.finding import Finding
@@ -25,7 +24,7 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.estimators import Estimate
 from irtwin.identification.motion_limits import JointLimits
@@ -53,6 +52,10 @@ def stribeck(motion):
     return torque
 
 
+def alone(motions):
+    return Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
+
+
 def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
     """The finding that an effect is missing on joint_2, beside rivals, which closes a part of the gap."""
     stack = Stack(ROBOT, BASELINE)
@@ -62,7 +65,7 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
         values = np.array([term.expected for _, term in stack.torque_terms])
         return stack.real_torque(motion, values)
 
-    grouping = Grouping({m.run: m.run for m in motions}, frozenset(m.run for m in motions))
+    grouping = alone(motions)
     system = torque_system(stack, motions, grouping, effects, lambda motion: Predicted(predicted(motion)))
     found = tuple(hypotheses(system.columns, system.base, MISSING))
     noise = np.full(2, NOISE)
@@ -78,7 +81,11 @@ def ground_of(motions, tried, cause=None, rivals=(), part=1.0):
     apart = Apart.of(system, system, [one.columns for one in causes])
     finding = Finding("torque", ROBOT.joint_names, observed, system, attribution, apart, judged, judged, None, nothing)
     vars(finding)["closed_squares"] = closed
-    return PlannedEquations(finding, stack, lambda motion: Predicted(predicted(motion)), DEFAULT)
+
+    def planned(some, effects):
+        return torque_system(stack, some, alone(some), effects, lambda motion: Predicted(predicted(motion)))
+
+    return PlannedEquations(finding, ROBOT, planned, DEFAULT)
 
 
 @pytest.fixture(scope="module")
@@ -118,17 +125,17 @@ def test_joints_that_are_not_asked_for_stand_still(motions):
 
 def test_a_page_draws_the_joints_that_move(motions):
     ladder = next(iter(programmes(ROBOT, ["joint_2"], motions)))
-    proposal = Proposal("tell", (), ladder.joints, ROBOT, ladder, (), (), (), None, 5.0)
-    assert proposal.curve.joints == ("joint_2",)
-    assert len(proposal.curve.q) == 1
-    assert np.ptp(proposal.curve.q[0]) > 0
-    assert [line["name"] for line in experiment(proposal.curve)["data"]] == ["joint_2"]
+    drawn = curve(ROBOT, ladder)
+    assert drawn.joints == ("joint_2",)
+    assert len(drawn.q) == 1
+    assert np.ptp(drawn.q[0]) > 0
+    assert [line["name"] for line in experiment(drawn)["data"]] == ["joint_2"]
 
 
 def test_positions_of_sliding_joints_are_in_metres(motions):
     gantry = arm(2, slides=(1,))
     both = next(iter(programmes(gantry, [], motions)))
-    drawn = Proposal("tell", (), both.joints, gantry, both, (), (), (), None, 5.0).curve
+    drawn = curve(gantry, both)
     assert drawn.units == ("rad", "m")
     assert experiment(drawn)["layout"]["yaxis"]["title"]["text"] == "position, rad or m"
     assert "m/s" in next(iter(programmes(gantry, ["joint_2"], motions))).text
@@ -185,7 +192,7 @@ def test_the_separation_expected_is_the_one_that_comes(motions):
     made = [measure(ROBOT, m, noise=NOISE, seed=50 + k) for k, m in enumerate(planned)]
     made = [replace(m, torque=m.torque + stribeck(m)) for m in made]
     again = ground_of([*motions, *made], ["stribeck_friction", "nonlinear_viscous_friction"]).finding.system
-    total = projected(summed(again.moments(np.full(2, NOISE))).whole, [*range(again.base)])
+    total = projected(Summed(again.moments(np.full(2, NOISE))).whole, [*range(again.base)])
     shapes = {
         one.effect: [list(v.columns) for v in one.variants]
         for one in channel.finding.attribution.hypotheses
@@ -208,7 +215,7 @@ def test_of_two_names_for_one_thing_none_is_told(motions):
     channel = ground_of(motions, ["cable_drag", "payload"], "cable_drag", ["cable_drag"])
     proposal = next_experiment(ROBOT, [channel], [], motions, DEFAULT.matters.apart)
     assert proposal.programme is None
-    assert "cannot be told apart" in proposal.note
+    assert "cannot be told apart" in proposal.experiment.note
     assert proposal.experiment.expected_separation is None
 
 

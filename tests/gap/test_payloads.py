@@ -12,7 +12,6 @@ from irtwin.effects.load import Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
-from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.payloads import untold_payload
 from irtwin.identification import progress
 
@@ -20,7 +19,7 @@ ROBOT = arm(4)
 LOAD = np.array([0.6, 0.0, 0.02, 0.05, 0, 0, 0, 0, 0, 0])
 
 
-def search(loaded, observed=range(8), tell=None):
+def search(loaded, observed=range(8)):
     motions = []
     for seed in range(8):
         motion = replace(swing(ROBOT, seed, seconds=6.0, rate=50.0), run=f"run_{seed}")
@@ -29,7 +28,7 @@ def search(loaded, observed=range(8), tell=None):
         motions.append(replace(shown, torque=shown.torque + extra))
     grouping = Grouping({m.run: m.run for m in motions}, frozenset(f"run_{seed}" for seed in observed))
     system = torque_system(Stack(ROBOT, BASELINE), motions, grouping, (), None)
-    return untold_payload(ROBOT, system, noise_before(system), tell)
+    return untold_payload(ROBOT, system, system.noise_before)
 
 
 def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():
@@ -40,7 +39,8 @@ def test_the_runs_that_carry_a_payload_are_told_from_those_that_do_not():
 def test_the_search_says_how_far_it_has_come(monkeypatch):
     monkeypatch.setattr(progress, "_EVERY", 0.0)
     lines = []
-    search((1, 4, 5), tell=lines.append)
+    with progress.telling(lines.append):
+        search((1, 4, 5))
     assert "  payloads in run_7" in lines
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from irtwin.gap.localisation.regimes import (
+from irtwin.gap.localisation.excess_map import (
     JOINT_PARTS,
     JOINT_REGIMES,
     ROBOT_PARTS,

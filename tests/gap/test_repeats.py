@@ -12,10 +12,9 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.regression.correlation import correlation_samples
 from irtwin.gap.repeats.disturbances import disturbances
 from irtwin.gap.repeats.lines import lines
-from irtwin.gap.repeats.series import Series
+from irtwin.gap.repeats.series import Series, correlation_samples
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(3)

@@ -11,7 +11,7 @@ from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.effects.catalogue import EXCITED, catalogue
 from irtwin.effects.stack import Stack
-from irtwin.gap.data.shaken import shaken
+from irtwin.gap.data.noise_floor import shaken
 from irtwin.gap.isolation.structure_search import attribute
 from irtwin.gap.regression.channel_equations import torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut

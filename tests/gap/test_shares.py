@@ -9,13 +9,12 @@ import pytest
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
-from irtwin.gap.isolation.apart import Apart
+from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, Column, Variant
-from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 400, 5
@@ -96,6 +95,6 @@ def test_where_nothing_is_closed_nothing_is_shared():
 def test_what_each_closes_adds_up_to_what_all_close():
     system, attribution = system_of([[1.0, 0.0], [0.6, 0.8]], [1.0, 2.0])
     chosen = [k for cause in attribution.causes for k in cause.columns]
-    judged = held_out(system, noise_before(system), attribution.noise, chosen)
+    judged = held_out(system, system.noise_before, attribution.noise, chosen)
     closed = closed_squares(apart(system, attribution), seed=0)
     assert closed.sum(axis=0) == pytest.approx(judged.before - judged.after)

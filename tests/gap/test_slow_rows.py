@@ -15,12 +15,11 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.isolation.apart import Apart
-from irtwin.gap.isolation.shares import closed_squares
+from irtwin.gap.isolation.apart import Apart, closed_squares
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.held_out import left_out
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.signals.filter import low_pass
 from irtwin.signals.log import Run, read_data_set
@@ -82,7 +81,7 @@ def test_rows_that_stand_apart_say_together_what_they_said() -> None:
     system = reduced(noise=0.0)
     apart = system.by_speed
     noise = np.array([0.05, 0.08])
-    whole, parts = summed(system.moments(noise)).whole, summed(apart.moments(np.tile(noise, 2))).whole
+    whole, parts = Summed(system.moments(noise)).whole, Summed(apart.moments(np.tile(noise, 2))).whole
     np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
     np.testing.assert_array_equal(apart.rows[:, :2] + apart.rows[:, 2:], system.rows)
     assert np.all(apart.rows > 0)

@@ -7,13 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from irtwin.gap.isolation import spread as module
-from irtwin.gap.isolation.spread import spread
-
-
-@pytest.fixture(autouse=True)
-def _noise(monkeypatch):
-    monkeypatch.setattr(module, "noise_before", lambda system: np.ones(len(system.of_group[0])))
+from irtwin.gap.isolation.apart import spread
 
 
 def system(*squares, observed=1):
@@ -24,7 +18,10 @@ def system(*squares, observed=1):
         return np.sqrt(of_group[list(of)].mean(axis=0))
 
     seen = np.arange(len(of_group)) >= len(of_group) - observed
-    return SimpleNamespace(group_observed=seen, of_group=of_group, rms=rms, halves=(slice(of_group.shape[1]),))
+    noise = np.ones(len(of_group[0]))
+    return SimpleNamespace(
+        noise_before=noise, group_observed=seen, of_group=of_group, rms=rms, halves=(slice(of_group.shape[1]),)
+    )
 
 
 def test_runs_that_are_alike_leave_nothing_over_one_another():

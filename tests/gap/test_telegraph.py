@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from irtwin.gap.repeats.series import Series
-from irtwin.gap.repeats.telegraph import two_levels
+from irtwin.gap.repeats.switching import two_levels
 
 TIME = np.arange(1000) / 125
 

@@ -14,11 +14,11 @@ from irtwin.effects.load import ExternalContact, Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
-from irtwin.gap.regression.moments import summed
-from irtwin.gap.regression.normal_equations import noise_before, twin_values
+from irtwin.gap.regression.moments import Summed
+from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.remainder import remainders
-from irtwin.gap.screening.together import each_beside_the_other
+from irtwin.gap.screening.screen import each_beside_the_other
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(4)
@@ -43,8 +43,8 @@ def screened(loaded, touched, still=()):
     case = SimpleNamespace(robot=ROBOT, with_torque=motions, observed=names, grouping=grouping, thresholds=DEFAULT)
     stack = Stack(ROBOT, BASELINE)
     system = torque_system(stack, motions, grouping, (), None)
-    noise = noise_before(system)
-    left = remainders(case, stack, twin_values(system, system.solution((), summed(system.moments(noise)))))
+    noise = system.noise_before
+    left = remainders(case, stack, twin_values(system, system.solution((), Summed(system.moments(noise)))))
     return [
         (type(one), one.runs) for one in each_beside_the_other(case, stack, system, noise, contact(ROBOT, left, noise))
     ]

@@ -12,7 +12,7 @@ from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.isolation.quantities import quantities
+from irtwin.gap.isolation.finding import quantities
 from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.robot.kinematics import flange

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from irtwin.identification.descent import descend
+from irtwin.identification.excitation import descend
 
 
 def rosenbrock(x: np.ndarray) -> tuple[float, np.ndarray]:

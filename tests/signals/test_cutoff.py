@@ -9,7 +9,7 @@ import pytest
 
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
-from irtwin.signals.cutoff import checked_cutoff
+from irtwin.signals.sampling import checked_cutoff
 
 
 def logged(seconds: float, rate: float) -> Signals:

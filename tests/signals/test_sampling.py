@@ -14,12 +14,12 @@ from tests.data_sets import write
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
-from irtwin.gap.predict import predict
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import Run, read_data_set
 from irtwin.signals.sampling import as_sampled, interval
 from irtwin.twin.identify import identify
+from irtwin.twin.predict import predict
 
 ROBOT = arm(2)
 FILE = Path("runs/a.csv")

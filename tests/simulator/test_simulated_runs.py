@@ -8,8 +8,7 @@ from tests import data_sets, mujoco_models, synthetic
 
 from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
-from irtwin.simulator.model import read_model
-from irtwin.simulator.simulated_runs import with_simulated_runs
+from irtwin.simulator.model import read_model, with_simulated_runs
 
 ROBOT = synthetic.arm(3)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +19,7 @@ _EXACT = 0.01  # of a torque's deviation: less is left in simulated logs alone, 
 
 @dataclass(frozen=True)
 class Rows:
-    """N samples of a robot of n joints over all runs: motion and torque, each (N, n); time (N,) in its run, s.
+    """N samples of a robot of n joints over all runs: motion and torque, each (N, n).
 
     `tilt`: by which vector (3,), rad, its base is turned from where the URDF has it.
     """
@@ -29,14 +29,7 @@ class Rows:
     dq: np.ndarray
     ddq: np.ndarray
     torque: np.ndarray
-    time: np.ndarray
     tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def changed(self, factors: np.ndarray, order: np.ndarray | None = None) -> Rows:
-        """Return them with the positions of each joint times a factor (n,), then in another order (n,)."""
-        order = np.arange(len(factors)) if order is None else order
-        q, dq, ddq = ((values * factors)[:, order] for values in (self.q, self.dq, self.ddq))
-        return replace(self, q=q, dq=dq, ddq=ddq)
 
     def nominal(self) -> np.ndarray:
         """Return the torque by the URDF's bodies, (N, n)."""
@@ -99,7 +92,7 @@ def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torq
             if motion.torque is not None
         ]
     )
-    return Rows(robot, q, dq, ddq, torque, np.concatenate([motion.time[::step] for motion in motions]))
+    return Rows(robot, q, dq, ddq, torque)
 
 
 def _alike(motions: list[Motion]) -> list[Motion]:

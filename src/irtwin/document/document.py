@@ -8,7 +8,7 @@ robot's positions have beyond the simulator's. What a field is in database and g
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -478,3 +478,26 @@ def schema() -> dict[str, Any]:
     """Return the JSON Schema of a diagnosis: that of `diagnosis.schema.json`, with all that is said beside it."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Diagnosis of a sim-to-real gap"}
     return head | form.schema(Document)
+
+
+def cause_ids(causes: Iterable[tuple[str, Sequence[str]]], joints: Sequence[str]) -> list[str]:
+    """Return an id for each cause, given as its effect and its joints; `joints`: all of the robot, in order.
+
+    "coulomb_friction@joint_2", "backlash@joint_1+joint_3", "payload" of the whole robot, "copper_loss@all" of every
+    joint of several. The second of the same gets "#2".
+    """
+    found: list[str] = []
+    for effect, on in causes:
+        name = effect + (f"@{_named(on, joints)}" if on else "")
+        one, count = name, 1
+        while one in found:
+            count += 1
+            one = f"{name}#{count}"
+        found.append(one)
+    return found
+
+
+def _named(on: Sequence[str], joints: Sequence[str]) -> str:
+    if len(joints) > 1 and set(on) == set(joints):
+        return "all"
+    return "+".join(sorted(on, key=joints.index))

@@ -19,7 +19,12 @@ Json = dict[str, Any]
 Part = TypeVar("Part")
 
 _GOES_WITH = "goes_with"
+_MEND = "write the diagnosis again with `irtwin diagnose`"
 _TYPES = {str: "string", float: "number", bool: "boolean"}
+
+
+class _Wrong(Exception):
+    """A value is not what it must be."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,7 @@ class Between:
         return base | {"minimum": self.low, "maximum": self.high}
 
     def check(self, value: float, where: str) -> None:
-        """Raise InputError where the value is outside."""
+        """Raise where the value is outside."""
         _check(self.low <= value <= self.high, where, f"from {self.low} to {self.high}")
 
 
@@ -52,7 +57,7 @@ class OneOf:
         return {"enum": list(self.values)}
 
     def check(self, value: str, where: str) -> None:
-        """Raise InputError where the value is another."""
+        """Raise where the value is another."""
         _check(value in self.values, where, f"one of {', '.join(self.values)}")
 
 
@@ -70,12 +75,16 @@ def to_json(value: Any) -> Any:
     return [to_json(one) for one in value] if isinstance(value, tuple | list) else value
 
 
-def from_json(kind: type[Part], given: object, where: str) -> Part:
+def from_json(kind: type[Part], given: object, where: str, mend: str = _MEND) -> Part:
     """Return the part that JSON says; keys beside its own are passed over.
 
-    `where`: what an error calls it. Raises InputError where a key is missing, or a value is of another type.
+    `where`: what an error calls it, `mend`: what it says to do. Raises InputError where a key is missing, or a value is
+    of another type.
     """
-    read: Part = _read(kind, given, where)
+    try:
+        read: Part = _read(kind, given, where)
+    except _Wrong as error:
+        raise InputError(f"{error}; {mend}") from error
     return read
 
 
@@ -179,4 +188,4 @@ def _read_part(kind: Any, given: Any, where: str) -> Any:
 
 def _check(holds: bool, where: str, what: str) -> None:
     if not holds:
-        raise InputError(f"{where} must be {what}; write the diagnosis again with `irtwin diagnose`")
+        raise _Wrong(f"{where} must be {what}")

@@ -10,9 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.effects.effect import (
+    NORMAL,
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Possible,
     Predicted,
     Quantity,
@@ -197,7 +198,6 @@ def _free(load: np.ndarray, q: np.ndarray, dq: np.ndarray, rate: float, gap: flo
 class _Compliance(JointEffect):
     """What both share: a swing that the predicted load drives and that has died away after two seconds."""
 
-    channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
@@ -280,14 +280,12 @@ class Backlash(_Compliance):
         passed = self._among(predicted, key, self.b, tried, lambda gaps: _passed_about(load, inertia, motion, gaps))
         return (_at(acting, motion, passed - load),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return b. The torque lost grows as b^(2/3), or as b^2 for the form `by_way`; the coefficient scales it."""
         power = 0.5 if self.by_way else 1.5
         return tuple(
             quantity("b", joint.name, value, joint.unit, deviation, lambda lost: self.b * max(lost, 0.0) ** power)
-            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
+            for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True)
         )
 
 
@@ -332,17 +330,15 @@ class JointElasticity(_Compliance):
         )
         return (_at(acting, motion, passed - load),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return K; nothing where the rotor's inertia is needed and not known."""
         found = []
         stiffness = (2 * np.pi * self.antiresonance) ** 2 * _mean_inertia(robot)
-        for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True):
-            rotor = (known or {}).get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
+        for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
+            rotor = given.known.get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
             top = rotor if self.antiresonance == 0 else float(stiffness[robot.index(joint.name)])
             if top and value > 0:
-                sure = value - 1.96 * deviation > 0  # else K has no upper end
+                sure = value - NORMAL * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
                 found.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, force_unit, quantity, size
+from irtwin.effects.effect import Coefficients, Effect, JointEffect, Predicted, Quantity, Term, force_unit, quantity
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -20,7 +20,6 @@ class PeriodicDisturbance(JointEffect):
     family: ClassVar[str] = "environment"
     disturbance: ClassVar[str | None] = "line"
     manual_test: ClassVar[str | None] = "holding one pose for a minute, twice, with pumps and fans around on, then off"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"f": (0.3, 500.0)}
 
     f: float = 1.0  # Hz
@@ -34,14 +33,12 @@ class PeriodicDisturbance(JointEffect):
         angle = np.broadcast_to(2 * np.pi * self.f * motion.time[:, None], motion.dq.shape)
         return np.cos(angle), np.sin(angle)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return frequency and amplitude."""
         found = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(2 * place, 2 * place + 2)
-            amplitude, deviation = size(values[own], covariance[own, own])
+            amplitude, deviation = given.size(own)
             found.append(quantity("f", joint.name, self.f, "Hz"))
             found.append(quantity("A", joint.name, amplitude, force_unit(joint), deviation))
         return tuple(found)
@@ -71,9 +68,7 @@ class SwitchingLoad(Effect):
         """Return (N, 1) one while on."""
         return (((motion.time - self.start) / self.period % 1 < self.duty).astype(float))[:, None]
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return P, the share of time that it is on, and the period."""
         shape = (quantity("duty", None, self.duty, "1"), quantity("period", None, self.period, "s"))
-        return (*super().parameters(robot, values, covariance, known), *shape)
+        return (*super().parameters(robot, given), *shape)

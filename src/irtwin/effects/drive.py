@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from irtwin.effects.effect import (
+    Coefficients,
     JointEffect,
-    Known,
     Possible,
     Predicted,
     Quantity,
@@ -43,7 +43,6 @@ class RotorInertia(JointEffect):
 
     id: ClassVar[str] = "rotor_inertia"
     family: ClassVar[str] = "bodies"
-    channel: ClassVar[str] = "torque"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Ia": "armature"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -118,14 +117,12 @@ class WindingTemperature(JointEffect):
         """Return how warm a winding gets."""
         return {"T": Possible(0.0, _WARMEST, "a winding that is warmer has burnt")}
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return T, the rise, relative to the joint's R; nothing where that is not known."""
         return tuple(
             quantity("T", joint.name, ratio(value, copper), "K", ratio(deviation, copper))
-            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
-            for copper in [(known or {}).get(("copper_loss", joint.name, "R"), joint.winding_resistance)]
+            for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True)
+            for copper in [given.known.get(("copper_loss", joint.name, "R"), joint.winding_resistance)]
             if copper
         )
 

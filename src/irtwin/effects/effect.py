@@ -16,7 +16,7 @@ from irtwin.signals.motion import Motion
 Known = Mapping[tuple[str, str | None, str], float]
 """Coefficients of other effects: (effect, joint, name) -> value."""
 
-_NORMAL = 1.96  # standard deviations in half a 95 % interval
+NORMAL = 1.959963984540054  # standard deviations in half a 95 % interval of what is normal
 _REFERENCE = 1e-12  # below, a coefficient is none
 
 
@@ -113,6 +113,27 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Coefficients:
+    """An effect's coefficients, `values` (k,), with their `covariance` (k, k), and those of other effects: `known`."""
+
+    values: np.ndarray
+    covariance: np.ndarray
+    known: Known = field(default_factory=dict)
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """(k,) standard deviations."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def size(self, own: slice = slice(None)) -> tuple[float, float]:
+        """Return the length of the vector of some of them, and its standard deviation."""
+        values, covariance = self.values[own], self.covariance[own, own]
+        length = float(np.linalg.norm(values))
+        along = values / length if length > 0 else np.full(len(values), len(values) ** -0.5)
+        return length, float(np.sqrt(along @ covariance @ along))
+
+
+@dataclass(frozen=True)
 class Effect(ABC):
     """What adds `columns @ (coefficients + shift)` to the torque or power that it shows in.
 
@@ -139,7 +160,7 @@ class Effect(ABC):
     """
 
     id: ClassVar[str]
-    channel: ClassVar[str]
+    channel: ClassVar[str] = "torque"
     signal: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = None
     stage: ClassVar[int] = 0
@@ -204,17 +225,11 @@ class Effect(ABC):
         """Return the shape that a change has in a twin where it stays."""
         return self
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
-        """Return the catalogue's parameters that (k,) coefficients and their (k, k) covariance say.
-
-        `known`: coefficients of other effects, for parameters that are relative to one.
-        """
-        deviations = np.sqrt(np.diag(covariance))
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
+        """Return the catalogue's parameters that coefficients say; some are relative to one of another effect."""
         return tuple(
             quantity(term.name, term.joint, value, term.unit, deviation)
-            for term, value, deviation in zip(self.terms(robot), values, deviations, strict=True)
+            for term, value, deviation in zip(self.terms(robot), given.values, given.deviations, strict=True)
         )
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
@@ -301,7 +316,7 @@ def quantity(
     """Return `convert` (monotone) of a value and of the ends of its interval; no interval where one end has none."""
     ends: list[float] = []
     if deviation is not None and np.isfinite(deviation):
-        ends = sorted(convert(float(value + side * _NORMAL * deviation)) for side in (-1, 1))
+        ends = sorted(convert(float(value + side * NORMAL * deviation)) for side in (-1, 1))
     if not ends or not np.all(np.isfinite(ends)):
         return Quantity(name, joint, convert(float(value)), unit)
     return Quantity(name, joint, convert(float(value)), unit, ends[0], ends[1])
@@ -310,13 +325,6 @@ def quantity(
 def ratio(numerator: float, denominator: float | None) -> float:
     """Return the quotient; NaN where the denominator is unknown or nothing."""
     return numerator / denominator if denominator is not None and abs(denominator) > _REFERENCE else float("nan")
-
-
-def size(values: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
-    """Return the length of a vector of coefficients, and its standard deviation."""
-    length = float(np.linalg.norm(values))
-    along = values / length if length > 0 else np.full(len(values), len(values) ** -0.5)
-    return length, float(np.sqrt(along @ covariance @ along))
 
 
 def force_unit(joint: Joint) -> str:

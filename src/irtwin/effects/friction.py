@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from irtwin.effects.effect import (
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Possible,
     Predicted,
     Quantity,
@@ -25,6 +25,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.motion import Motion
 
+SLOW = 0.02  # rad/s, across which friction surely changes its sign, whatever its law
 _SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
 _TURNED = 2.0  # widths, where most of a turn is over
 _OVER = 3.0  # widths, where a turn is over
@@ -69,7 +70,6 @@ class CoulombFriction(JointEffect):
 
     id: ClassVar[str] = "coulomb_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Fc": "frictionloss"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -92,7 +92,6 @@ class ViscousFriction(JointEffect):
 
     id: ClassVar[str] = "viscous_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Fv": "damping"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -110,7 +109,6 @@ class StribeckFriction(JointEffect):
 
     id: ClassVar[str] = "stribeck_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"vs": (0.005, 0.2), "d": (0.5, 2.0)}
 
     vs: float = 0.05  # rad/s
@@ -133,11 +131,9 @@ class StribeckFriction(JointEffect):
         """Return s exp(-(|dq|/vs)^d)."""
         return (direction(robot, motion.dq) * np.exp(-((np.abs(motion.dq) / self.vs) ** self.d)),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fs, vs and d."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         shapes = [
             shape
             for joint in self.acting(robot)
@@ -155,7 +151,6 @@ class NonlinearViscousFriction(JointEffect):
 
     id: ClassVar[str] = "nonlinear_viscous_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (0.2, 3.0)}
 
     d: float = 2.0
@@ -172,11 +167,9 @@ class NonlinearViscousFriction(JointEffect):
         """Return s |dq|^d."""
         return (direction(robot, motion.dq) * np.abs(motion.dq) ** self.d,)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k and d."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         return (*found, *(Quantity("d", joint.name, self.d, "1") for joint in self.acting(robot)))
 
 
@@ -186,7 +179,6 @@ class AsymmetricFriction(JointEffect):
 
     id: ClassVar[str] = "asymmetric_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return a and b."""
@@ -204,7 +196,6 @@ class LoadDependentFriction(JointEffect):
 
     id: ClassVar[str] = "load_dependent_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
 
@@ -239,7 +230,6 @@ class TemperatureDependentFriction(JointEffect):
     family: ClassVar[str] = "friction"
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
     manual_test: ClassVar[str | None] = "log joint temperatures, from a cold start"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
 
     k: float = 0.02  # 1/K
@@ -263,13 +253,11 @@ class TemperatureDependentFriction(JointEffect):
             return (np.zeros_like(motion.dq),)
         return (motion.dq * np.expm1(-self.k * (motion.temperature - self.T0)) / self.k,)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, relative to the joint's Fv; the shape's k where Fv is not known."""
         found = []
-        for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True):
-            viscous = (known or {}).get(("viscous_friction", joint.name, "Fv"))
+        for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
+            viscous = given.known.get(("viscous_friction", joint.name, "Fv"))
             part = (ratio(value, viscous), ratio(deviation, viscous)) if viscous else (self.k, None)
             found.append(quantity("k", joint.name, part[0], "1/K", part[1]))
         return tuple(found)
@@ -299,12 +287,11 @@ class ChangedFrictionWithTemperature(TemperatureDependentFriction):
         (thinning,) = super().samples(robot, motion, predicted)
         return (thinning, np.zeros_like(motion.dq) if motion.temperature is None else motion.dq)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, relative to the joint's former Fv: (k (Fv + dFv) - k dFv)/Fv."""
         thinning = np.kron(np.eye(len(self.acting(robot))), [1.0, -self.k])
-        return super().parameters(robot, thinning @ values, thinning @ covariance @ thinning.T, known)
+        former = Coefficients(thinning @ given.values, thinning @ given.covariance @ thinning.T, given.known)
+        return super().parameters(robot, former)
 
 
 @dataclass(frozen=True)
@@ -316,7 +303,6 @@ class PreslidingHysteresis(JointEffect):
 
     id: ClassVar[str] = "presliding_hysteresis"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     memory: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (1e-4, 0.2)}
 
@@ -350,9 +336,7 @@ class PreslidingHysteresis(JointEffect):
             left = lag[stop - 1]
         return lag
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return d."""
         return tuple(Quantity("d", joint.name, self.d, joint.unit) for joint in self.acting(robot))
 
@@ -363,7 +347,6 @@ class PositionDependentFriction(JointEffect):
 
     id: ClassVar[str] = "position_dependent_friction"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fc a and Fc b."""
@@ -375,15 +358,13 @@ class PositionDependentFriction(JointEffect):
         signs = direction(robot, motion.dq)
         return signs * np.cos(motion.q), signs * np.sin(motion.q)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return a and b, relative to the joint's Fc; nothing where that is not known."""
-        deviations = np.sqrt(np.diag(covariance))
+        deviations = given.deviations
         found = []
         for place, joint in enumerate(self.acting(robot)):
-            dry = (known or {}).get(("coulomb_friction", joint.name, "Fc"))
+            dry = given.known.get(("coulomb_friction", joint.name, "Fc"))
             for number, name in enumerate(("a", "b")) if dry else ():
                 at = 2 * place + number
-                found.append(quantity(name, joint.name, ratio(values[at], dry), "1", ratio(deviations[at], dry)))
+                found.append(quantity(name, joint.name, ratio(given.values[at], dry), "1", ratio(deviations[at], dry)))
         return tuple(found)

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.effects.effect import (
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Possible,
     Predicted,
     Quantity,
@@ -21,7 +21,6 @@ from irtwin.effects.effect import (
     force_unit,
     quantity,
     ratio,
-    size,
 )
 from irtwin.effects.rigid_body import flange_frame, inverse_dynamics, last_body_columns, model_of, to_body
 from irtwin.robot.body_regressor import point_jacobian
@@ -52,7 +51,6 @@ class CableDrag(JointEffect):
     id: ClassVar[str] = "cable_drag"
     family: ClassVar[str] = "load"
     taken_off: ClassVar[str | None] = "with the hose package off"
-    channel: ClassVar[str] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k."""
@@ -73,7 +71,6 @@ class GravityCompensation(JointEffect):
 
     id: ClassVar[str] = "gravity_compensation"
     family: ClassVar[str] = "load"
-    channel: ClassVar[str] = "torque"
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the effect at the joint that makers balance: the first that gravity loads."""
@@ -88,17 +85,15 @@ class GravityCompensation(JointEffect):
         """Return cos q, sin q, cos 2 q, sin 2 q."""
         return np.cos(motion.q), np.sin(motion.q), np.cos(2 * motion.q), np.sin(2 * motion.q)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the largest torque over a turn."""
         waves = np.column_stack([np.cos(_TURN), np.sin(_TURN), np.cos(2 * _TURN), np.sin(2 * _TURN)])
         found = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(4 * place, 4 * place + 4)
-            torque = waves @ values[own]
+            torque = waves @ given.values[own]
             wave = waves[int(np.argmax(np.abs(torque)))]
-            deviation = float(np.sqrt(wave @ covariance[own, own] @ wave))
+            deviation = float(np.sqrt(wave @ given.covariance[own, own] @ wave))
             found.append(quantity("torque", joint.name, np.abs(torque).max(), force_unit(joint), deviation))
         return tuple(found)
 
@@ -111,7 +106,6 @@ class Payload(Effect):
     family: ClassVar[str] = "load"
     within_bodies: ClassVar[bool] = True
     taken_off: ClassVar[str | None] = "with the tool off"
-    channel: ClassVar[str] = "torque"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return mass, first moments and inertia in the flange frame."""
@@ -140,17 +134,15 @@ class Payload(Effect):
         near = Possible(-_FARTHEST, _FARTHEST, "a load's centre is within reach of its flange")
         return {"m": mass, **{f"c_{axis}": near for axis in "xyz"}}
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return m, and c where the mass is one."""
-        mass = float(values[0])
-        found = [quantity("m", None, mass, "kg", float(covariance[0, 0] ** 0.5))]
+        mass = float(given.values[0])
+        found = [quantity("m", None, mass, "kg", float(given.deviations[0]))]
         for number, axis in enumerate("xyz", start=1):
-            place = ratio(values[number], mass)
+            place = ratio(given.values[number], mass)
             if np.isfinite(place):
                 slope = np.array([-place, 1.0]) / mass
-                spread = covariance[np.ix_([0, number], [0, number])]
+                spread = given.covariance[np.ix_([0, number], [0, number])]
                 found.append(quantity(f"c_{axis}", None, place, "m", float(np.sqrt(slope @ spread @ slope))))
         return tuple(found)
 
@@ -161,7 +153,6 @@ class BaseTilt(Effect):
 
     id: ClassVar[str] = "base_tilt"
     family: ClassVar[str] = "environment"
-    channel: ClassVar[str] = "torque"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 1
 
@@ -180,13 +171,11 @@ class BaseTilt(Effect):
             columns[:, :, axis] = inverse_dynamics(model, still)
         return columns
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the angle between the base's axis and the plumb line, and its two parts."""
-        angle, deviation = size(values, covariance)
+        angle, deviation = given.size()
         whole = quantity("angle", None, angle, "rad", deviation)
-        return (whole, *super().parameters(robot, values, covariance, known))
+        return (whole, *super().parameters(robot, given))
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how far a base that was meant to stand upright may lean."""
@@ -204,7 +193,6 @@ class ExternalContact(Effect):
     family: ClassVar[str] = "environment"
     manual_test: ClassVar[str | None] = "the same motion with free space around the arm"
     taken_off: ClassVar[str | None] = "in free space"
-    channel: ClassVar[str] = "torque"
 
     start: float = -np.inf  # s
     stop: float = np.inf  # s
@@ -222,14 +210,12 @@ class ExternalContact(Effect):
             columns[during] = point_jacobian(robot.model, frame, motion.q[during])
         return columns
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the force, its three parts, and start and stop where it has them."""
-        length, deviation = size(values, covariance)
+        length, deviation = given.size()
         ends = (quantity(name, None, end, "s") for name, end in (("start", self.start), ("stop", self.stop)))
         return (
             quantity("f", None, length, "N", deviation),
-            *super().parameters(robot, values, covariance, known),
+            *super().parameters(robot, given),
             *(end for end in ends if np.isfinite(end.value)),
         )

@@ -9,7 +9,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Known, Possible, Predicted, Quantity, Stated, Term, force_unit
+from irtwin.effects.effect import (
+    Coefficients,
+    Effect,
+    JointEffect,
+    Possible,
+    Predicted,
+    Quantity,
+    Stated,
+    Term,
+    force_unit,
+)
 from irtwin.effects.friction import direction
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
@@ -64,11 +74,9 @@ class LocalEffect(JointEffect):
         """Return the law along the motion."""
         return (self.law(motion.q, direction(robot, motion.dq)),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the coefficient, the place, and what else is the shape's."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         shapes = [Quantity("q0", joint.name, self.q0, joint.unit) for joint in self.acting(robot)]
         return (*found, *shapes)
 
@@ -83,7 +91,6 @@ class LocalWear(LocalEffect):
 
     id: ClassVar[str] = "local_wear"
     family: ClassVar[str] = "friction"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"q0": (-2 * np.pi, 2 * np.pi), "w": (0.01, 1.0)}
 
     w: float = 0.1  # rad or m, where the bump has fallen to 37 %
@@ -109,11 +116,9 @@ class LocalWear(LocalEffect):
         """Return Fw."""
         return (Term("Fw", force_unit(joint), joint.name, spread=5.0),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fw, q0 and w."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         return (*found, *(Quantity("w", joint.name, self.w, joint.unit) for joint in self.acting(robot)))
 
 
@@ -128,7 +133,6 @@ class JointLimitSpring(LocalEffect):
     id: ClassVar[str] = "joint_limit_spring"
     family: ClassVar[str] = "load"
     taken_off: ClassVar[str | None] = "with the hose package off"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"q0": (-2 * np.pi, 2 * np.pi)}
 
     side: float = 1.0  # 1: it acts above q0; -1: below
@@ -153,11 +157,9 @@ class JointLimitSpring(LocalEffect):
         """Return k."""
         return (Term("k", f"{force_unit(joint)}/{joint.unit}", joint.name, spread=100.0, lowest=0.0),)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, q0 and the side."""
-        found = super().parameters(robot, values, covariance, known)
+        found = super().parameters(robot, given)
         return (*found, *(Quantity("side", joint.name, self.side, "1") for joint in self.acting(robot)))
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:

@@ -31,7 +31,6 @@ class RigidBody(Effect):
     id: ClassVar[str] = "rigid_body"
     family: ClassVar[str] = "bodies"
     bodies: ClassVar[bool] = True
-    channel: ClassVar[str] = "torque"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return ten terms per moving body, expected as in the URDF."""

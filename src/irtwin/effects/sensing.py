@@ -10,9 +10,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from irtwin.effects.effect import (
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Possible,
     Predicted,
     Quantity,
@@ -85,13 +85,11 @@ class TorqueConstantError(JointEffect):
         assert predicted is not None
         return (predicted.torque,)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return g."""
         return tuple(
             quantity("g", joint.name, value, "1", deviation, lambda excess: 1 + excess)
-            for joint, value, deviation in zip(self.acting(robot), values, np.sqrt(np.diag(covariance)), strict=True)
+            for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True)
         )
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
@@ -218,8 +216,6 @@ class MeterGain(Effect):
         """Return the range of a meter that is out of scale."""
         return {"g": Possible(*_GAINS, "beyond, the unit of power is wrong rather than its scale")}
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return g."""
-        return (quantity("g", None, values[0], "1", float(covariance[0, 0] ** 0.5), lambda excess: 1 + excess),)
+        return (quantity("g", None, given.values[0], "1", float(given.deviations[0]), lambda excess: 1 + excess),)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Known, Predicted, Quantity, Term, quantity
+from irtwin.effects.effect import Coefficients, Effect, JointEffect, Predicted, Quantity, Term, quantity
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -130,11 +130,9 @@ class NoRegeneration(Effect):
         assert predicted is not None and predicted.axes is not None
         return np.asarray(np.maximum(-predicted.axes, 0.0)[:, None])
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the share that goes back to the mains."""
-        return (quantity("returned", None, values[0], "1", float(covariance[0, 0] ** 0.5), lambda burnt: 1 - burnt),)
+        return (quantity("returned", None, given.values[0], "1", float(given.deviations[0]), lambda burnt: 1 - burnt),)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 from irtwin.effects.effect import (
+    Coefficients,
     Effect,
     JointEffect,
-    Known,
     Predicted,
     Quantity,
     Term,
     force_unit,
     inertia_unit,
     quantity,
-    size,
 )
 from irtwin.effects.friction import sharp_sign
 from irtwin.robot.description import Joint, Robot
@@ -32,7 +31,6 @@ class TorqueRipple(JointEffect):
 
     id: ClassVar[str] = "torque_ripple"
     family: ClassVar[str] = "transmission"
-    channel: ClassVar[str] = "torque"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"N": (1.0, 400.0)}
 
     N: float = 1.0  # per turn of the joint
@@ -57,14 +55,12 @@ class TorqueRipple(JointEffect):
         """Return sin N q and cos N q."""
         return np.sin(self.N * motion.q), np.cos(self.N * motion.q)
 
-    def parameters(
-        self, robot: Robot, values: np.ndarray, covariance: np.ndarray, known: Known | None = None
-    ) -> tuple[Quantity, ...]:
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return A and N."""
         found = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(2 * place, 2 * place + 2)
-            length, deviation = size(values[own], covariance[own, own])
+            length, deviation = given.size(own)
             found.append(quantity("A", joint.name, length, force_unit(joint), deviation))
             found.append(Quantity("N", joint.name, self.N, "1/rev"))
         return tuple(found)
@@ -79,7 +75,6 @@ class JointCoupling(Effect):
 
     id: ClassVar[str] = "joint_coupling"
     family: ClassVar[str] = "transmission"
-    channel: ClassVar[str] = "torque"
 
     def pair(self, robot: Robot) -> tuple[Joint, ...]:
         """Return the two joints; none on a robot of one."""

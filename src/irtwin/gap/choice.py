@@ -20,13 +20,11 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.held_out import left_out
 from irtwin.gap.search import Search, twin_equations, variants
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.identification.progress import Tell
-from irtwin.identification.threads import one_blas_thread
+from irtwin.identification.two_processes import one_blas_thread
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
-from irtwin.twin.choice import Choice
 from irtwin.twin.identify import identify
-from irtwin.twin.twin import Twin
+from irtwin.twin.twin import Choice, Twin
 
 
 def begin(runs: Sequence[Run]) -> tuple[str, ...]:
@@ -35,40 +33,40 @@ def begin(runs: Sequence[Run]) -> tuple[str, ...]:
     return (*BASELINE, *(heat if any(run.signals.power is not None for run in runs) else ()))
 
 
-def identified(data_set: DataSet, motions: Sequence[Motion], tell: Tell | None = None) -> Twin:
+def identified(data_set: DataSet, motions: Sequence[Motion]) -> Twin:
     """Return the twin of a data set's robot, fitted to motions of its runs, conditioned by the data set's cutoff.
 
     Its effects are those that the data set names; else those that its runs show, each in its shape: all that a twin
     has acts wherever and whenever it moves, so effects about a place, of a while or of the surroundings are left to a
     diagnosis. The scales of power and of torque are told only against each other; the twin's energy is that of the
-    meter, so no gain of it is chosen. Where the runs cannot be diagnosed, the effects are those of `begin`.
-    `tell` is told how far it has come, where it takes long. Raises InputError where there is nothing to fit.
+    meter, so no gain of it is chosen. Where the runs cannot be diagnosed, the effects are those of `begin`. Raises
+    InputError where there is nothing to fit.
     """
     if data_set.effects is not None:
-        return identify(data_set.robot, motions, data_set.effects, tell=tell)
+        return identify(data_set.robot, motions, data_set.effects)
     begun = begin(data_set.runs)
     runs = tuple(replace(run, role="observed") for run in data_set.runs)
     try:
-        effects, choices = _chosen(replace(data_set, runs=runs, effects=begun), tell or (lambda line: None))
+        effects, choices = _chosen(replace(data_set, runs=runs, effects=begun))
     except InputError:
         effects, choices = begun, ()
-    return replace(identify(data_set.robot, motions, effects, tell=tell), choices=choices)
+    return replace(identify(data_set.robot, motions, effects), choices=choices)
 
 
 @one_blas_thread()
-def _chosen(data_set: DataSet, tell: Tell) -> tuple[Sequence[str | Effect], tuple[Choice, ...]]:
-    case = case_of(data_set, (), DEFAULT, None, tell)
-    found = list(_findings(case, tell))
+def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ...]]:
+    case = case_of(data_set, (), DEFAULT, None)
+    found = list(_findings(case))
     causes = [cause for finding in found for cause in finding.causes]
     return (*case.effects, *added(case, causes)), tuple(one for finding in found for one in _choices(case, finding))
 
 
-def _findings(case: Case, tell: Tell) -> Iterator[Finding]:
+def _findings(case: Case) -> Iterator[Finding]:
     """Yield what torque shows, then what power shows on the torque that is explained."""
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
-    plain = twin_equations(case, stack, tell)
+    plain = twin_equations(case, stack)
     floor = noise_floor(case.runs, case.motions, case.thresholds.data)
-    search, of_torque = Search(case, stack, plain, floor, tell), None
+    search, of_torque = Search(case, stack, plain, floor), None
     tried = _standing(case, "torque"), _standing(case, "power")
     if case.shows("torque") and plain is not None:
         of_torque, floor, _ = search.torque_causes(tried)

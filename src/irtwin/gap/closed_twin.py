@@ -9,21 +9,17 @@ from irtwin.effects.effect import Effect
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.regression.hypotheses import CHANGED, place_of
-from irtwin.identification.progress import Tell
 from irtwin.twin.friction_curve import friction_curves
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 
 
-def closed_twin(case: Case, causes: Sequence[Cause], tell: Tell | None = None) -> Twin:
-    """Return the twin with the causes added; where some effect changed, fitted to the observed runs alone.
-
-    `tell` is told how far that has come, where it takes long.
-    """
+def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
+    """Return the twin with the causes added; where some effect changed, fitted to the observed runs alone."""
     changed = any(cause.scope == CHANGED for cause in causes)
     robot, motions = case.given
     used = [motion for run, motion in motions.items() if run in case.observed or not changed]
-    return identify(robot, used, [*case.effects, *added(case, causes)], case.prior, tell)
+    return identify(robot, used, [*case.effects, *added(case, causes)], case.prior)
 
 
 def added(case: Case, causes: Sequence[Cause]) -> list[Effect]:
@@ -46,11 +42,8 @@ def added(case: Case, causes: Sequence[Cause]) -> list[Effect]:
     return found
 
 
-def friction(case: Case, causes: Sequence[Cause], closed: Twin, tell: Tell | None = None) -> tuple[FrictionCurve, ...]:
-    """Return the friction of each joint by the closed twin; before it, where it changed, as the other runs show it.
-
-    `tell` is told how far that has come, where it takes long.
-    """
+def friction(case: Case, causes: Sequence[Cause], closed: Twin) -> tuple[FrictionCurve, ...]:
+    """Return the friction of each joint by the closed twin; before it, where it changed, as the other runs show it."""
     robot, motions = case.given
     found = friction_curves(closed, [motions[run] for run in closed.fitted], "observed")
     changed = {
@@ -63,6 +56,6 @@ def friction(case: Case, causes: Sequence[Cause], closed: Twin, tell: Tell | Non
         return found
     assert case.against is not None
     others = {run: motion for run, motion in motions.items() if run not in case.observed}
-    former = identify(robot, list(others.values()), case.effects, case.prior, tell)
+    former = identify(robot, list(others.values()), case.effects, case.prior)
     before = friction_curves(former, [others[run] for run in former.fitted], case.against)
     return (*(one for one in before if one.joint in changed), *found)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
-from irtwin.document.cause_ids import cause_ids
 from irtwin.document.curves import Curves
-from irtwin.document.document import Closeable, Cutoff, Document, Untestable
+from irtwin.document.document import Closeable, Cutoff, Document, Location, Untestable, cause_ids
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
@@ -32,9 +31,7 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
 from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
-from irtwin.gap.localisation.channel_residuals import channel_residual, places
-from irtwin.gap.localisation.evidence import drawn
-from irtwin.gap.localisation.locations import Location
+from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
 from irtwin.gap.not_repeating import NotRepeating, with_removed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
@@ -43,16 +40,13 @@ from irtwin.gap.screening.screen import screen
 from irtwin.gap.search import Search, check_observed, twin_equations, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.gap.writing import Simulator
-from irtwin.identification.progress import Told
-from irtwin.identification.threads import one_blas_thread
-from irtwin.identification.two_processes import begun
+from irtwin.identification.progress import tell, tell_step
+from irtwin.identification.two_processes import begun, one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 from irtwin.twin.torque_scale import TorqueScale
 from irtwin.twin.twin import Twin
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -121,14 +115,14 @@ class Diagnosis:
             unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
             robot=robot.name,
             gap=apart.gap(writing.gap(robot.joint_names, self.channels, self.energies)),
-            locations=() if verdict == NO_GAP else tuple(map(writing.location, self.locations)),
+            locations=() if verdict == NO_GAP else self.locations,
             findings=found,
             causes=causes,
             not_testable=self.untestable,
             shrink=apart.shrink(shrink, self.seed),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
-            refused=tuple(map(writing.refused, self.refusals.refused)) or None,
+            refused=self.refusals.refused or None,
             torque_scale=None if self.scale is None else writing.torque_scale(self.scale),
             cutoff=self.cutoff,
             simulator=None if self.simulator is None else self.simulator.name,
@@ -154,40 +148,37 @@ def diagnose(
     unknown: Sequence[str] = (),
     thresholds: Thresholds = DEFAULT,
     seed: int = 0,
-    progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a robot's twin and its runs.
 
     `twin` is what the gap is held against: its effects in their shapes, and its numbers as the prior; None: the effects
     that the data set names. `withhold` takes effects out of it and leaves them in the catalogue; `unknown` are those
     that the search is not to know. `simulator` is the model whose runs are among those of the data set: its numbers
-    stand beside the robot's. `thresholds` decide what is said; `progress` is told each step. Raises InputError on
-    an effect that the catalogue lacks or the twin has not, on a twin of another robot, and where the data set cannot be
-    diagnosed.
+    stand beside the robot's. `thresholds` decide what is said. Raises InputError on an effect that the catalogue lacks
+    or the twin has not, on a twin of another robot, and where the data set cannot be diagnosed.
     """
-    tell = Told(progress or (lambda line: None))
     expected = forecast(data_set)
     if expected.long:
         tell(expected.line)
     tell(f"Filtering {len(data_set.runs)} runs")
-    case = case_of(data_set, withhold, thresholds, twin, tell)
+    case = case_of(data_set, withhold, thresholds, twin)
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
-    excitation = begun(lambda: excitation_of(case.robot, tell), worth=case.long)  # the next experiment's
+    excitation = begun(lambda: excitation_of(case.robot), worth=case.long)  # the next experiment's
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
-    plain = twin_equations(case, stack, tell)
+    plain = twin_equations(case, stack)
     differ = disturbances(case)
     case, taken = removed(case, stack, plain, differ)
     if taken:
-        case = case.with_friction_near_zero(tell)
+        case = case.with_friction_near_zero()
         stack = case.stack.with_effects(stack.effects)
-        plain = twin_equations(case, stack, tell)
-    tell.step("  the noise floor")
+        plain = twin_equations(case, stack)
+    tell_step("  the noise floor")
     floor = noise_floor(case.runs, case.motions, thresholds.data)
     if case.shows("torque") and plain is not None:
         check_observed(plain)
-    search = Search(case, stack, plain, floor, tell, frozenset(unknown), seed)
+    search = Search(case, stack, plain, floor, frozenset(unknown), seed)
     twin_torque = search.twin.torque
     explained: list[Explained] = []
     refusals = NOTHING_REFUSED
@@ -195,12 +186,12 @@ def diagnose(
     torque: ExplainedTorque | None = None
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        torque, floor, refusals = search.torque_causes(_tried(search, plain, tell))
+        torque, floor, refusals = search.torque_causes(_tried(search, plain))
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
     energies: EnergyErrors | None = None
     causes = [cause for one in explained for cause in one.finding.causes]
-    twin_with_causes = begun(partial(closed_twin, case, causes, tell), worth=case.long)
+    twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
     if case.shows("power"):
         tell("Trying every effect on power")
         of_power, wrong = search.power_causes(variants(case, "power"), floor, torque)
@@ -212,7 +203,7 @@ def diagnose(
     if len(every := [cause for finding in findings for cause in finding.causes]) > len(causes):
         twin_with_causes.drop()
         causes = every
-        twin_with_causes = begun(partial(closed_twin, case, causes, tell), worth=case.long)
+        twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
     blamed = {cause.effect for cause in causes}
     screened = (LocalEffect,) if case.shows("torque") else ()
     silent = [
@@ -223,9 +214,7 @@ def diagnose(
     lacking = untestable(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.criterion
     )
-    left = [
-        channel_residual(case, one, twin_torque if one is torque else torque or twin_torque, tell) for one in explained
-    ]
+    left = [channel_residual(case, one, twin_torque if one is torque else torque or twin_torque) for one in explained]
     open_because = left_open(
         findings,
         thresholds,
@@ -234,21 +223,20 @@ def diagnose(
         differing=differ,
         explained=[one.disturbance for one in taken],
     )
-    located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None, tell)
+    located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
     tell("Designing the next experiment")
     stacks = stack, search.power_stack
     planned = planned_equations(case, stacks, findings, search.twin.below, torque or twin_torque)
-    measures = {one.finding.name: flexible_regression(one, seed, tell) for one in left}
+    measures = {one.finding.name: flexible_regression(one, seed) for one in left}
     proposal = next_experiment(
         case.robot,
         planned,
         [catalogue()[one.effect] for one in lacking],
         case.seen,
         thresholds.matters.apart,
-        lambda: excitation(lambda: tell.step("  waiting for the exciting motion")),
-        tell,
+        lambda: excitation(lambda: tell_step("  waiting for the exciting motion")),
     )
-    identified = twin_with_causes(lambda: tell.step("  waiting for the twin with its causes"))
+    identified = twin_with_causes(lambda: tell_step("  waiting for the twin with its causes"))
     return Diagnosis(
         description=case.robot,
         left_open=open_because,
@@ -260,19 +248,14 @@ def diagnose(
         seed=seed,
         experiment=None if proposal is None else proposal.experiment,
         planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
-        curves=drawn(
-            left,
-            located,
-            None if proposal is None else proposal.curve,
-            friction(case, causes, identified, tell),
-        ),
+        curves=drawn(left, located, None if proposal is None else proposal.curve, friction(case, causes, identified)),
         twin=replace(identified, torque_scale=scale),
         energies=energies,
         not_repeating=tuple(differ),
         removed=tuple(taken),
         against=case.against,
         thresholds=thresholds,
-        yardstick={name: one.shares() for name, one in measures.items() if one is not None},
+        yardstick={name: one for name, one in measures.items() if one is not None},
         refusals=refusals,
         scale=scale,
         cutoff=case.cutoff,
@@ -280,10 +263,10 @@ def diagnose(
     )
 
 
-def _tried(search: Search, plain: System, tell: Progress) -> tuple[Sequence[Effect], Sequence[Effect]]:
+def _tried(search: Search, plain: System) -> tuple[Sequence[Effect], Sequence[Effect]]:
     """Return the effects on torque and on power that are tried, those that a screening proposes among them."""
     case = search.case
-    found = screen(case, search.stack, plain, tell)
+    found = screen(case, search.stack, plain)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
             search.below(motion)

@@ -9,7 +9,7 @@ import numpy as np
 
 from irtwin.document.document import Change
 from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.signals.motion import Motion
 
 _RESAMPLED = 1000
@@ -48,7 +48,7 @@ def energy_errors(finding: Finding, motions: Sequence[Motion], rest: Sequence[in
     for system, columns, noise in (before, after):
         ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
         moments = system.moments(noise)
-        total = summed(moments)
+        total = Summed(moments)
         part = []
         for group in np.flatnonzero(system.group_observed):
             vector = system.solution(columns, total - moments[group])

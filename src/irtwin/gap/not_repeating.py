@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import expit
 
 from irtwin.document import document
-from irtwin.document.cause_ids import cause_ids
+from irtwin.document.document import cause_ids
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.closing import Closing, closing

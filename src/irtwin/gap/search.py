@@ -17,21 +17,19 @@ from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
-from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power
+from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
 from irtwin.gap.isolation.finding import Finding, Without, find
-from irtwin.gap.isolation.floor_left import floor_left
 from irtwin.gap.isolation.refusal import Refusals, find_possible
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
-from irtwin.identification.progress import Tell
 
 
-def twin_equations(case: Case, stack: Stack, tell: Tell) -> System | None:
+def twin_equations(case: Case, stack: Stack) -> System | None:
     """Return the equations of torque of the twin alone; None where no torque is known."""
-    return torque_system(stack, case.with_torque, case.grouping, (), None, tell) if case.with_torque else None
+    return torque_system(stack, case.with_torque, case.grouping, (), None) if case.with_torque else None
 
 
 def check_observed(system: System) -> None:
@@ -45,15 +43,13 @@ class Search:
     """The search for the causes in a case, and what it stands on.
 
     `stack`: the twin's effects; `plain`: its equations of torque alone, None where no torque is known; `floor`: the
-    noise floor; `unknown` are not known to it; `seed` draws orders of many causes; `tell` is told how far it has come,
-    where it takes long.
+    noise floor; `unknown` are not known to it; `seed` draws orders of many causes.
     """
 
     case: Case
     stack: Stack
     plain: System | None
     floor: Floor
-    tell: Tell
     unknown: Set[Without] = frozenset()
     seed: int = 0
 
@@ -67,7 +63,7 @@ class Search:
             return ThroughPower(self.stack, self.case.with_power)
         if self.case.shows("torque"):
             check_same_robot(self.case.runs, self.stack, self.plain, self.case.thresholds.data)
-        return LeftOut(self.stack, self.plain, self.tell)
+        return LeftOut(self.stack, self.plain)
 
     @property
     def power_stack(self) -> Stack:
@@ -95,7 +91,7 @@ class Search:
         if case.shows("power"):
             found = find_possible(case, lambda without: self._beside_power(tried, without), self.unknown)
         else:
-            about = case.with_torque, case.grouping, tried[0], self.below, self.tell, case.shaken
+            about = case.with_torque, case.grouping, tried[0], self.below, case.shaken
             system = torque_system(self.stack, *about)
             found = find_possible(case, lambda without: self._of_torque(system, without), self.unknown)
         finding, floor, refusals = found
@@ -105,12 +101,10 @@ class Search:
         self, tried: tuple[Sequence[Effect], Sequence[Effect]], without: Set[Without]
     ) -> tuple[Finding, Floor]:
         about = self.below, self.twin.torque, self.before
-        return find_beside_power(
-            self.case, self.stack, tried, *about, self.floor, self.seed, without=without, tell=self.tell
-        )
+        return find_beside_power(self.case, self.stack, tried, *about, self.floor, self.seed, without=without)
 
     def _of_torque(self, system: System, without: Set[Without]) -> tuple[Finding, Floor]:
-        first = find("torque", self.case, system, self.floor.torque, self.seed, without, tell=self.tell)
+        first = find("torque", self.case, system, self.floor.torque, self.seed, without)
         explained = ExplainedTorque(self.stack, first, self.below)
         left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
         return replace(first, floor=left.torque), left
@@ -124,13 +118,13 @@ class Search:
         """
         case, torque = self.case, explained or self.twin.torque
         power_of = TwinPower(self.power_stack, case.with_power, case.grouping, torque) if explained else self.before
-        system = power_system(self.power_stack, case.with_power, case.grouping, tried, torque, power_of, self.tell)
+        system = power_system(self.power_stack, case.with_power, case.grouping, tried, torque, power_of)
         check_observed(system)
         level = None if floor.power is None else np.array([floor.power])
         plain = self.before.system if explained else None
 
         def search(without: Set[Without]) -> tuple[Finding, Floor]:
-            found = find("power", case, system, level, self.seed, without, plain, self.tell)
+            found = find("power", case, system, level, self.seed, without, plain)
             of_power = explained_power(self.power_stack, found, torque, power_of)
             left = floor_left(case, floor, of_power) if found.causes else floor
             return replace(found, floor=None if left.power is None else np.array([left.power])), left

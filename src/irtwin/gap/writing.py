@@ -9,21 +9,15 @@ from typing import Protocol
 import numpy as np
 
 from irtwin.document import document
-from irtwin.document.cause_ids import cause_ids
-from irtwin.document.document import Closeable
+from irtwin.document.document import Closeable, cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
-from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.isolation.quantities import quantities
-from irtwin.gap.isolation.refusal import Refused
-from irtwin.gap.localisation.locations import Location
+from irtwin.gap.isolation.finding import Finding, branches, quantities
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.hypotheses import CHANGED
-from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Criterion, Matters
 from irtwin.robot.description import Robot
@@ -63,23 +57,6 @@ def _sizes(finding: Finding) -> list[document.Size]:
         )
         for k, rmse in enumerate(finding.rmse)
     ]
-
-
-def location(one: Location) -> document.Location:
-    """Return a place of the gap, with what is sure of it."""
-    return document.Location(
-        channel=one.channel,
-        joint=one.joint,
-        regime=one.regime,
-        follows=one.follows,
-        runs=one.runs,
-        share=one.share,
-        share_interval95=one.share_interval,
-        excess=one.excess,
-        excess_interval95=one.excess_interval,
-        concentration=one.concentration,
-        false_discovery_rate=one.q,
-    )
 
 
 def cause(
@@ -203,11 +180,6 @@ def beside(simulator: Simulator, cause: document.Cause) -> document.Cause:
     return replace(cause, parameters=tuple(map(told, cause.parameters)))
 
 
-def refused(one: Refused) -> document.Refused:
-    """Return a cause that cannot be true."""
-    return document.Refused(effect=one.effect, joints=() if one.joint is None else (one.joint,), why=one.why)
-
-
 def torque_scale(one: TorqueScale) -> document.TorqueScale:
     """Return how sure the scale of torque is, and why."""
     return document.TorqueScale(
@@ -270,7 +242,7 @@ def _change(finding: Finding, seed: int) -> document.Change:
 
 def _by_cause(robot: Robot, finding: Finding, one: Cause, name: str) -> document.CauseChange:
     """Return what a cause closes alone, and what is lost without it."""
-    system, noise = finding.system, noise_before(finding.system)
+    system, noise = finding.system, finding.system.noise_before
     alone = held_out(system, noise, noise, one.columns)
     others = [k for other in finding.causes if other is not one for k in other.columns]
     without = held_out(system, noise, finding.attribution.noise, others)

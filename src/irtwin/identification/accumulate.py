@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from irtwin.errors import InputError
+from irtwin.identification.progress import tell_step
 from irtwin.identification.two_processes import can_copy, shared
 from irtwin.signals.filter import decimate, decimation, kernel
 from irtwin.signals.motion import Motion
@@ -124,9 +125,15 @@ def accumulate_any(
     kind = _Products if by_products else _Triangle
     found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total)]
     samples = sum(len(motion.time) for motion in motions)
+    place = {motion.run: number for number, motion in enumerate(motions, start=1)}
+
+    def asked(motion: Motion) -> Rows:
+        share = 100 * motion.start // len((motion.whole or motion).time)
+        tell_step(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")
+        return equations(motion)
 
     def grown(some: Sequence[tuple[Motion, int, int]]) -> list[Block]:
-        return _grown(some, equations, lambda motion, start, stop: _Growing(motion, start, stop, pattern, kind))
+        return _grown(some, asked, lambda motion, start, stop: _Growing(motion, start, stop, pattern, kind))
 
     blocks = grown(found) if samples * int(pattern.sum()) < _SHARED or not can_copy() else shared(grown, found)
     return [block for block in blocks if block.rows.any()]

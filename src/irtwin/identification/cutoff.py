@@ -17,7 +17,6 @@ from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.fits import fit_torque
-from irtwin.identification.progress import Tell
 from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition, cutoff_of_motion
 from irtwin.signals.log import Run
@@ -28,24 +27,23 @@ _FEWEST_PERIODS = 20  # of the cutoff in what is fitted, and in what is held out
 _BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, in the mean: less is chance
 
 
-def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None, tell: Tell | None = None) -> Cutoff:
+def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None) -> Cutoff:
     """Return the cutoff for runs that are to be treated alike: the one that is stated, Hz, as it is.
 
     Else it is ten times the band of the motion (`cutoff_of_motion`), or that halved as long as the torque of what is
-    held out is told better so. Without torque nothing tells it. `tell` is told how far that has come, where it takes
-    long.
+    held out is told better so. Without torque nothing tells it.
     """
     if stated is not None:
         return Cutoff(hz=stated, stated=True, why="stated")
     highest, why = cutoff_of_motion(runs)
-    halved = _halved(robot, runs, highest, tell)
+    halved = _halved(robot, runs, highest)
     if halved:
         times = {1: "once", 2: "twice"}.get(halved, f"{halved} times")
         why = f"{why}, {highest:.3g} Hz, halved {times}, as that tells held-out torque better"
     return Cutoff(hz=highest / 2**halved, stated=False, why=f"found: {why}")
 
 
-def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None) -> int:
+def _halved(robot: Robot, runs: Sequence[Run], cutoff: float) -> int:
     """Return how often a cutoff, Hz, is halved."""
     found = 0
     measured = [run for run in runs if run.signals.torque is not None]
@@ -56,9 +54,9 @@ def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None)
     parts = 1 if len(looked_at) > 1 else 2
     seconds = min(float(run.signals.time[-1] - run.signals.time[0]) for run in looked_at) / parts
     try:
-        error = _held_out(robot, looked_at, cutoff, tell)
+        error = _held_out(robot, looked_at, cutoff)
         while cutoff / 2 * seconds >= _FEWEST_PERIODS:
-            lower = _held_out(robot, looked_at, cutoff / 2, tell)
+            lower = _held_out(robot, looked_at, cutoff / 2)
             if lower > error + np.log(1 - _BETTER):
                 break
             cutoff, error, found = cutoff / 2, lower, found + 1
@@ -67,14 +65,14 @@ def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None)
     return found
 
 
-def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float, tell: Tell | None) -> float:
+def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float) -> float:
     """Return the mean over joints of the logarithm of the squares left in torque as logged, by a fit to the rest."""
     stack = Stack(robot, EXCITED)
     motions = [condition(run, robot, cutoff) for run in runs]
     logged = {run.name: run.signals for run in runs}
     squares, count = np.zeros(len(robot.joints)), np.zeros(len(robot.joints))
     for fitted, judged in _halves(motions):
-        values = fit_torque(stack, fitted, tell)[1].values
+        values = fit_torque(stack, fitted)[1].values
         for motion in judged:
             torque = make_interp_spline(logged[motion.run].time, logged[motion.run].torque, k=1)(motion.time)
             decided = ~stack.undecided(motion)

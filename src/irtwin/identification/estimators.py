@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.identification.uncertainty import covariance
 
 _REWEIGHTINGS = 4
@@ -47,7 +47,6 @@ def estimate(
     terms: Sequence[Term],
     prior_rows: np.ndarray | None = None,
     signals: Sequence[int] | None = None,
-    tell: Tell | None = None,
 ) -> Estimate:
     """Estimate the coefficients of `terms` (K) from g equations a sample.
 
@@ -57,9 +56,8 @@ def estimate(
     terms together, `prior_rows` (K, K) say it instead: rows on their deviations, in units of their spread, of noise
     one. As samples depend on each other, they count against it by their design effect only; where `signals` (g,) says
     which equations are of one, each signal by its own. Bounds hold (`lowest`). The covariance is explained in
-    `uncertainty`. `tell` is told how far that has come, where it takes long.
+    `uncertainty`.
     """
-    told = paced(tell)
     factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
     count = np.maximum(sum(block.rows for block in blocks), 1)
     expected = np.array([term.expected for term in terms])
@@ -72,11 +70,11 @@ def estimate(
     least = np.maximum(_LEAST_NOISE * size, dead)
     noise = np.maximum(size, dead)
     for turn in range(_REWEIGHTINGS):
-        told(f"  {len(terms)} coefficients, weighed {turn} times")
+        tell_step(f"  {len(terms)} coefficients, weighed {turn} times")
         values, _ = _solve(factors, noise, expected, spread, lowest, prior)
         residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
         noise = np.maximum(residual / np.sqrt(count), least)
-    told(f"  how sure {len(terms)} coefficients are")
+    tell_step(f"  how sure {len(terms)} coefficients are")
     level = noise.copy()
     alike = np.zeros(len(pattern), dtype=int) if signals is None else np.array(signals)
     for signal in np.unique(alike):
@@ -85,7 +83,7 @@ def estimate(
         _, effect = covariance(mine, pattern[own], [factors[e] for e in own], values, noise[own], spread, prior)
         level[own] *= np.sqrt(effect)
     values, equations = _solve(factors, level, expected, spread, lowest, prior)
-    told(f"  how sure {len(terms)} coefficients are")
+    tell_step(f"  how sure {len(terms)} coefficients are")
     sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
     return Estimate(values, sureness, noise, len(blocks), equations)
 

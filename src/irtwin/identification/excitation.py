@@ -13,14 +13,12 @@ from scipy.optimize import minimize
 
 from irtwin.errors import InputError
 from irtwin.identification.base_condition import BaseRegressor
-from irtwin.identification.descent import descend
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
 from irtwin.identification.own_body import OwnBody
-from irtwin.identification.threads import one_blas_thread
+from irtwin.identification.two_processes import one_blas_thread
 from irtwin.robot.description import Robot
-from irtwin.signals.channels import Signals
-from irtwin.signals.csv_text import csv_text
+from irtwin.signals.channels import Signals, csv_text
 
 Progress = Callable[[int, float, float], None]
 """Called with the iteration, the best condition number so far and the seconds since the start."""
@@ -34,6 +32,11 @@ _MOST_WORK = 3e8  # products of regressors' numbers, an iteration asked for: ten
 _PER_POINT = 3e-5  # s, of each joint at each point of the grid in an iteration, and
 _PER_WORK = 4e-10  # s, of each product: chains of 7, 12 and 30 joints took 17, 34 and 91 s, with others beside them
 _MOST = 100_000_000  # numbers that a motion is worked out from: 3600 s at 500 Hz of six joints, 0.8 GB
+Cost = Callable[[np.ndarray], tuple[float, np.ndarray]]
+
+_SUFFICIENT = 1e-4  # Armijo's share of the promised decrease
+_SHORTEN = 0.4
+_SHORTEST = 1e-8
 
 
 @dataclass(frozen=True)
@@ -324,3 +327,50 @@ class _Search:
         if at_grid <= self._keep_off or self._workspace.least_clearance(series) <= 0:
             return False
         return self._body.allows(series) and self._body.barrier(self._motion(x)[0])[0] < math.inf
+
+
+def descend(cost: Cost, start: np.ndarray, iterations: int, tolerance: float = 1e-4) -> Iterator[np.ndarray]:
+    """Yield ever better points, (k,) each, by BFGS with backtracking.
+
+    `cost` gives value and gradient, or an infinite value outside the region; `start` lies inside. Ends after
+    `iterations` steps, or where a step gains less than `tolerance` or no step helps.
+    Source: Nocedal and Wright, Numerical Optimization, 2006, section 6.1.
+    """
+    x = start
+    value, gradient = cost(x)
+    inverse: np.ndarray | None = None
+    for _ in range(iterations):
+        if inverse is None:
+            direction = -gradient * (0.01 * np.linalg.norm(x) / np.linalg.norm(gradient))
+        else:
+            direction = -inverse @ gradient
+        slope = float(direction @ gradient)
+        if slope >= 0:
+            return
+        length = 1.0
+        while True:
+            new_value, new_gradient = cost(x + length * direction)
+            if new_value < value + _SUFFICIENT * length * slope:
+                break
+            length *= _SHORTEN
+            if length < _SHORTEST:
+                return
+        step, change = length * direction, new_gradient - gradient
+        inverse = _update(inverse, step, change)
+        gain = value - new_value
+        x, value, gradient = x + step, new_value, new_gradient
+        yield x
+        if gain < tolerance:
+            return
+
+
+def _update(inverse: np.ndarray | None, step: np.ndarray, change: np.ndarray) -> np.ndarray | None:
+    """Return the inverse Hessian, (k, k), that maps the gradient's change to the step (BFGS)."""
+    curvature = float(step @ change)
+    if curvature <= 1e-10 * np.linalg.norm(step) * np.linalg.norm(change):
+        return inverse
+    if inverse is None:
+        inverse = np.eye(len(step)) * (curvature / float(change @ change))
+    turned = inverse @ change
+    scale = (1 + float(change @ turned) / curvature) / curvature
+    return inverse + scale * np.outer(step, step) - (np.outer(turned, step) + np.outer(step, turned)) / curvature

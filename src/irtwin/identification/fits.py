@@ -13,7 +13,6 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Equations, Rows, accumulate, accumulate_any
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.power_line import PowerLine, power_line, power_rows, rows_of_both
-from irtwin.identification.progress import Tell, with_progress
 from irtwin.signals.motion import Motion
 
 Terms = Sequence[tuple[Effect, Term]]
@@ -25,16 +24,13 @@ _REPEATS = 8  # of fit and prediction, at most
 _SCALE = Term("scale", "1", spread=0.05)  # of real over logged torque, less one: drives' constants are nominal
 
 
-def fit_torque(stack: Stack, motions: Sequence[Motion], tell: Tell | None = None) -> tuple[list[Block], Estimate]:
-    """Fit the coefficients of torque to measured torque; return them with the equations, reduced.
-
-    `tell` is told how far that has come, where it takes long.
-    """
+def fit_torque(stack: Stack, motions: Sequence[Motion]) -> tuple[list[Block], Estimate]:
+    """Fit the coefficients of torque to measured torque; return them with the equations, reduced."""
     terms, known = _of(stack.torque_terms), stack.prior_rows(stack.torque_terms)
 
     def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
-        blocks = accumulate(motions, with_progress(_torque_equations(stack, values), motions, tell), stack.pattern)
-        return blocks, estimate(blocks, stack.pattern, terms, known, tell=tell)
+        blocks = accumulate(motions, _torque_equations(stack, values), stack.pattern)
+        return blocks, estimate(blocks, stack.pattern, terms, known)
 
     blocks, found = fit(_alone(stack, motions) if stack.coupled else None)
     for _ in range(_REPEATS if stack.coupled else 0):
@@ -71,11 +67,7 @@ def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray
 
 
 def fit_both(
-    stack: Stack,
-    motions: Sequence[Motion],
-    torque_values: np.ndarray,
-    of_torque: Sequence[Block] | None = None,
-    tell: Tell | None = None,
+    stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, of_torque: Sequence[Block] | None = None
 ) -> Estimate:
     """Fit the coefficients of torque to torque and power at once, starting from those that torque alone gives.
 
@@ -83,7 +75,7 @@ def fit_both(
     predicted, by Gauss-Newton. Each signal is weighed by its own residual, and by how long that remembers. So that what
     the twin lacks of power does not look like friction, heat of windings and how real work stands to that of logged
     torque are found beside, and samples in which the joints give power back are left out of power: it may be burnt.
-    `of_torque`: the equations of torque of all these motions, if they were reduced before; `tell` as above.
+    `of_torque`: the equations of torque of all these motions, if they were reduced before.
     """
     if CopperLoss.id not in stack.ids:
         stack = stack.with_effects([*stack.effects, CopperLoss()])
@@ -102,13 +94,11 @@ def fit_both(
     for _ in range(_STEPS):
         before = values
         if of_torque is None or stack.coupled:
-            blocks = of_torque = accumulate(
-                motions, with_progress(_both_equations(stack, values), motions, tell), pattern
-            )
+            blocks = of_torque = accumulate(motions, _both_equations(stack, values), pattern)
         else:  # that of power alone follows the values
-            line = with_progress(_line_equations(stack, values), motions, tell)
+            line = _line_equations(stack, values)
             blocks = _beside(of_torque, accumulate_any(motions, line, pattern[joints:]), pattern)
-        found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1], tell=tell)
+        found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
         values, sure = found.values, np.sqrt(np.diag(found.covariance))
         if np.all(np.abs(values - before)[:count] < _SETTLED * sure[:count]):
             break

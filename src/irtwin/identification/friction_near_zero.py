@@ -17,7 +17,7 @@ from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
-from irtwin.identification.progress import Tell, paced, with_progress
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -30,13 +30,10 @@ _NEARLY_ALL = 0.85  # of the ranks: real turns have 0.87 and more, forms of fric
 _NOTHING = 1e-9  # of the largest column: less is not shown
 
 
-def with_friction_near_zero(
-    robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect], tell: Tell | None = None
-) -> Robot:
+def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> Robot:
     """Return the robot with the turn of each joint's dry friction, as its torque shows it beside some effects.
 
-    A joint whose torque shows none, or in which it makes no sure difference, has friction that turns at once. `tell` is
-    told how far that has come, where it takes long.
+    A joint whose torque shows none, or in which it makes no sure difference, has friction that turns at once.
     """
     measured = [motion for motion in motions if motion.torque is not None]
     plain = replace(robot, joints=tuple(replace(j, friction_width=None, friction_exponent=None) for j in robot.joints))
@@ -56,10 +53,10 @@ def with_friction_near_zero(
         for shape in effect.candidates(plain)
         if isinstance(shape, JointEffect) and shape != effect
     ]
-    found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints), tell)
+    found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints))
     if any(found):
         finer = [[] if one is None else _around(one) for one in found]
-        found = _found(stack, open_shapes, measured, finer, tell)
+        found = _found(stack, open_shapes, measured, finer)
     return replace(
         plain,
         joints=tuple(
@@ -70,17 +67,13 @@ def with_friction_near_zero(
 
 
 def _found(
-    stack: Stack,
-    open_shapes: Sequence[JointEffect],
-    motions: Sequence[Motion],
-    tried: Sequence[Sequence[Turn]],
-    tell: Tell | None,
+    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
 ) -> list[Turn | None]:
     """Return the best of the turns that are tried in each joint; None where there is none."""
-    blocks, pattern = _reduced(stack, open_shapes, motions, tried, tell)
-    found, told = [], paced(tell)
+    blocks, pattern = _reduced(stack, open_shapes, motions, tried)
+    found = []
     for joint, turns in enumerate(tried):
-        told(f"  friction near zero speed, joint {joint + 1} of {len(tried)}")
+        tell_step(f"  friction near zero speed, joint {joint + 1} of {len(tried)}")
         found.append(_best(blocks, pattern, joint, turns) if turns else None)
     return found
 
@@ -92,11 +85,7 @@ def _around(found: Turn) -> list[Turn]:
 
 
 def _reduced(
-    stack: Stack,
-    open_shapes: Sequence[JointEffect],
-    motions: Sequence[Motion],
-    tried: Sequence[Sequence[Turn]],
-    tell: Tell | None,
+    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
 ) -> tuple[list[Block], np.ndarray]:
     """Reduce the equations of torque.
 
@@ -123,7 +112,7 @@ def _reduced(
         undecided = stack.undecided(motion) | sticking.undecided(motion)
         return Rows(columns, stack.shift_torque(motion, own), motion.torque, undecided)
 
-    return accumulate(motions, with_progress(equations, motions, tell), pattern), pattern
+    return accumulate(motions, equations, pattern), pattern
 
 
 def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:

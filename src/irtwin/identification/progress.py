@@ -1,54 +1,51 @@
-"""How far long work on runs has come."""
+"""How far long work has come: lines for whoever listens."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 
-from irtwin.identification.accumulate import Equations, Rows
 from irtwin.identification.two_processes import in_copy
-from irtwin.signals.motion import Motion
-
-Tell = Callable[[str], None]
 
 _EVERY = 2.5  # s between two lines at least: with a step that long there is one each 5 s, and short work says none
 
 
-class Told:
-    """What tells lines, and knows when it told the last: one clock for all that is done in turn."""
+@dataclass
+class _Listener:
+    """Who hears lines, and when the last was told: one clock for all that is done in turn."""
 
-    def __init__(self, tell: Tell):
-        self._tell, self._last = tell, time.monotonic()
-
-    def __call__(self, line: str) -> None:
-        """Tell a line."""
-        self._last = time.monotonic()
-        self._tell(line)
-
-    def step(self, line: str) -> None:
-        """Tell a line where the last was some seconds ago."""
-        if time.monotonic() - self._last >= _EVERY and not in_copy():
-            self(line)
+    hear: Callable[[str], None]
+    last: float
 
 
-def paced(tell: Tell | None) -> Tell:
-    """Return what tells a line only where the last was some seconds ago: it may be given one at each step."""
-    if tell is None:
-        return lambda line: None
-    told = getattr(tell, "__self__", tell)  # what is paced already keeps its clock
-    return (told if isinstance(told, Told) else Told(tell)).step
+_listener: ContextVar[_Listener | None] = ContextVar("listener", default=None)
 
 
-def with_progress(equations: Equations, motions: Sequence[Motion], tell: Tell | None) -> Equations:
-    """Return the equations, with a line every few seconds of how much of the motions they have been asked for."""
-    if tell is None:
-        return equations
-    place = {motion.run: number for number, motion in enumerate(motions, start=1)}
-    told = paced(tell)
+@contextmanager
+def telling(hear: Callable[[str], None] | None) -> Iterator[None]:
+    """Let `hear` have the lines that the work inside tells; None: who hears them already, if anyone."""
+    if hear is None:
+        yield
+        return
+    token = _listener.set(_Listener(hear, time.monotonic()))
+    try:
+        yield
+    finally:
+        _listener.reset(token)
 
-    def asked(motion: Motion) -> Rows:
-        share = 100 * motion.start // len((motion.whole or motion).time)
-        told(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")
-        return equations(motion)
 
-    return asked
+def tell(line: str) -> None:
+    """Tell a line."""
+    if (one := _listener.get()) is not None:
+        one.last = time.monotonic()
+        one.hear(line)
+
+
+def tell_step(line: str) -> None:
+    """Tell a line where the last was some seconds ago: it may be called at each step."""
+    one = _listener.get()
+    if one is not None and time.monotonic() - one.last >= _EVERY and not in_copy():
+        tell(line)

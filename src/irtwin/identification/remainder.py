@@ -9,10 +9,10 @@ from typing import TypeVar
 import numpy as np
 from scipy.stats import t as student
 
-from irtwin.effects.effect import Term
+from irtwin.effects.effect import NORMAL, Term
 from irtwin.identification.accumulate import Block
 from irtwin.identification.estimators import estimate
-from irtwin.identification.uncertainty import LEVEL, NORMAL
+from irtwin.identification.uncertainty import LEVEL
 
 T = TypeVar("T")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,23 @@ def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants
     mechanical = next(effect for effect in catalogue().values() if effect.carries_torque)
     kept = found.of(range(1, 1 + len(joints)))
     return TorqueConstants(kept.values, tuple((mechanical, term) for term in own), kept)
+
+
+def torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot, list[Motion], TorqueConstants | None]:
+    """Give robot and motions the torque constants that power tells, and the torque that follows.
+
+    None, and all as it was, where torque is known, or no current beside power.
+    """
+    telling = [motion for motion in motions if motion.current is not None and motion.power is not None]
+    if not telling or any(motion.torque is not None for motion in motions):
+        return robot, list(motions), None
+    found = torque_constants(robot, telling)
+    both = zip(robot.joints, found.constants.tolist(), strict=True)
+    known = [
+        motion if motion.current is None else replace(motion, torque=motion.current * found.constants)
+        for motion in motions
+    ]
+    return replace(robot, joints=tuple(replace(joint, torque_constant=value) for joint, value in both)), known, found
 
 
 def _balance(motions: Sequence[Motion], terms: Sequence[Term], *, pooled: bool) -> Estimate:

@@ -7,9 +7,12 @@ import os
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
+
+from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -120,3 +123,10 @@ def _send(to: Connection, work: Callable[[], Sequence[Made]]) -> None:
     to.send(len(made))
     for one in made:  # one by one: together they would take their memory twice
         to.send(one)
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Keep BLAS to one thread: runs are worked on side by side already, and two kinds of threads starve each other."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import t as student
 
+from irtwin.effects.effect import NORMAL
 from irtwin.identification.accumulate import Block, triangle
 
 LEVEL = 0.95
-NORMAL = 1.959963984540054  # deviations of a normal distribution that are half its 95 % interval
 _LEARNT = 0.5  # of the prior's standard deviation: an estimate less sure than this says what was expected, not measured
 
 

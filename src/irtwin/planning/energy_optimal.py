@@ -1,4 +1,4 @@
-"""The motion that costs the least energy in a given time: path and time law changed together."""
+"""The motion that costs the least energy in a given time: path and time law changed together, or the law alone."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
-from irtwin.planning.timing import MotionLimits, Timed, Torque, shares
+from irtwin.planning.timing import MotionLimits, Timed, Torque, along, shares
 from irtwin.robot.collision import CollisionModel
 
 Power = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From time (N,), q, dq, ddq (N, n) to electrical power (N,), W."""
 
 _DEGREE = 5
-_FREE = 7  # points of the spline between start and goal that each joint may move
-_SAMPLES = 48  # of a motion while it is sought
+_FREE, _FREE_OF_LAW = 7, 9  # points of the spline between start and goal: of each joint, of a time law
+_SAMPLES, _SAMPLES_OF_LAW = 48, 60  # of a motion while it is sought
 _DENSE = 1500  # at the end
 _POSES = 20  # at which the distance to everything is held
 _STIFFNESS = (30.0, 1000.0)  # of the walls, as a share of the energy for a limit passed by all of it
@@ -52,6 +52,20 @@ class SplineMotion:
         return q, dq, ddq, jerk
 
 
+@dataclass(frozen=True)
+class PathMotion:
+    """A path, (n,) joints over the place on it from 0 to 1, and that place as a spline over time, from rest to rest."""
+
+    path: BSpline
+    law: BSpline
+    seconds: float
+
+    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
+        s, ds, dds, ddds = (self.law(np.clip(time, 0, self.seconds), order) for order in range(4))
+        return along(self.path, s, ds, dds, ddds)
+
+
 def cheapest(
     given: Timed,
     seconds: float,
@@ -59,23 +73,26 @@ def cheapest(
     torque: Torque,
     power: Power,
     collisions: CollisionModel,
-) -> SplineMotion | Timed:
+    *,
+    on_path: bool = False,
+) -> Movement:
     """Return the motion between the ends of `given` that takes least energy in `seconds`, of all that keep the limits.
 
-    Sought from the given motion, slowed, by quasi-Newton steps (L-BFGS) over the points of a quintic spline, with walls
-    that grow stiffer. What is found counts only if it keeps every limit and touches nothing; else the given motion,
-    slowed, is the answer.
+    `on_path`: of all along its path that go forward all the way. Sought from the given motion, slowed, by quasi-Newton
+    steps (L-BFGS) over the points of a quintic spline, with walls that grow stiffer. What is found counts only if it
+    keeps every limit and touches nothing; else the given motion, slowed, is the answer.
     """
     slowed = given.slower(seconds)
-    best: SplineMotion | Timed = slowed
+    best: Movement = slowed
     least = energy(best, power)
-    search = _Search(slowed, limits, torque, power, collisions)
-    points = search.start
+    search: _Search | _OnPath
+    search = _OnPath(slowed, limits, torque, power) if on_path else _Search(slowed, limits, torque, power, collisions)
+    points = search.spline.nearest
     for stiffness in _STIFFNESS:
         points = search.improve(points, stiffness * least)
         found = search.motion(points)
         cost = energy(found, power)
-        if cost < least and keeps(found, limits, torque, collisions):
+        if cost < least and search.goes_forward(points) and keeps(found, limits, torque, collisions):
             best, least = found, cost
     return best
 
@@ -95,6 +112,66 @@ def energy(motion: Movement, power: Power) -> float:
     return float(np.trapezoid(power(time, *motion.motion(time)[:3]), time))
 
 
+class _Spline:
+    """A quintic spline over time, of free points (k, ...) between fixed ends at rest, near `values` (N, ...)."""
+
+    def __init__(self, time: np.ndarray, free: int, values: np.ndarray) -> None:
+        count = free + 6  # three equal points at each end are rest: no speed, no acceleration
+        inner = np.linspace(0, time[-1], count - _DEGREE + 1)
+        self._knots = np.concatenate([np.zeros(_DEGREE), inner, np.full(_DEGREE, time[-1])])
+        basis = BSpline(self._knots, np.eye(count), _DEGREE)
+        self.bases = [basis(time, order) for order in range(4)]
+        self._ends = values[[0, -1]]
+        place = self.bases[0]
+        known = np.multiply.outer(place[:, :3].sum(axis=1), values[0])
+        known = known + np.multiply.outer(place[:, -3:].sum(axis=1), values[-1])
+        self.nearest = np.linalg.lstsq(place[:, 3:-3], values - known, rcond=None)[0]
+
+    def through(self, points: np.ndarray) -> BSpline:
+        """Return the spline of free points."""
+        return BSpline(self._knots, self._all(points), _DEGREE)
+
+    def states(self, points: np.ndarray) -> list[np.ndarray]:
+        """Return its values and their first three derivatives at the times, (N, ...) each."""
+        return [basis @ self._all(points) for basis in self.bases]
+
+    def _all(self, points: np.ndarray) -> np.ndarray:
+        return np.concatenate([self._ends[[0, 0, 0]], points, self._ends[[1, 1, 1]]])
+
+
+class _OnPath:
+    """Costs of the free points, (k,), of a time law between rest at 0 and rest at 1."""
+
+    def __init__(self, given: Timed, limits: MotionLimits, torque: Torque, power: Power) -> None:
+        self._path, self._limits, self._torque, self._power = given.path, limits, torque, power
+        self._time = np.linspace(0, given.seconds, _SAMPLES_OF_LAW)
+        place = given.place(self._time)[0]
+        place[[0, -1]] = 0.0, 1.0
+        self.spline = _Spline(self._time, _FREE_OF_LAW, place)
+
+    def motion(self, points: np.ndarray) -> PathMotion:
+        """Return the motion of free points (k,)."""
+        return PathMotion(self._path, self.spline.through(points), float(self._time[-1]))
+
+    def goes_forward(self, points: np.ndarray) -> bool:
+        """Whether a motion never goes back on its path."""
+        dense = np.linspace(0, self._time[-1], 20 * _SAMPLES_OF_LAW)
+        return bool((np.diff(self.spline.through(points)(dense)) > -1e-12).all())
+
+    def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
+        """Return points of less cost, with walls of a stiffness, J."""
+        options = {"maxiter": _ITERATIONS, "eps": 1e-5}
+        return np.asarray(minimize(self._cost, points, args=(stiffness,), method="L-BFGS-B", options=options).x)
+
+    def _cost(self, points: np.ndarray, stiffness: float) -> float:
+        s, ds, dds, ddds = self.spline.states(points)
+        states = along(self._path, s, ds, dds, ddds)
+        taken = float(np.trapezoid(self._power(self._time, *states[:3]), self._time))
+        passed = [np.maximum(share - _SHARE, 0) for share in shares(states, self._limits, self._torque).values()]
+        backward = np.minimum(ds, 0) * self._time[-1]
+        return taken + stiffness * float(sum((each**2).sum() for each in (*passed, backward))) / len(self._time)
+
+
 class _Search:
     """Costs of the free points, (k, n), of a spline between fixed ends at rest."""
 
@@ -104,19 +181,15 @@ class _Search:
         self._limits, self._torque, self._power, self._collisions = limits, torque, power, collisions
         self._seconds = given.seconds
         self._time = np.linspace(0, given.seconds, _SAMPLES)
-        count = _FREE + 6  # three equal points at each end are rest: no speed, no acceleration
-        inner = np.linspace(0, given.seconds, count - _DEGREE + 1)
-        self._knots = np.concatenate([np.zeros(_DEGREE), inner, np.full(_DEGREE, given.seconds)])
-        basis = BSpline(self._knots, np.eye(count), _DEGREE)
-        self._bases = [basis(self._time, order) for order in range(4)]
-        q = given.motion(self._time)[0]
-        self._ends = np.array([q[0], q[-1]])
-        known = self._bases[0][:, :3].sum(axis=1)[:, None] * q[0] + self._bases[0][:, -3:].sum(axis=1)[:, None] * q[-1]
-        self.start = np.linalg.lstsq(self._bases[0][:, 3:-3], q - known, rcond=None)[0]
+        self.spline = _Spline(self._time, _FREE, given.motion(self._time)[0])
 
     def motion(self, points: np.ndarray) -> SplineMotion:
         """Return the motion of free points (k, n)."""
-        return SplineMotion(BSpline(self._knots, self._all(points), _DEGREE), self._seconds)
+        return SplineMotion(self.spline.through(points), self._seconds)
+
+    def goes_forward(self, points: np.ndarray) -> bool:
+        """Whether a motion may go so: any may."""
+        return True
 
     def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
         """Return points of less cost, with walls of a stiffness, J."""
@@ -129,18 +202,17 @@ class _Search:
         )
         return np.asarray(found.x.reshape(points.shape))
 
-    def _all(self, points: np.ndarray) -> np.ndarray:
-        return np.concatenate([self._ends[[0, 0, 0]], points, self._ends[[1, 1, 1]]])
-
     def _cost(self, points: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
-        states = [basis @ self._all(points) for basis in self._bases]
+        states = self.spline.states(points)
         value, slopes = self._energy(states[:3])
         slopes.append(np.zeros_like(states[3]))
         for wall, gradients in (self._walls(states), self._distances(states[0])):
             value += stiffness * wall
             for order, gradient in enumerate(gradients):
                 slopes[order] = slopes[order] + stiffness * gradient
-        return value, np.concatenate([sum(b[:, 3:-3].T @ s for b, s in zip(self._bases, slopes, strict=True)).ravel()])
+        return value, np.concatenate(
+            [sum(b[:, 3:-3].T @ s for b, s in zip(self.spline.bases, slopes, strict=True)).ravel()]
+        )
 
     def _energy(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
         """Return the energy, J, and its slope over each sample's q, dq, ddq, from differences sample by sample."""

@@ -11,7 +11,6 @@ from irtwin.effects.drive import RotorInertia
 from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.planning.energy_on_path import cheapest_on_path
 from irtwin.planning.energy_optimal import Movement, Power, cheapest, keeps
 from irtwin.planning.path import LONGEST_SEARCH, joint_path, line_path
 from irtwin.planning.poses import Pose, joints_for
@@ -88,8 +87,8 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
     seconds = task.seconds or quickest.seconds
     chosen: Movement = quickest.slower(seconds)
     if task.least_energy:
-        search = cheapest_on_path if task.line else cheapest
-        chosen = search(quickest, seconds, limits, _torque(twin, task), _power(twin, task), collisions)
+        about = limits, _torque(twin, task), _power(twin, task), collisions
+        chosen = cheapest(quickest, seconds, *about, on_path=task.line)
     if not keeps(chosen, limits, _torque(twin, task), collisions):
         raise InputError(f"a motion of {seconds:g} s asks for more torque than the joints have; give another duration")
     collisions.keep_off(0.0)

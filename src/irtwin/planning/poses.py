@@ -12,13 +12,10 @@ from irtwin.errors import InputError
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
-from irtwin.robot.inverse_kinematics import damped_step
+from irtwin.robot.inverse_kinematics import nearest
 from irtwin.robot.kinematics import flange
 
 _STARTS = 60  # random joint positions from which a pose is sought
-_STEPS = 150
-_DAMPING = 1e-3
-_FOUND = 1e-9  # m and rad
 _ANGLE = 0.3  # m/rad: how a wrong direction weighs beside a wrong place
 _SPACE = 1e-6  # rad: kept off the limits, so that rounding does not pass them
 _FARTHEST = 1e3
@@ -86,40 +83,8 @@ def flange_placement(robot: Robot, q: np.ndarray) -> pin.SE3:
 
 
 def follow(robot: Robot, target: pin.SE3, start: np.ndarray, limits: JointLimits) -> tuple[np.ndarray, float, float]:
-    """Return joint positions within their limits near `start`, and how far they leave the target: m, rad.
-
-    Damped least squares (Nakamura and Hanafusa, 1986).
-    """
-    model, data = robot.model, robot.model.createData()
-    frame = model.getFrameId(flange(robot), pin.FrameType.BODY)
-    lower, upper = limits.lower + _SPACE, limits.upper - _SPACE
-    q = np.clip(start, lower, upper)
-
-    def error(q: np.ndarray) -> np.ndarray:
-        pin.forwardKinematics(model, data, q)
-        return np.asarray(pin.log6(pin.updateFramePlacement(model, data, frame).actInv(target)).vector)
-
-    weights = np.array([1.0] * 3 + [_ANGLE] * 3)
-    left = error(q)
-    damping = _DAMPING
-    for _ in range(_STEPS):
-        if np.abs(left).max() < _FOUND:
-            break
-        jacobian = weights[:, None] * pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
-        tried = np.clip(q + damped_step(jacobian, weights * left, damping), lower, upper)
-        after = error(tried)
-        if np.linalg.norm(weights * after) < np.linalg.norm(weights * left):
-            q, left, damping = tried, after, max(damping / 10, 1e-12)
-        elif damping > 1e3:
-            break
-        else:
-            damping *= 10
-    reached = flange_placement(robot, q)
-    return (
-        q,
-        float(np.linalg.norm(reached.translation - target.translation)),
-        float(np.linalg.norm(pin.log3(reached.rotation.T @ target.rotation))),
-    )
+    """Return joint positions within their limits near `start`, and how far they leave the target: m, rad."""
+    return nearest(robot, target, start, limits.lower + _SPACE, limits.upper - _SPACE)
 
 
 def _solutions(robot: Robot, pose: Pose, limits: JointLimits, near: np.ndarray | None, what: str) -> list[np.ndarray]:

@@ -22,9 +22,8 @@ from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
-from irtwin.twin.choice import Choice
 from irtwin.twin.files import to_json
-from irtwin.twin.twin import BaseParameter, Parameter, Twin
+from irtwin.twin.twin import BaseParameter, Choice, Parameter, Twin
 from irtwin.twin.validate import validate
 
 

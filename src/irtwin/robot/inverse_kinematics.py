@@ -68,7 +68,17 @@ def solve(
     return Found(np.empty((0, len(lower))), distance, angle, redundant)
 
 
-def damped_step(slope: np.ndarray, value: np.ndarray, damping: float) -> np.ndarray:
+def nearest(
+    robot: Robot, target: pin.SE3, start: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, float, float]:
+    """Return where a descent of the flange to a target from `start` (n,) ends, and what is left: m, rad."""
+    search = _Search(robot, link_frame(robot, flange(robot)), target, lower, upper)
+    q, _ = search.descend(search.whole, np.clip(start, lower, upper))
+    left = target.actInv(search.place(q))
+    return q, float(np.linalg.norm(left.translation)), float(np.linalg.norm(pin.log3(left.rotation)))
+
+
+def _damped_step(slope: np.ndarray, value: np.ndarray, damping: float) -> np.ndarray:
     """Return x, (n,), of least |slope x - value|^2 + damping |x|^2; slope: (m, n), value: (m,).
 
     Nakamura and Hanafusa (1986). The slope is not squared: links may be kilometres long.
@@ -112,18 +122,19 @@ class _Search:
 
     def whole(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (6,) m and rad from the pose to the goal, and (6, n) its slope."""
-        place = self._place(q)
+        place = self.place(q)
         jacobian = np.reshape(pin.getFrameJacobian(self._model, self._data, self._frame, pin.LOCAL), (6, -1))
         left = self._goal.actInv(place)
         return np.asarray(pin.log6(left).vector), np.asarray(pin.Jlog6(left) @ jacobian)
 
     def position(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (3,) m from the flange's position to the goal's, and (3, n) its slope."""
-        place = self._place(q)
+        place = self.place(q)
         frame = pin.getFrameJacobian(self._model, self._data, self._frame, pin.LOCAL_WORLD_ALIGNED)
         return np.asarray(place.translation - self._goal.translation), np.reshape(frame, (6, -1))[:3]
 
-    def _place(self, q: np.ndarray) -> pin.SE3:
+    def place(self, q: np.ndarray) -> pin.SE3:
+        """Return the link's placement."""
         pin.computeJointJacobians(self._model, self._data, q)
         return pin.updateFramePlacement(self._model, self._data, self._frame)
 
@@ -137,7 +148,7 @@ class _Search:
             free = ~(((q <= self._lower) & (slope.T @ value > 0)) | ((q >= self._upper) & (slope.T @ value < 0)))
             part = slope[:, free]
             step = np.zeros_like(q)
-            step[free] = -damped_step(part, value, damping)
+            step[free] = -_damped_step(part, value, damping)
             tried = np.clip(q + step, self._lower, self._upper)
             new, new_slope = error(tried)
             if new @ new < value @ value:
@@ -170,5 +181,5 @@ class _Search:
         for q in candidates:
             q, left = self.descend(self.position, q)
             if left < _NEAR:
-                angles.append(float(np.linalg.norm(pin.log3(self._goal.rotation.T @ self._place(q).rotation))))
+                angles.append(float(np.linalg.norm(pin.log3(self._goal.rotation.T @ self.place(q).rotation))))
         return min(angles, default=np.nan)

@@ -6,7 +6,9 @@ A new channel is a line of `Signals`. It is then read from every source, checked
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from typing import Annotated, Any, Self, get_type_hints
@@ -137,3 +139,13 @@ def from_columns(columns: Mapping[str, Samples], joints: Iterable[str]) -> Signa
             nothing = np.empty((len(columns["time"]), 0))  # of a robot whose joints nobody logged
             found[field] = np.column_stack([nothing, *parts]) if channel.per_joint else parts[0]
     return Signals(**found)
+
+
+def csv_text(motion: Signals, joint_names: Sequence[str]) -> str:
+    """Return columns time, q_J, dq_J, ddq_J (s, rad, rad/s, rad/s^2) of each joint J, a row a sample, to ten digits."""
+    columns = columns_of(motion, joint_names)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([f"{value:.10g}" for value in row] for row in np.column_stack(list(columns.values())))
+    return text.getvalue()

@@ -13,11 +13,10 @@ from irtwin.input_file import checksum, real_path
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
-from irtwin.signals.cutoff import checked_cutoff
 from irtwin.signals.dh_table import robot_of_table
 from irtwin.signals.finding import Finding
 from irtwin.signals.samples import read_signals
-from irtwin.signals.sampling import as_sampled, holes
+from irtwin.signals.sampling import as_sampled, checked_cutoff, holes
 from irtwin.signals.sources.bag_source import number_topics
 from irtwin.signals.toml_file import Table, shown, take
 from irtwin.toml_text import read_toml
@@ -65,6 +64,13 @@ class Run:
     def says_effort(self) -> bool:
         """Whether it has torque or power; a run without has commands."""
         return self.signals.torque is not None or self.signals.power is not None
+
+
+def run_of(name: str, signals: Signals, **known: Any) -> Run:
+    """Return an observed run of which nothing is known but its samples, and what is given by the fields' names."""
+    nothing: dict[str, Any] = {"file": Path(name), "sha256": "", "role": "observed", "repeat_of": None}
+    nothing |= {"payload_mass": 0.0, "payload_com": (0.0, 0.0, 0.0), "started": None, "notes": {}}
+    return Run(name=name, signals=signals, **(nothing | known))
 
 
 @dataclass(frozen=True)
@@ -162,19 +168,8 @@ def read_log(
     """
     signals, dropped = read_signals(file, robot, repair=repair)
     pieces, sampled = as_sampled(signals, file)
-    run = Run(
-        name=file.stem,
-        file=file,
-        sha256=checksum(file),
-        role="observed",
-        payload_mass=payload_mass,
-        payload_com=payload_com,
-        repeat_of=None,
-        started=None,
-        notes={},
-        signals=signals,
-        performs=performs,
-    )
+    known = {"payload_mass": payload_mass, "payload_com": payload_com, "performs": performs}
+    run = run_of(file.stem, signals, file=file, sha256=checksum(file), **known)
     return DataSet(
         folder=file.parent,
         robot=robot,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
+from irtwin.signals.filter import FEWEST_PERIODS
 from irtwin.signals.finding import Finding
 from irtwin.signals.holes import HOLE
 from irtwin.signals.samples import FEWEST
@@ -108,3 +110,15 @@ def _updates(q: np.ndarray, step: int) -> np.ndarray:
     changes = [0, *(np.flatnonzero(np.diff(q, axis=0).any(axis=1)) + 1).tolist(), len(q)]
     rows = [np.arange(start, max(stop - step // 2, start + 1), step) for start, stop in pairwise(changes)]
     return np.concatenate(rows)
+
+
+def checked_cutoff(hz: float, runs: Sequence[Signals], said: str) -> float:
+    """Return a stated cutoff, Hz. Raises InputError, beginning with `said`, where runs cannot be filtered with it."""
+    longest = max(float(run.time[-1] - run.time[0]) for run in runs)
+    least, most = FEWEST_PERIODS / longest, min(0.5 / interval(run.time) for run in runs)
+    if not least <= hz < most:
+        raise InputError(
+            f"{said} should be at least {least:.3g} Hz, {FEWEST_PERIODS} periods in the longest run, and below "
+            f"{most:.4g} Hz, half the slowest sampling rate, not {hz:g} Hz"
+        )
+    return hz

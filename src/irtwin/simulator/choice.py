@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
+from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
-from irtwin.identification.progress import Tell
 from irtwin.simulator.fit import LIKELY, SMOOTH, Fit, Played, Slopes
 from irtwin.simulator.servos import NAMES
 
@@ -17,7 +17,6 @@ _LEAST = 2e-3  # rad (m), a misfit that is none
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
 _AGAIN = 2  # passes after numbers were given back
 _NEARLY = 3.0  # times what a number has to gain, by its slopes: beyond, it is not tried without
-_NORMAL = 1.96
 _SAME = 1e-9  # of the chart
 
 
@@ -49,9 +48,9 @@ class Choice:
         return self.fit.servos.of_chart(at)
 
 
-def choose(fit: Fit, tell: Tell | None = None) -> Choice:
+def choose(fit: Fit) -> Choice:
     """Fit all numbers, then give back to the simulator what the evidence is no worse without, the least first."""
-    fit, best = _all_free(fit, tell)
+    fit, best = _all_free(fit)
     own = fit.servos.chart(fit.servos.numbers)
     differs = ~np.isclose(best.at, own, rtol=0, atol=_SAME)
     needed = np.zeros_like(differs)
@@ -64,12 +63,12 @@ def choose(fit: Fit, tell: Tell | None = None) -> Choice:
         some = weakest & (loss < _NEARLY * worth)
         if not some.any():
             break
-        tried = fit.solved(fit.played(np.where(some, own, best.at)), differs & ~some, _AGAIN, tell)
+        tried = fit.solved(fit.played(np.where(some, own, best.at)), differs & ~some, _AGAIN)
         given = some & (fit.cost(fit.rolled(tried.at)) - fit.cost(best) < worth)
         differs &= ~given
         needed |= some & ~given
         best = fit.played(np.where(given.any(axis=0), tried.at, best.at))
-    best = fit.solved(best, differs, _AGAIN, tell)
+    best = fit.solved(best, differs, _AGAIN)
     slopes = fit.slopes(best)
     loss, worth = _weighed(fit, best, slopes, differs)
     return Choice(
@@ -77,14 +76,14 @@ def choose(fit: Fit, tell: Tell | None = None) -> Choice:
     )
 
 
-def _all_free(fit: Fit, tell: Tell | None) -> tuple[Fit, Played]:
+def _all_free(fit: Fit) -> tuple[Fit, Played]:
     """Return the fit with what its misfit and certainty are, and all numbers fitted."""
     free = np.isin(np.arange(len(NAMES)), SMOOTH)[:, None] & fit.servos.can_differ
-    best = fit.begun(tell)
+    best = fit.begun()
     for _ in range(2):
         usual = np.sqrt(np.median(best.squares, axis=0))
         fit = replace(fit, floor=np.maximum(usual, _LEAST), certainty=_certainty(best)).about(best.at)
-        best = fit.solved(fit.limited(fit.played(best.at)), free, tell=tell)
+        best = fit.solved(fit.limited(fit.played(best.at)), free)
     return fit, best
 
 
@@ -134,7 +133,7 @@ def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np
         between = inverse @ (each.T @ each) @ inverse * count / max(count - len(rows), 1)
         doubt = _doubt(fit, best, slopes, differs, joint)
         spread[rows, joint] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)) + doubt)
-    return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-_NORMAL, _NORMAL)])
+    return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
 
 
 def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from irtwin.identification.progress import Tell
+from irtwin.identification.progress import tell_step
 from irtwin.simulator.alone import Alone
 from irtwin.simulator.play import Stretch, play
 from irtwin.simulator.servos import HOLDS, NAMES, Servos
@@ -140,7 +140,7 @@ class Fit:
             right.append(np.einsum("tnk,tn->nk", columns, left) * weight[:, None])
         return Slopes(np.array(normal), np.array(right))
 
-    def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES, tell: Tell | None = None) -> Played:
+    def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES) -> Played:
         """Return numbers with those that are free (9, n) fitted, by Levenberg's way, each joint with its own damping.
 
         A joint keeps what it has where nothing better is found.
@@ -154,8 +154,7 @@ class Fit:
             chosen = np.argmin([self.cost(one) for one in tried], axis=0)
             best = self.best((best, *tried))
             damping = np.maximum(damping * np.array(_DAMPINGS)[chosen], 1e-4)
-            if tell:
-                tell(f"  numbers of servos, pass {number + 1}: {1e3 * np.sqrt(best.squares.mean()):.3g} mrad left")
+            tell_step(f"  numbers of servos, pass {number + 1}: {1e3 * np.sqrt(best.squares.mean()):.3g} mrad left")
             if (before - self.cost(best) < _WORTH).all():
                 break
         return best
@@ -199,7 +198,7 @@ class Fit:
             found = self.best((found, *self.all_played([self.servos.chart(one) for one in tried])))
         return found
 
-    def begun(self, tell: Tell | None = None) -> Played:
+    def begun(self) -> Played:
         """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
         own, tried = self.servos.numbers, []
         free = self.servos.can_differ.copy()
@@ -209,5 +208,5 @@ class Fit:
             ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]
             grid = [np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways]
             begun = self.best(self.all_played([self.servos.chart(one) for one in grid]))
-            tried.append(self.solved(begun, free, 3, tell))
+            tried.append(self.solved(begun, free, 3))
         return self.best(tried)

@@ -10,7 +10,7 @@ import numpy as np
 from irtwin.document.curves import Curves
 from irtwin.document.document import Document
 from irtwin.errors import InputError
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator import writing
@@ -45,7 +45,7 @@ class Playing:
         return self.servos.written(self.numbers, self.differs)
 
 
-def diagnose(data_set: DataSet, model: Model, tell: Tell) -> Playing:
+def diagnose(data_set: DataSet, model: Model) -> Playing:
     """Hold a model against the observed runs by playing their commands.
 
     Raises InputError where a run has no commands or they are in degrees, or the model has no position servos.
@@ -62,11 +62,11 @@ def diagnose(data_set: DataSet, model: Model, tell: Tell) -> Playing:
     stretches = _stretches(runs)
     step = max(_STEP, model.compiled.opt.timestep)
     begun = Fit(alone(own, stretches, step), np.full(len(model.joints), 1e-2), np.full(len(model.joints), 3.0))
-    chosen = choose(begun, paced(tell))
+    chosen = choose(begun)
     tell("Playing all runs")
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
-    before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers), paced(tell))
-    after = tracked(data_set.robot, own, runs, numbers, paced(tell))
+    before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
+    after = tracked(data_set.robot, own, runs, numbers)
     differing = [name for row, name in enumerate(NAMES) if chosen.differs[row].any()]
     closed = parts(chosen, numbers, writing.families(differing))
     horizons = restarted(own, runs, numbers)

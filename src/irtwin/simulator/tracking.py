@@ -9,7 +9,7 @@ from math import factorial
 
 import numpy as np
 
-from irtwin.identification.progress import Tell
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
@@ -83,11 +83,11 @@ def held_out(chosen: Choice, runs: Sequence[Run]) -> OfRun:
     return found
 
 
-def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun, tell: Tell) -> list[Tracked]:
+def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[Tracked]:
     """Play runs as a whole, each with its numbers."""
     found = []
     for run in runs:
-        tell(f"  run {run.name}")
+        tell_step(f"  run {run.name}")
         left = run.signals.q - play(own, [numbers[run.name]], [whole(run)])[0][0]
         some = slice(None, None, max(1, len(left) // _POSES))
         places = [placements(robot, q[some])[:, :3, 3] for q in (run.signals.q, run.signals.q - left)]

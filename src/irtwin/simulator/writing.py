@@ -9,8 +9,8 @@ import numpy as np
 from scipy.special import expit
 
 from irtwin.document import document as said
-from irtwin.document.cause_ids import cause_ids
 from irtwin.document.curves import Curves, RunError
+from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.closing import share
 from irtwin.gap.thresholds import DEFAULT

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.effect import JointEffect
+from irtwin.effects.effect import NORMAL, JointEffect
 from irtwin.identification.power_line import power_rise
-from irtwin.identification.uncertainty import NORMAL
 from irtwin.signals.motion import Motion
 from irtwin.twin.price import cost, trapezoid
 from irtwin.twin.twin import LedgerEntry, Twin

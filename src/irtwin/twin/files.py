@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from irtwin.document import form
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
@@ -19,51 +21,62 @@ from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
-from irtwin.twin.choice import Choice
 from irtwin.twin.torque_scale import TorqueScale
-from irtwin.twin.twin import BaseParameter, Parameter, Twin
+from irtwin.twin.twin import BaseParameter, Choice, Parameter, Twin
 
 _FORMAT, _VERSION = "irtwin twin", 1
 _LARGEST = 100_000_000  # bytes
-_SHEET = (
-    *("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration"),
-    *("friction_width", "friction_exponent"),
-)
-_Columns = dict[str, tuple[type | None, ...]]
-_PARAMETER: _Columns = {
-    "effect": (str,),
-    "joint": (str, None),
-    "link": (str, None),
-    "name": (str,),
-    "value": (float,),
-    "unit": (str,),
-    "lower": (float, None),
-    "upper": (float, None),
-}
-_TORQUE_SCALE: _Columns = {
-    "uncertainty": (float,),
-    "source": (str,),
-    "low": (float,),
-    "high": (float,),
-    "why": (str,),
-}
-_REMAINDER: _Columns = {"sample": (float,), "mean": (float,), "seconds": (float,)}
-_CHOICE: _Columns = {
-    "effect": (str,),
-    "probability": (float,),
-    "unit": (str, None),
-    "rmse_without": (float, None),
-    "rmse_with": (float, None),
-    "energy_error_without": (float, None),
-    "energy_error_with": (float, None),
-}
-_BASE_PARAMETER: _Columns = {
-    "name": (str,),
-    "value": (float,),
-    "unit": (str,),
-    "lower": (float,),
-    "upper": (float,),
-}
+_MEND = "save the twin again"
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """What is known of a joint beside the URDF."""
+
+    gear_ratio: float | None
+    rotor_inertia: float | None
+    torque_constant: float | None
+    winding_resistance: float | None
+    acceleration: float | None
+    friction_width: float | None
+    friction_exponent: float | None
+
+
+@dataclass(frozen=True)
+class _Robot:
+    name: str
+    manufacturer: str | None
+    type: str | None
+    weight: float | None
+    joints: Mapping[str, _Sheet]
+    urdf: str
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """Where an effect of a shape acts."""
+
+    joints: tuple[str, ...] | None
+    runs: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Twin:
+    """A twin as its file has it, less its effects; `covariance`: the rows of its lower triangle."""
+
+    robot: _Robot
+    unidentified: tuple[str, ...]
+    fitted: tuple[str, ...]
+    cutoff: float | None
+    condition_number: float | None
+    parameters: tuple[Parameter, ...]
+    base_parameters: tuple[BaseParameter, ...]
+    covariance: tuple[str, ...] | None = None
+    torque_scale: TorqueScale | None = None
+    body_change: float | None = None
+    quantities: tuple[Parameter, ...] = ()
+    remainder: Remainder | None = None
+    choices: tuple[Choice, ...] = ()
 
 
 def load(path: Path) -> Twin:
@@ -73,7 +86,7 @@ def load(path: Path) -> Twin:
 
 def to_json(twin: Twin) -> str:
     """Return a twin as JSON text: the same twin, the same text."""
-    robot = twin.robot
+    robot, sheet = twin.robot, [each.name for each in fields(_Sheet)]
     document = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -82,7 +95,7 @@ def to_json(twin: Twin) -> str:
             "manufacturer": robot.manufacturer,
             "type": robot.type,
             "weight": robot.weight,
-            "joints": {joint.name: {key: getattr(joint, key) for key in _SHEET} for joint in robot.joints},
+            "joints": {joint.name: {key: getattr(joint, key) for key in sheet} for joint in robot.joints},
             "urdf": robot.urdf,
         },
         "effects": [_effect_document(effect) for effect in twin.stack.effects],
@@ -114,97 +127,26 @@ def from_json(text: str | bytes, path: Path) -> Twin:
         document = parse_json(text)
     except ValueError as error:
         raise InputError(f"{path}: not JSON ({error}); name a twin that irtwin saved") from error
-    reader = _Reader(path, document, "")
-    if reader.take("format", str) != _FORMAT:
+    if not isinstance(document, dict) or document.get("format") != _FORMAT:
         raise InputError(f'{path}: "format" is not "{_FORMAT}"; name a twin that irtwin saved')
-    if reader.take("version", int) != _VERSION:
+    if document.get("version") != _VERSION:
         raise InputError(f'{path}: "version" is not {_VERSION}; identify the twin again with this irtwin')
-    twin = Twin(
-        robot=_robot(path, reader.inner("robot")),
-        effects=tuple(_effect(path, place, each) for place, each in enumerate(reader.take("effects", list), 1)),
-        parameters=tuple(Parameter(**row) for row in reader.rows("parameters", _PARAMETER)),
-        cutoff=reader.take("cutoff", float, None),
-        unidentified=tuple(reader.texts("unidentified")),
-        base_parameters=tuple(BaseParameter(**row) for row in reader.rows("base_parameters", _BASE_PARAMETER)),
-        condition_number=reader.take("condition_number", float, None),
-        fitted=tuple(reader.texts("fitted")),
-        quantities=tuple(Parameter(**row) for row in reader.rows("quantities", _PARAMETER))
-        if "quantities" in document
-        else (),
-        torque_scale=_torque_scale(reader) if "torque_scale" in document else None,
-        remainder=Remainder(**reader.inner("remainder").columns(_REMAINDER)) if "remainder" in document else None,
-        choices=tuple(map(_choice, reader.each("choices"))) if "choices" in document else (),
-        body_change=reader.take("body_change", float) if "body_change" in document else None,
-    )
+    read = form.from_json(_Twin, document, f"{path}, twin", _MEND)
+    effects = document.get("effects")
+    if not isinstance(effects, list):
+        raise InputError(f"{path}, twin.effects must be an array; {_MEND}")
+    known = {each.name: getattr(read, each.name) for each in fields(read) if each.name not in ("robot", "covariance")}
+    robot = _robot(path, read.robot)
+    twin = Twin(robot, tuple(_effect(path, place, each) for place, each in enumerate(effects)), **known)
     _check_complete(path, twin)
-    return replace(twin, covariance=_covariance(reader)) if "covariance" in document else twin
+    return twin if read.covariance is None else replace(twin, covariance=_covariance(path, read))
 
 
-class _Reader:
-    """An object of the document, whose faults name file and key."""
-
-    def __init__(self, path: Path, values: Any, place: str):
-        if not isinstance(values, dict):
-            raise InputError(
-                f"{path}: {place or 'the document'} should be a JSON object; name a twin that irtwin saved"
-            )
-        self.path, self.values, self.place = path, values, place
-
-    def fail(self, key: str, what: str) -> InputError:
-        return InputError(f'{self.path}: {self.place}"{key}" {what}; save the twin again')
-
-    def take(self, key: str, *kinds: type | None) -> Any:
-        if key not in self.values:
-            raise self.fail(key, "is missing")
-        value = self.values[key]
-        if value is None and None in kinds:
-            return None
-        if float in kinds and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        if isinstance(value, bool) or not isinstance(value, tuple(kind for kind in kinds if kind)):
-            raise self.fail(key, f"is no {' or '.join(kind.__name__ for kind in kinds if kind)}")
-        if isinstance(value, float) and not math.isfinite(value):
-            raise self.fail(key, "is not a finite number")
-        return value
-
-    def truth(self, key: str) -> bool:
-        if not isinstance(self.values.get(key), bool):
-            raise self.fail(key, "is neither true nor false")
-        return bool(self.values[key])
-
-    def inner(self, key: str) -> _Reader:
-        return _Reader(self.path, self.take(key, dict), f'in "{key}": ')
-
-    def texts(self, key: str) -> list[str]:
-        values = self.take(key, list)
-        if not all(isinstance(value, str) for value in values):
-            raise self.fail(key, "holds something that is no text")
-        return list(values)
-
-    def rows(self, key: str, columns: _Columns) -> list[dict[str, Any]]:
-        return [row.columns(columns) for row in self.each(key)]
-
-    def each(self, key: str) -> list[_Reader]:
-        return [_Reader(self.path, row, f'in "{key}", entry {n}: ') for n, row in enumerate(self.take(key, list), 1)]
-
-    def columns(self, columns: _Columns) -> dict[str, Any]:
-        return {name: self.take(name, *kinds) for name, kinds in columns.items()}
-
-
-def _torque_scale(reader: _Reader) -> TorqueScale:
-    return TorqueScale(**reader.inner("torque_scale").columns(_TORQUE_SCALE))
-
-
-def _choice(reader: _Reader) -> Choice:
-    joints, rivals = (tuple(reader.texts(key)) for key in ("joints", "rivals"))
-    return Choice(**reader.columns(_CHOICE), joints=joints, rivals=rivals, chosen=reader.truth("chosen"))
-
-
-def _covariance(reader: _Reader) -> np.ndarray:
+def _covariance(path: Path, read: _Twin) -> np.ndarray:
     """Return the covariance of the parameters from the rows of its lower triangle, as text."""
-    rows, count = reader.texts("covariance"), len(reader.take("parameters", list))
+    rows, count = read.covariance or (), len(read.parameters)
     if len(rows) != count:
-        raise reader.fail("covariance", f"should have {count} rows")
+        raise InputError(f"{path}, twin.covariance must be an array of {count}; {_MEND}")
     lower = np.zeros((count, count))
     for number, row in enumerate(rows):
         try:
@@ -212,7 +154,7 @@ def _covariance(reader: _Reader) -> np.ndarray:
         except ValueError:
             values = np.zeros(0)
         if len(values) != number + 1 or not np.isfinite(values).all():
-            raise reader.fail("covariance", f"row {number + 1} is not {number + 1} finite numbers")
+            raise InputError(f"{path}, twin.covariance[{number}] must be {number + 1} finite numbers; {_MEND}")
         lower[number, : number + 1] = values
     return np.asarray(lower + np.tril(lower, -1).T)
 
@@ -230,45 +172,34 @@ def _finite(value: float) -> float | str:
     return value if math.isfinite(value) else str(value)
 
 
-def _effect(path: Path, place: int, document: Any) -> Effect:
-    reader = _Reader(
-        path, {"id": document} if isinstance(document, str) else document, f'in "effects", entry {place}: '
-    )
-    name = reader.take("id", str)
+def _effect(path: Path, place: int, given: Any) -> Effect:
+    where = f"{path}, twin.effects[{place}]"
+    name = given.get("id") if isinstance(given, dict) else given
+    if not isinstance(name, str):
+        raise InputError(f"{where} must be an id, or an object with one; {_MEND}")
     known = catalogue().get(name)
     if known is None:
         raise InputError(f'{path}: there is no effect "{name}"; choose from {", ".join(catalogue())}')
-    if isinstance(document, str):
+    if isinstance(given, str):
         return known
-    shape = reader.inner("shape").values
-    if shape.keys() != known.shape.keys():
-        raise reader.fail("shape", f"should have {', '.join(known.shape) or 'no key'}")
-    kinds = {key: type(value) for key, value in known.shape.items()}
+    placed, shape = form.from_json(_Placed, given, where, _MEND), given.get("shape")
+    if not isinstance(shape, dict) or shape.keys() != known.shape.keys():
+        raise InputError(f"{where}.shape must have {', '.join(known.shape) or 'no key'}; {_MEND}")
     try:
-        fields = {key: kinds[key](value) for key, value in shape.items()}
+        values = {key: type(value)(shape[key]) for key, value in known.shape.items()}
     except (TypeError, ValueError) as error:
-        raise reader.fail("shape", f"holds a wrong value ({error})") from error
-    parts = {
-        key: None if reader.take(key, list, None) is None else tuple(reader.texts(key)) for key in ("joints", "runs")
-    }
-    return replace(known, **fields, **parts)
+        raise InputError(f"{where}.shape holds a wrong value ({error}); {_MEND}") from error
+    return replace(known, **values, joints=placed.joints, runs=placed.runs)
 
 
-def _robot(path: Path, reader: _Reader) -> Robot:
-    robot = parse_urdf(reader.take("urdf", str), source=f"{path}, URDF in it")
-    sheets = reader.inner("joints")
-    joints = []
-    for joint in robot.joints:
-        sheet = sheets.inner(joint.name)
-        joints.append(replace(joint, **{key: sheet.take(key, float, None) for key in _SHEET}))
-    return replace(
-        robot,
-        name=reader.take("name", str),
-        manufacturer=reader.take("manufacturer", str, None),
-        type=reader.take("type", str, None),
-        weight=reader.take("weight", float, None),
-        joints=tuple(joints),
-    )
+def _robot(path: Path, read: _Robot) -> Robot:
+    robot = parse_urdf(read.urdf, source=f"{path}, URDF in it")
+    lacking = [joint for joint in robot.joint_names if joint not in read.joints]
+    if lacking:
+        raise InputError(f"{path}, twin.robot.joints.{lacking[0]} must be given; {_MEND}")
+    joints = tuple(replace(joint, **vars(read.joints[joint.name])) for joint in robot.joints)
+    said = {key: getattr(read, key) for key in ("name", "manufacturer", "type", "weight")}
+    return replace(robot, **said, joints=joints)
 
 
 def _check_complete(path: Path, twin: Twin) -> None:

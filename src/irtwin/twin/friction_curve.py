@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from irtwin.document.curves import FrictionCurve, FrictionNumber, MeasuredFriction
-from irtwin.effects.effect import Effect, Predicted, force_unit
+from irtwin.effects.effect import NORMAL, Effect, Predicted, force_unit
 from irtwin.effects.stack import Stack
-from irtwin.identification.uncertainty import NORMAL
 from irtwin.signals.conditioning import STANDSTILL
 from irtwin.signals.filter import low_pass
 from irtwin.signals.motion import Motion

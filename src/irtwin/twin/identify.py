@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import BASELINE
-from irtwin.effects.effect import Effect, JointEffect
+from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
@@ -27,11 +26,10 @@ from irtwin.identification.fits import (
     real_terms,
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
-from irtwin.identification.progress import Tell
 from irtwin.identification.remainder import Remainder, remainder
-from irtwin.identification.threads import one_blas_thread
-from irtwin.identification.torque_constants import TorqueConstants, torque_constants
-from irtwin.identification.uncertainty import NORMAL, half_widths, normal_covariance
+from irtwin.identification.torque_constants import torque_from_current
+from irtwin.identification.two_processes import one_blas_thread
+from irtwin.identification.uncertainty import half_widths, normal_covariance
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
@@ -41,11 +39,7 @@ Found = tuple[Terms, Estimate]
 
 @one_blas_thread()
 def identify(
-    robot: Robot,
-    motions: Sequence[Motion],
-    effects: Sequence[str | Effect] = BASELINE,
-    prior: Prior | None = None,
-    tell: Tell | None = None,
+    robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect] = BASELINE, prior: Prior | None = None
 ) -> Twin:
     """Return the twin of a robot that fits the motions.
 
@@ -58,20 +52,18 @@ def identify(
     Effects are ids, for which the data choose among the candidates of shape (joint by joint), or effects of a shape.
     Those that nothing measured can show are listed as `unidentified`, and left out. Where columns depend on what other
     effects predict, fit and prediction are repeated until they agree. `prior` is what is known before the motions;
-    None: what the catalogue expects. `tell` is told how far that has come, where it takes long. Raises InputError where
+    None: what the catalogue expects. Raises InputError where
     there is nothing to fit.
     """
     if not motions:
         raise InputError("there is no run to fit a twin to; give at least one")
-    constants = None
-    if not any(motion.torque is not None for motion in motions):
-        robot, motions, constants = _torque_from_current(robot, motions)
+    robot, motions, constants = torque_from_current(robot, motions)
     with_torque = [motion for motion in motions if motion.torque is not None]
     with_power = [motion for motion in motions if motion.power is not None]
     measured = [motion for motion in motions if motion.torque is not None or motion.power is not None]
     if not with_torque and not with_power:
         raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
-    robot = with_friction_near_zero(robot, with_torque, effects, tell)
+    robot = with_friction_near_zero(robot, with_torque, effects)
     stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
     left: list[Block] = []
@@ -79,15 +71,15 @@ def identify(
     condition: float | None = None
     change: float | None = None
     if with_torque:
-        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque, tell)[1])
-        blocks, torque = fit_torque(stack, with_torque, tell)
+        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque)[1])
+        blocks, torque = fit_torque(stack, with_torque)
         powered = bool(with_power) and not stack.fixed.all()
         if powered:
             values = torque.values
             stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values)[1])
             if any(effect.carries_torque for effect in stack.effects):
                 known = blocks if len(with_torque) == len(measured) else None
-                torque = fit_both(stack, measured, values, known, tell)
+                torque = fit_both(stack, measured, values, known)
         free, torque = torque, with_consistent_bodies(stack, stack.torque_terms, torque)
         found: list[Found] = [(stack.torque_terms, torque)]
         if powered:
@@ -134,23 +126,6 @@ def _visible(whole: Stack, *, torque: bool, power: bool) -> Stack:
     carried = any(effect.carries_torque for effect in whole.effects)
     seen |= {effect.id for effect, _ in whole.torque_terms if torque or (carried and effect.channel == "torque")}
     return whole.with_effects([effect for effect in whole.effects if effect.id in seen])
-
-
-def _torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot, list[Motion], TorqueConstants | None]:
-    """Give motions their torque, current times torque constant, where the power balance tells the constants."""
-    telling = [motion for motion in motions if motion.current is not None and motion.power is not None]
-    if not telling:
-        return robot, list(motions), None
-    found = torque_constants(robot, telling)
-    joints = tuple(
-        replace(joint, torque_constant=float(constant))
-        for joint, constant in zip(robot.joints, found.constants, strict=True)
-    )
-    known = [
-        motion if motion.current is None else replace(motion, torque=motion.current * found.constants)
-        for motion in motions
-    ]
-    return replace(robot, joints=joints), known, found
 
 
 def _shaped(stack: Stack, open_shapes: set[str], signal: str, fit: Callable[[Stack], Estimate]) -> Stack:
@@ -207,8 +182,8 @@ def _quantities(robot: Robot, found: Sequence[Found], parameters: Sequence[Param
             if type(effect).parameters is Effect.parameters:
                 continue
             own = [place for place, (owner, _) in enumerate(terms) if owner is effect]
-            values, covariance = result.values[own], result.covariance[np.ix_(own, own)]
-            for each in effect.parameters(robot, values, covariance, known):
+            given = Coefficients(result.values[own], result.covariance[np.ix_(own, own)], known)
+            for each in effect.parameters(robot, given):
                 place = (each.joint, None, each.name, each.value, each.unit, each.lower, each.upper)
                 told.append(Parameter(effect.id, *place))
     return tuple(told)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.effects.effect import NORMAL
 from irtwin.identification.power_line import power_slope
-from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from irtwin.signals.channels import Signals, from_columns
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.filter import kernel
 from irtwin.signals.holes import HOLE
-from irtwin.signals.log import Run
+from irtwin.signals.log import Run, run_of
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import FEWEST
 from irtwin.signals.sampling import holes, interval
@@ -187,18 +186,7 @@ class EnergySoFar:
         """Return signals as a run; a channel that was not said throughout is none."""
         said = {name: None for name, values in signals.logged().items() if np.isnan(values).any()}
         whole = Signals(**{**signals.logged(), **said})  # type: ignore[arg-type]
-        return Run(
-            name=self._name,
-            file=Path(self._name),
-            sha256="",
-            role="live",
-            payload_mass=self._payload,
-            payload_com=self._payload_com,
-            repeat_of=None,
-            started=None,
-            notes={},
-            signals=whole,
-        )
+        return run_of(self._name, whole, role="live", payload_mass=self._payload, payload_com=self._payload_com)
 
     def _add(self, stretch: Stretch) -> None:
         assert self._twin is not None

@@ -7,15 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, Term
+from irtwin.effects.effect import NORMAL, Effect, Term
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.identification.remainder import Remainder
-from irtwin.identification.uncertainty import NORMAL
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
-from irtwin.twin.choice import Choice
 from irtwin.twin.torque_scale import TorqueScale
 
 _CONTRADICTED = 0.01  # of a joint's torque, RMS: by less, consistent bodies are as good as any
@@ -231,3 +229,25 @@ def _deviation(parameter: Parameter, spread: float) -> float:
     if parameter.lower is None or parameter.upper is None:
         return spread
     return max(parameter.upper - parameter.value, parameter.value - parameter.lower) / NORMAL
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An effect of the catalogue: whether the twin has it by what data show, at which joints, and how sure that is.
+
+    What is not `chosen` could not be told: neither that it is there nor that it is not. `joints`: none for an effect of
+    the whole robot, or of all joints alike. `rivals`: other effects that could be in its place.
+    On groups of runs that are left out of the fit in turn, without the effect and with it: `rmse`, in `unit`, of the
+    channel that shows it, at the joint that gains most; `energy_error`, % in the mean; None where nothing tells.
+    """
+
+    effect: str
+    joints: tuple[str, ...]
+    chosen: bool
+    probability: float
+    rivals: tuple[str, ...] = ()
+    unit: str | None = None
+    rmse_without: float | None = None
+    rmse_with: float | None = None
+    energy_error_without: float | None = None
+    energy_error_with: float | None = None

@@ -15,14 +15,13 @@ from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.admission import admit
 from irtwin.gap.data.baseline import baseline
-from irtwin.gap.data.shaken import shaken
+from irtwin.gap.data.noise_floor import shaken
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.friction_near_zero import with_friction_near_zero
-from irtwin.identification.progress import Tell
-from irtwin.identification.torque_constants import torque_constants
+from irtwin.identification.torque_constants import torque_from_current
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
@@ -132,7 +131,7 @@ class Case:
         runs = [motion.run for motion in self.with_torque]
         return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
 
-    def with_friction_near_zero(self, tell: Tell | None = None) -> Case:
+    def with_friction_near_zero(self) -> Case:
         """Return the case with the turn of each joint's dry friction.
 
         It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
@@ -141,7 +140,7 @@ class Case:
         found = self.robot
         for motions in (self.seen, self.others):
             if motions:
-                turned = with_friction_near_zero(self.robot, motions, self.effects, tell)
+                turned = with_friction_near_zero(self.robot, motions, self.effects)
                 both = zip(found.joints, turned.joints, strict=True)
                 found = replace(found, joints=tuple(_turned(own, one) for own, one in both))
         return replace(self, robot=found)
@@ -151,21 +150,16 @@ class Case:
         return any(getattr(motion, signal) is not None for motion in self.seen)
 
 
-def case_of(
-    data_set: DataSet,
-    withhold: Sequence[str],
-    thresholds: Thresholds,
-    twin: Twin | None = None,
-    tell: Tell | None = None,
-) -> Case:
+def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, twin: Twin | None = None) -> Case:
     """Prepare a data set; `withhold` takes effects out of the twin, which is `twin` or what the data set says.
 
-    `tell` is told how far that has come, where it takes long. Raises InputError where `baseline` and `admit` do.
+    Raises InputError where `baseline` and `admit` do.
     """
     begun = baseline(data_set, withhold, thresholds.data.moved, twin)
-    cutoff = cutoff_for(begun.robot, data_set.runs, data_set.cutoff, tell)
+    cutoff = cutoff_for(begun.robot, data_set.runs, data_set.cutoff)
     given = {run.name: condition_for_fit(run, begun.robot, cutoff.hz) for run in data_set.runs}
-    robot, motions = _torque_from_current(begun.robot, given)
+    robot, known, _ = torque_from_current(begun.robot, list(given.values()))
+    motions = dict(zip(given, known, strict=True))
     admit(data_set, motions, thresholds.data.shortest)
     case = Case(
         robot,
@@ -178,7 +172,7 @@ def case_of(
         _stated(data_set),
         cutoff,
     )
-    return case.with_friction_near_zero(tell)
+    return case.with_friction_near_zero()
 
 
 def _turned(before: Joint, joint: Joint) -> Joint:
@@ -195,24 +189,6 @@ def _stated(data_set: DataSet) -> Stated:
         rated_payload=float(rated) if isinstance(rated, int | float) and rated > 0 else None,
         torque_scale=data_set.torque_scale_uncertainty,
     )
-
-
-def _torque_from_current(robot: Robot, motions: dict[str, Motion]) -> tuple[Robot, dict[str, Motion]]:
-    """Where there is no torque but current and power: let their balance tell the torque constants."""
-    if any(motion.torque is not None for motion in motions.values()):
-        return robot, motions
-    telling = [motion for motion in motions.values() if motion.current is not None and motion.power is not None]
-    if not telling:
-        return robot, motions
-    constants = torque_constants(robot, telling).constants
-    joints = tuple(
-        replace(joint, torque_constant=float(value)) for joint, value in zip(robot.joints, constants, strict=True)
-    )
-    found = {
-        name: motion if motion.current is None else replace(motion, torque=motion.current * constants)
-        for name, motion in motions.items()
-    }
-    return replace(robot, joints=joints), found
 
 
 def _labels(runs: Sequence[Run]) -> dict[str, str]:

@@ -10,8 +10,8 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.moments import Moments, summed
-from irtwin.gap.regression.normal_equations import System, noise_before
+from irtwin.gap.regression.moments import Moments, Summed
+from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Data
 from irtwin.robot.description import Robot
 from irtwin.signals.log import Run
@@ -29,10 +29,10 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
     if not system.both:
         return
     others = [run for run in runs if run.role != "observed"]
-    moments = system.moments(noise_before(system))
+    moments = system.moments(system.noise_before)
     seen = system.group_observed
-    other = system.solution((), summed([m for m, own in zip(moments, seen, strict=True) if not own]))
-    total = summed([m for m, own in zip(moments, seen, strict=True) if own])
+    other = system.solution((), Summed([m for m, own in zip(moments, seen, strict=True) if not own]))
+    total = Summed([m for m, own in zip(moments, seen, strict=True) if own])
     own = system.solution((), total)
     foreign = _foreign_share(system, total, own, other) > limits.foreign[others[0].role]
     opposed = _opposed(stack.robot, system, own, other)

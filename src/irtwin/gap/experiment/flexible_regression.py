@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from irtwin.document.document import Closeable
 from irtwin.effects.friction import sharp_sign
 from irtwin.gap.localisation.channel_residuals import ChannelResidual
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
@@ -27,66 +26,51 @@ _RIDGES = (1e-3, 1e-2, 1e-1)  # of the mean square of a feature
 _MEMORY = (0.1, 0.5)  # s
 
 
-@dataclass(frozen=True)
-class FlexibleRegression:
-    """Mean squares of g equations on groups left out, (g,) each, in the units of the measurement.
+def closeable(squares: np.ndarray, floor: np.ndarray | None, least_gap: float) -> Closeable:
+    """Return which part of the gap above the floor could be closed, in all equations and in each.
 
-    `plain`, `closed`: what the twin and the twin with its causes leave, refitted to all runs; `plain_regressed` and
-    `closed_regressed`: what a regression of these on the motion leaves. `floor` (g,): RMS of the noise; None: unknown.
-    A gap smaller than `least_gap`, of the floor's mean square, has no shares.
+    squares: (4, g) mean squares on groups left out: of what the twin leaves, refitted to all runs, of what a regression
+    of that on the motion does, and of both with the causes. `floor` (g,): RMS of the noise, None where unknown; then
+    fractions are of the mean square. They are None where the gap is smaller than `least_gap`, of the floor's.
+    `closed`: by the causes; `by_regression`: by a regression of what the plain twin leaves; `nameless`: by one of what
+    the causes leave, that is, without a name; `closeable`: by the better of the two.
     """
-
-    plain: np.ndarray
-    plain_regressed: np.ndarray
-    closed: np.ndarray
-    closed_regressed: np.ndarray
-    floor: np.ndarray | None
-    least_gap: float
-
-    def shares(self) -> Closeable:
-        """Return which part of the gap above the floor could be closed, in all equations and in each.
-
-        `closed`: by the causes, refitted to all runs; `by_regression`: by a regression of what the plain twin leaves;
-        `nameless`: by a regression of what the causes leave, that is, without a name; `closeable`: by the better of the
-        two. Fractions are of the mean square where no floor is known, None where there is no gap.
-        """
-        floor = np.zeros_like(self.plain) if self.floor is None else self.floor**2
-        level = self.plain if self.floor is None else floor
-        gap = (self.plain - floor) / level
-        left = {
-            "closed": self.plain - self.closed.clip(floor),
-            "closeable": self.plain - np.minimum(self.plain_regressed, self.closed_regressed).clip(floor),
-            "by_regression": self.plain - self.plain_regressed.clip(floor),
-            "nameless": self.closed - self.closed_regressed.clip(floor),
-        }
-        parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
-        total = float(np.maximum(gap, 0.0).sum())
-        total = total if total > self.least_gap * len(gap) else 0.0
-        gaps = np.where(gap > self.least_gap, gap, 0.0)
-        shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
-        shares |= {f"{name}_by_equation": tuple(map(_share, part, gaps)) for name, part in parts.items()}
-        return Closeable(
-            **shares,
-            of="the mean square, as no floor is known" if self.floor is None else "the gap above the floor",
-        )
+    plain, plain_regressed, closed, closed_regressed = squares
+    least = np.zeros_like(plain) if floor is None else floor**2
+    level = plain if floor is None else least
+    gap = (plain - least) / level
+    left = {
+        "closed": plain - closed.clip(least),
+        "closeable": plain - np.minimum(plain_regressed, closed_regressed).clip(least),
+        "by_regression": plain - plain_regressed.clip(least),
+        "nameless": closed - closed_regressed.clip(least),
+    }
+    parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
+    total = float(np.maximum(gap, 0.0).sum())
+    total = total if total > least_gap * len(gap) else 0.0
+    gaps = np.where(gap > least_gap, gap, 0.0)
+    shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
+    shares |= {f"{name}_by_equation": tuple(map(_share, part, gaps)) for name, part in parts.items()}
+    return Closeable(
+        **shares, of="the mean square, as no floor is known" if floor is None else "the gap above the floor"
+    )
 
 
-def flexible_regression(left: ChannelResidual, seed: int, tell: Tell | None = None) -> FlexibleRegression | None:
+def flexible_regression(left: ChannelResidual, seed: int) -> Closeable | None:
     """Regress what the twin leaves on what the motion is, groups of observed runs left out in turn.
 
     A ridge on tents and random Fourier features (Rahimi and Recht 2007) of angle, speed, acceleration, load,
     temperature, time and what went before, of the joint and of its neighbours, each also times the direction, as
     friction jumps with it. None where there are fewer than two groups or too few samples.
-    `tell` is told how far that has come, where it takes long.
     """
-    told, finding = paced(tell), left.finding
+    finding = left.finding
     torque, motions = finding.name == "torque", [trace.motion for trace in left.refitted]
     warm = all(motion.temperature is not None for motion in motions)
     thinned = max(1, sum(len(motion.time) for motion in motions) // _ROWS)
     parts = []
     for plain, closed in zip(left.refitted, left.after or left.refitted, strict=True):
         motion = plain.motion
-        told(f"  how much of {finding.name} could be closed, {motion.run}")
+        tell_step(f"  how much of {finding.name} could be closed, {motion.run}")
         group = _groups(finding.system, motion)
         kept = np.arange(len(group)) % max(thinned, decimation(motion.rate, motion.cutoff) if motion.cutoff else 1) == 0
         kept &= group >= 0
@@ -99,11 +83,10 @@ def flexible_regression(left: ChannelResidual, seed: int, tell: Tell | None = No
     generator = np.random.default_rng(seed)
     sums = []
     for equation in range(before.shape[1]):
-        told(f"  how much of {finding.name} could be closed, {equation + 1} of {before.shape[1]}")
+        tell_step(f"  how much of {finding.name} could be closed, {equation + 1} of {before.shape[1]}")
         features = _features(variables[:, equation], signs[:, equation], generator)
         sums.append(_regressed(features, np.column_stack([before[:, equation], after[:, equation]]), group))
-    squares = np.array(sums).T
-    return FlexibleRegression(squares[0], squares[1], squares[2], squares[3], finding.floor, left.least)
+    return closeable(np.array(sums).T, finding.floor, left.least)
 
 
 def _groups(system: System, motion: Motion) -> np.ndarray:

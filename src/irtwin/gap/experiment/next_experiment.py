@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +11,13 @@ from irtwin.document.curves import PlannedMotion
 from irtwin.document.experiment import Considered, Experiment, Question
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
-from irtwin.gap.experiment.planned_equations import PlannedEquations, Products
+from irtwin.gap.experiment.planned_equations import PlannedEquations, Products, fitted, unimitated
 from irtwin.gap.experiment.programmes import LONGEST, Programme, programmes
-from irtwin.gap.experiment.separation import fitted, unimitated
-from irtwin.gap.isolation.branches import branches
 from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.finding import branches
 from irtwin.gap.regression.hypotheses import Column, candidate_columns
 from irtwin.identification.excitation import Excitation
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -74,61 +73,29 @@ class Weight:
 
 @dataclass(frozen=True)
 class Proposal:
-    """The experiment that is proposed: the programme chosen (None where none helps), and what each would tell.
+    """The experiment that is proposed, its programme (None where none helps), and what that would tell."""
 
-    `joints` of the `robot` are those that the question is about.
-    """
-
-    purpose: str
-    effects: tuple[str, ...]
-    joints: tuple[str, ...]
-    robot: Robot
+    experiment: Experiment
     programme: Programme | None
     weights: tuple[Weight, ...]
-    considered: tuple[tuple[Programme, float], ...]
-    by_hand: tuple[str, ...]
-    note: str | None
-    enough: float
+    curve: PlannedMotion | None
 
-    @property
-    def experiment(self) -> Experiment:
-        """What a diagnosis says of it: texts, numbers and the programme to run."""
-        chosen = self.programme
-        return Experiment(
-            purpose=self.purpose,
-            effects=self.effects,
-            joints=self.joints,
-            motions=(*([chosen.text] if chosen else []), *self.by_hand),
-            expected_separation=min((_rounded(w.expected) for w in self.weights), default=None) if chosen else None,
-            separation_now=min((_rounded(w.now) for w in self.weights), default=None),
-            separation_that_is_enough=self.enough,
-            questions=tuple(weight.question for weight in self.weights),
-            programme=chosen.said if chosen else None,
-            considered=tuple(
-                Considered(kind=one.kind, minutes=round(one.cost / 60, 1), expected_separation=_rounded(worth))
-                for one, worth in self.considered
-            ),
-            note=self.note,
-        )
 
-    @property
-    def curve(self) -> PlannedMotion | None:
-        """What a page draws of the programme: time (s) and each joint's position, thinned."""
-        if self.programme is None:
-            return None
-        time, q, start = [], [], 0.0
-        moved = [self.robot.index(joint) for joint in self.programme.joints]
-        for motion in self.programme.motions:
-            every = -(-len(motion.time) * len(self.programme.motions) // _DRAWN)
-            time.append(motion.time[::every] + start)
-            q.append(motion.q[::every])
-            start = float(time[-1][-1]) + every / motion.rate
-        return PlannedMotion(
-            time=tuple(np.concatenate(time).round(3).tolist()),
-            joints=self.programme.joints,
-            units=tuple(self.robot.joints[joint].unit for joint in moved),
-            q=tuple(map(tuple, np.concatenate(q).T[moved].round(5).tolist())),
-        )
+def curve(robot: Robot, programme: Programme) -> PlannedMotion:
+    """Return what a page draws of a programme: time (s) and the position of each joint that moves, thinned."""
+    time, q, start = [], [], 0.0
+    moved = [robot.index(joint) for joint in programme.joints]
+    for motion in programme.motions:
+        every = -(-len(motion.time) * len(programme.motions) // _DRAWN)
+        time.append(motion.time[::every] + start)
+        q.append(motion.q[::every])
+        start = float(time[-1][-1]) + every / motion.rate
+    return PlannedMotion(
+        time=tuple(np.concatenate(time).round(3).tolist()),
+        joints=programme.joints,
+        units=tuple(robot.joints[joint].unit for joint in moved),
+        q=tuple(map(tuple, np.concatenate(q).T[moved].round(5).tolist())),
+    )
 
 
 @dataclass(frozen=True)
@@ -209,12 +176,11 @@ def next_experiment(
     seen: Sequence[Motion],
     enough: float,
     excitation: Callable[[], Excitation | None] | None = None,
-    tell: Tell | None = None,
 ) -> Proposal | None:
     """Design what tells the rivals of causes that matter apart; where there are none, what shows the effects `lacking`.
 
-    `channels`: planned equations of each; `seen`: the motions that were judged; `excitation` as for `programmes`;
-    `tell` is told which programme is weighed, where that takes long. Of the programmes that reach a separation of
+    `channels`: planned equations of each; `seen`: the motions that were judged; `excitation` as for `programmes`.
+    Of the programmes that reach a separation of
     `enough` in every question the one that takes the least time is chosen, else the one that answers the most.
     None where there is nothing to ask.
     """
@@ -233,8 +199,7 @@ def next_experiment(
     warm = any("temperature" in effect.requires for effect in effects)
     off = [effect for effect in effects if effect.taken_off]
     tried = programmes(robot, joints, seen, warm=warm, take_off=off, excitation=excitation) if questions else ()
-    told = paced(tell)
-    weighed = [(one, _weigh(one, questions, told)) for one in tried]
+    weighed = [(one, _weigh(one, questions)) for one in tried]
     note = _note([weights for _, weights in weighed])
     if questions and not weighed:
         note = f"no programme of at most {LONGEST / 60:g} minutes keeps to the limits of this robot"
@@ -244,19 +209,36 @@ def next_experiment(
     chosen, weights = _choose(weighed) if weighed else (None, [])
     if not any(weight.reached or weight.added >= 1 for weight in weights):
         chosen, by_hand = None, by_hand or _manual_tests(effects)
-    considered = tuple((one, min(weight.expected for weight in of_one)) for one, of_one in weighed)
-    return Proposal(purpose, names, joints, robot, chosen, tuple(weights), considered, by_hand, note, enough)
+    said = Experiment(
+        purpose=purpose,
+        effects=names,
+        joints=joints,
+        motions=(*([chosen.text] if chosen else []), *by_hand),
+        expected_separation=_least(weight.expected for weight in weights) if chosen else None,
+        separation_now=_least(weight.now for weight in weights),
+        separation_that_is_enough=enough,
+        questions=tuple(weight.question for weight in weights),
+        programme=chosen.said if chosen else None,
+        considered=tuple(
+            Considered(
+                kind=one.kind,
+                minutes=round(one.cost / 60, 1),
+                expected_separation=_rounded(min(weight.expected for weight in of_one)),
+            )
+            for one, of_one in weighed
+        ),
+        note=note,
+    )
+    return Proposal(said, chosen, tuple(weights), None if chosen is None else curve(robot, chosen))
 
 
-def _weigh(programme: Programme, questions: Sequence[_Question], tell: Tell) -> list[Weight]:
-    tell(f"  weighing {programme.kind.replace('_', ' ')}")
+def _weigh(programme: Programme, questions: Sequence[_Question]) -> list[Weight]:
+    tell_step(f"  weighing {programme.kind.replace('_', ' ')}")
     products: dict[str, Products] = {}
     for channel in {q.channel.finding.name: q.channel for q in questions}.values():
         name = channel.finding.name
         tried = set().union(*(q.tried for q in questions if q.channel.finding.name == name))
-        products[name] = channel.products(
-            programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))), tell
-        )
+        products[name] = channel.products(programme, sorted(tried, key=lambda k: (not isinstance(k, int), str(k))))
     return [w for q in questions for w in q.weigh(products[q.channel.finding.name], programme.seconds)]
 
 
@@ -329,6 +311,10 @@ def _unseen(robot: Robot, channels: Sequence[PlannedEquations], effect: Effect) 
 
 def _other(scope: str) -> str:
     return "changed" if scope == "missing" else "missing"
+
+
+def _least(values: Iterable[float]) -> float | None:
+    return min(map(_rounded, values), default=None)
 
 
 def _rounded(value: float) -> float:

@@ -8,23 +8,27 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Predicted
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
 from irtwin.gap.data.case import Case
 from irtwin.gap.experiment.programmes import Programme
-from irtwin.gap.experiment.separation import dispersion, projected
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.candidate_columns import Below
-from irtwin.gap.regression.channel_equations import Torque
-from irtwin.gap.regression.cross_fitted import PowerOf, TwinPower
+from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
+from irtwin.gap.regression.cholesky import factored, solved
+from irtwin.gap.regression.cross_fitted import TwinPower
+from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Column
-from irtwin.gap.regression.moments import Moments, summed
-from irtwin.gap.regression.normal_equations import System, least_noise
+from irtwin.gap.regression.moments import Moments, Summed
+from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.projection import scores
 from irtwin.gap.thresholds import Thresholds
-from irtwin.identification.accumulate import Rows, accumulate_any
-from irtwin.identification.progress import Tell, with_progress
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
+
+Build = Callable[[Sequence[Motion], Sequence[Effect]], System]
+_LEAST = 1.0  # squares of a column in units of its prior: with less the prior decides
 
 
 @dataclass(frozen=True)
@@ -48,16 +52,10 @@ class Products:
 class PlannedEquations:
     """The equations of one channel, with what was found in it, on motions of one's choice."""
 
-    def __init__(self, finding: Finding, stack: Stack, below: Callable[[Motion], Predicted], thresholds: Thresholds):
-        """Take a channel's finding, the twin's effects, and what these predict over a whole run."""
-        self.finding, self._stack, self._predict = finding, stack, below
+    def __init__(self, finding: Finding, robot: Robot, equations: Build, thresholds: Thresholds):
+        """Take a channel's finding, and what gives its equations of some motions and effects."""
+        self.finding, self.robot, self._equations = finding, robot, equations
         self.thresholds = thresholds
-        self._last: tuple[Motion, Predicted] | None = None
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self._stack.robot
 
     @cached_property
     def per_second(self) -> float:
@@ -81,13 +79,13 @@ class PlannedEquations:
 
     @cached_property
     def _total(self) -> Moments:
-        return summed(self._moments)
+        return Summed(self._moments)
 
-    def products(self, programme: Programme, tried: Sequence[int | Column], tell: Tell | None = None) -> Products:
+    def products(self, programme: Programme, tried: Sequence[int | Column]) -> Products:
         """Return the products of the twin's columns and those tried.
 
         A column that the system lacks is zero in its data: nothing that it depends on was measured. What a programme
-        will measure is yet to come: zero. `tell` is told how far that has come, where it takes long.
+        will measure is yet to come: zero.
         """
         system, base = self.finding.system, self.finding.system.base
         inside = [k for k in tried if isinstance(k, int)]
@@ -96,100 +94,33 @@ class PlannedEquations:
         existing = np.zeros((base + len(tried) + 1,) * 2)
         existing[np.ix_(into, into)] = self._total.among(places, places)
         at = {column: base + place for place, column in enumerate(tried)}
-        return Products(existing, existing + self._planned(programme, tried, tell), at, system)
+        return Products(existing, existing + self._planned(programme, tried), at, system)
 
-    def _planned(self, programme: Programme, tried: Sequence[int | Column], tell: Tell | None) -> np.ndarray:
-        system, base = self.finding.system, self.finding.system.base
-        columns = [system.columns[self._plain(k) - base] if isinstance(k, int) else k for k in tried]
-        pattern = np.ones((len(system.pattern), base + len(columns)), dtype=bool)
-        pattern[:, :base] = system.pattern[:, :base]
-        for place, k in enumerate(tried):
-            if isinstance(k, int):
-                pattern[:, base + place] = system.pattern[:, self._plain(k)]
+    def _planned(self, programme: Programme, tried: Sequence[int | Column]) -> np.ndarray:
+        base, found = self.finding.system.base, np.zeros((self.finding.system.base + len(tried) + 1,) * 2)
+        columns = [self.finding.system.column(k) if isinstance(k, int) else k for k in tried]
+        effects = {id(one.effect): one.effect for one in columns if one.effect.id not in programme.without}
+        named = f"{programme.kind} {{}} {' '.join(programme.joints)}"
+        nothing = [np.zeros(motion.dq.shape) for motion in programme.motions]
         motions = [
-            replace(motion, run=f"{programme.kind} {k} {' '.join(programme.joints)}")
-            for k, motion in enumerate(programme.motions)
+            replace(motion, run=named.format(k), torque=none, power=none[:, 0])
+            for k, (motion, none) in enumerate(zip(programme.motions, nothing, strict=True))
         ]
-
-        def equations(part: Motion) -> Rows:
-            return self._of_joints(part, columns, programme, pattern)
-
-        blocks = accumulate_any(motions, with_progress(equations, motions, tell), pattern)
-        scale = np.append([*system.scale[:base], *(column.term.spread for column in columns)], 0.0)
-        found = np.zeros((len(scale), len(scale)))
-        places = [np.append(np.flatnonzero(row), len(scale) - 1) for row in pattern]
-        squares = np.sum([[_largest(b.factors[e] * scale[at]) for e, at in enumerate(places)] for b in blocks], axis=0)
-        least = [least_noise(each) for each in np.broadcast_to(squares, len(places))]
-        levels = np.maximum(self.finding.attribution.noise, least)
-        for block in blocks:
-            for equation, (used, level) in enumerate(zip(places, levels, strict=True)):
-                factor = block.factors[equation] * scale[used] / level
-                found[np.ix_(used, used)] += factor.T @ factor
+        try:
+            planned = self._equations(motions, list(effects.values()))
+        except InputError:  # too short to say anything
+            return found
+        made = {(id(one.effect), one.index): base + k for k, one in enumerate(planned.columns)}
+        at = {base + p: made.get((id(one.effect), one.index)) for p, one in enumerate(columns)}
+        places = dict.fromkeys(range(base)) | {place: k for place, k in at.items() if k is not None}
+        asked = np.array([place if k is None else k for place, k in places.items()])
+        into = np.array(list(places))
+        found[np.ix_(into, into)] = Summed(planned.moments(self.finding.attribution.noise)).among(asked, asked)
         return found
-
-    def _of_joints(self, part: Motion, columns: Sequence[Column], programme: Programme, pattern: np.ndarray) -> Rows:
-        """Return a part's equations, each with the columns alone that it has: of many joints all would be large."""
-        stack, base = self._stack, self.finding.system.base
-        if self.finding.name != "torque":
-            return self._equations(part, columns, programme.without)
-        own, made = stack.columns_by_joint(part), self._tried(part, columns, programme.without)
-        both: list[list[np.ndarray]] = [
-            [first, *(made[k][:, joint, None] for k in np.flatnonzero(used[base:]))]
-            for joint, (first, used) in enumerate(zip(own, pattern, strict=True))
-        ]
-        return Rows(both, np.zeros(part.dq.shape), np.zeros(part.dq.shape), stack.undecided(part))
-
-    def _load(self, part: Motion) -> np.ndarray:
-        """Return the joint torque that the twin predicts for a part of a run, (N, n) N m."""
-        return self._below(part.whole or part).torque[part.start : part.start + len(part.time)]
-
-    def _tried(self, part: Motion, columns: Sequence[Column], without: Sequence[str]) -> list[np.ndarray]:
-        """Return the columns tried over a part, (N, n) or (N,) each; zero for effects that are taken off."""
-        below, held = self._below(part.whole or part), dict[int, np.ndarray]()
-        return [self._made(column, part, below, held) * (column.effect.id not in without) for column in columns]
-
-    def _plain(self, index: int) -> int:
-        """Return the index of a column as it is, where that of its change is given."""
-        system = self.finding.system
-        return index if index < system.changed else index - len(system.columns)
-
-    def _equations(self, part: Motion, columns: Sequence[Column], without: Sequence[str]) -> Rows:
-        stack, made = self._stack, self._tried(part, columns, without)
-        if self.finding.name == "torque":
-            own, undecided = stack.torque_columns(part), stack.undecided(part)
-        else:
-            own, undecided = stack.power_columns(part, self._load(part))[:, None, ~stack.fixed], None
-            made = [values[:, None] for values in made]
-        joined = np.concatenate([own, *(values[..., None] for values in made)], axis=2)
-        return Rows(joined, np.zeros(joined.shape[:2]), np.zeros(joined.shape[:2]), undecided)
-
-    def _made(self, column: Column, part: Motion, below: Predicted, held: dict[int, np.ndarray]) -> np.ndarray:
-        """Return one column over a part; the columns of an effect are computed once for all that it has."""
-        effect = column.effect
-        if id(effect) not in held:
-            held[id(effect)] = self._stack.columns(effect, part, below)
-        values = held[id(effect)]
-        if column.index is None:
-            return np.asarray(values @ np.array([term.expected for term in effect.terms(self._stack.robot)]))
-        return np.asarray(values[..., column.index])
-
-    def _below(self, whole: Motion) -> Predicted:
-        if self._last is None or self._last[0] is not whole:
-            self._last = whole, self._predict(whole)
-        return self._last[1]
-
-
-def _largest(factor: np.ndarray) -> float:
-    """Return the sum of squares of the largest column."""
-    return float((factor**2).sum(axis=0).max(initial=0.0))
 
 
 def planned_equations(
-    case: Case,
-    stacks: tuple[Stack, Stack],
-    findings: Sequence[Finding],
-    below: Below,
-    torque: Torque,
+    case: Case, stacks: tuple[Stack, Stack], findings: Sequence[Finding], below: Below, torque: Torque
 ) -> tuple[PlannedEquations, ...]:
     """Return the planned equations of each channel.
 
@@ -198,16 +129,58 @@ def planned_equations(
     """
 
     @cache
-    def power() -> PowerOf:
+    def power_of() -> TwinPower:
         return TwinPower(stacks[1], case.with_power, case.grouping, torque)
 
-    def below_power(whole: Motion) -> Predicted:
-        real = torque(whole)
-        return Predicted(real, *power()(whole, real))
+    def of_torque(motions: Sequence[Motion], effects: Sequence[Effect]) -> System:
+        return torque_system(stacks[0], motions, _each_alone(motions), effects, below)
 
-    return tuple(
-        PlannedEquations(finding, stacks[0], below, case.thresholds)
-        if finding.name == "torque"
-        else PlannedEquations(finding, stacks[1], below_power, case.thresholds)
-        for finding in findings
-    )
+    def of_power(motions: Sequence[Motion], effects: Sequence[Effect]) -> System:
+        return power_system(stacks[1], motions, _each_alone(motions), effects, torque, power_of())
+
+    builds = {"torque": of_torque, "power": of_power}
+    return tuple(PlannedEquations(one, case.robot, builds[one.name], case.thresholds) for one in findings)
+
+
+def _each_alone(motions: Sequence[Motion]) -> Grouping:
+    runs = [motion.run for motion in motions]
+    return Grouping({run: run for run in runs}, frozenset(runs))
+
+
+def projected(total: np.ndarray, inside: Sequence[int], prior: np.ndarray | None = None) -> np.ndarray:
+    """Return the products of what the columns `inside` (c), refitted, leave of all columns; `prior`: its products."""
+    kept = np.array(inside, dtype=int)
+    return np.asarray(total - total[:, kept] @ solved(factored(total[np.ix_(kept, kept)], prior), total[kept]))
+
+
+def fitted(left: np.ndarray, own: Sequence[int]) -> np.ndarray:
+    """Return the values (k,) of columns in their fit to projected products, and nothing else in it."""
+    part = list(own)
+    return np.asarray(np.linalg.solve(left[np.ix_(part, part)] + np.eye(len(part)), left[part, -1]))
+
+
+def unimitated(left: np.ndarray, own: Sequence[int], values: np.ndarray, by: Sequence[int]) -> float:
+    """Return the squares that columns `by`, refitted, leave of the columns `own` with their values (k,)."""
+    part, rival = list(own), list(by)
+    squares = float(values @ left[np.ix_(part, part)] @ values)
+    if rival:
+        cross = left[np.ix_(rival, part)] @ values
+        squares -= float(cross @ np.linalg.solve(left[np.ix_(rival, rival)] + np.eye(len(rival)), cross))
+    return max(squares, 0.0)
+
+
+def dispersion(system: System, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]) -> float:
+    """Return how many times more than with independent samples the scores of columns vary.
+
+    Samples of one run are not independent, so what a fit leaves counts by this the less: the median over all candidate
+    columns, between blocks of time or between groups of runs, whichever is the larger, and at least one.
+    moments, noise: as of `System.moments`; chosen: the columns fitted beside the twin's.
+    """
+    by_block, products = scores(system, moments, noise, chosen)
+    sizes = products.squares(range(by_block.shape[1]))
+    judged = np.arange(system.base, len(sizes))
+    judged = np.setdiff1d(judged[sizes[judged] > _LEAST], chosen)
+    if not len(judged):
+        return 1.0
+    by_group = np.array([by_block[system.group == group].sum(axis=0) for group in range(system.groups)])
+    return max(1.0, *(float(np.median((s[:, judged] ** 2).sum(axis=0) / sizes[judged])) for s in (by_block, by_group)))

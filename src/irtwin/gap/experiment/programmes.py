@@ -15,7 +15,7 @@ from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import JointLimits, Workspace
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -84,15 +84,11 @@ class Programme:
         )
 
 
-def excitation_of(robot: Robot, tell: Tell | None = None) -> Excitation | None:
-    """Return an exciting motion of all joints, good enough to compare; None where the robot's limits allow none.
-
-    `tell` is told how far that has come, where it takes long.
-    """
-    told = paced(tell)
+def excitation_of(robot: Robot) -> Excitation | None:
+    """Return an exciting motion of all joints, good enough to compare; None where the robot's limits allow none."""
 
     def step(iteration: int, condition: float, seconds: float) -> None:
-        told(f"  exciting motion, step {iteration}")
+        tell_step(f"  exciting motion, step {iteration}")
 
     try:
         return excite(robot, _EXCITING, iterations=_ITERATIONS, progress=step)

@@ -6,15 +6,23 @@ them counts by it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import combinations
+from math import factorial
 
 import numpy as np
 
+from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.held_out import HeldOut, held_out
-from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms, reference_rms
-from irtwin.identification.progress import Tell
+from irtwin.gap.regression.moments import Summed
+from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
+from irtwin.identification.progress import tell_step
+
+_DRAWN = 32  # partitions into halves; of five groups there are ten
+_EXACT = 8  # causes: 256 subsets
+_ORDERS = 40  # drawn, and each reversed, where there are more
 
 
 @dataclass(frozen=True)
@@ -41,20 +49,20 @@ class Apart:
     @cached_property
     def noise(self) -> np.ndarray:
         """(g,), of rows apart (2 g,), RMS that the causes leave."""
-        return self.system.residual_rms(self.chosen, noise_before(self.system))
+        return self.system.residual_rms(self.chosen, self.system.noise_before)
 
     @cached_property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
         """(g,) RMS left in observed runs by fits to all runs, without causes and with them, where the law is known."""
         known = self.plain.halves[0]
-        before = observed_rms(self.plain, (), noise_before(self.plain))
+        before = observed_rms(self.plain, (), self.plain.noise_before)
         return before[known], observed_rms(self.system, self.chosen, self.noise)[known]
 
     def level(self, floor: np.ndarray) -> np.ndarray:
         """Return (g,) RMS beyond which a gap lies: the floor (g,), or what the other runs show, if that is more."""
         if not self.plain.both:
             return floor
-        known = reference_rms(self.plain, noise_before(self.plain))[self.plain.halves[0]]
+        known = reference_rms(self.plain, self.plain.noise_before)[self.plain.halves[0]]
         return np.asarray(np.maximum(floor, known))
 
     def counted(self, squares: np.ndarray) -> np.ndarray:
@@ -63,8 +71,97 @@ class Apart:
         weights = (self.noise[first] / np.stack([self.noise[half] for half in self.system.halves])) ** 2
         return np.asarray(sum(squares[..., half] * own for half, own in zip(self.system.halves, weights, strict=True)))
 
-    def held_out(self, tell: Tell | None = None) -> HeldOut:
-        """Return the squares of each observed group left out, counted so; `tell` as there."""
-        found = held_out(self.system, noise_before(self.plain), self.noise, self.chosen, self.plain, tell)
+    def held_out(self) -> HeldOut:
+        """Return the squares of each observed group left out, counted so."""
+        found = held_out(self.system, self.plain.noise_before, self.noise, self.chosen, self.plain)
         rows = np.asarray(sum(found.rows[:, half] for half in self.system.halves))
         return HeldOut(self.counted(found.before), self.counted(found.after), rows)
+
+
+def spread(system: System, floor: np.ndarray) -> float | None:
+    """Return the largest excess, in floors squared, of a half of the reference groups over the other half.
+
+    Each half in turn plays the observed runs: what a fit to both leaves in it is held against what a fit to the other
+    half leaves there, or the floor (g,) RMS if that is more, in rows in which no dry friction turns. The largest of all
+    equations and halves; None where the groups are fewer than four.
+    """
+    groups = [int(group) for group in np.flatnonzero(~system.group_observed)]
+    if len(groups) < FEWEST_GROUPS:
+        return None
+    noise = system.noise_before
+
+    def left(fitted: Sequence[int], of: Sequence[int]) -> np.ndarray:
+        return system.rms((), noise, fitted, of)[system.halves[0]]
+
+    def excess(played: Sequence[int], others: Sequence[int]) -> float:
+        return float(np.max((left(groups, played) / np.maximum(floor, left(others, others))) ** 2 - 1))
+
+    return max(excess(*halves) for halves in _halves(groups))
+
+
+def _halves(groups: list[int]) -> Iterator[tuple[list[int], list[int]]]:
+    """Yield each partition into halves that is drawn, both ways round."""
+    generator = np.random.default_rng(0)
+    drawn = (generator.permutation(groups)[: len(groups) // 2] for _ in range(_DRAWN))
+    for half in dict.fromkeys(frozenset(some.tolist()) for some in drawn):
+        first, second = sorted(half), sorted(set(groups) - half)
+        yield first, second
+        yield second, first
+
+
+def closed_squares(apart: Apart, seed: int) -> np.ndarray:
+    """Return what each cause closes of the squares of each observed group left out and equation, (C, G, g), as counted.
+
+    Its Shapley value: everything is refitted with every set of causes, up to eight causes exactly, beyond from random
+    orders, each beside its reverse. They add up to what all causes close.
+    """
+    system, players = apart.system, apart.players
+    judged = np.flatnonzero(system.group_observed)
+    weighed = {True: system.moments(apart.noise), False: system.moments(system.noise_before)}
+    totals = {some: Summed(moments) for some, moments in weighed.items()}
+
+    @cache
+    def left(members: frozenset[int]) -> np.ndarray:
+        chosen = [k for player in sorted(members) for k in players[player]]
+        total, moments = totals[bool(members)], weighed[bool(members)]
+        found = []
+        for group in judged:
+            tell_step(f"  what {len(members)} of {len(players)} causes leave, group {group + 1} of {len(moments)}")
+            found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
+        return np.array(found)
+
+    count = len(players)
+    values = np.zeros((count, len(judged), len(system.pattern)))
+    for player, before, weight in _exact(count) if count <= _EXACT else _drawn(count, seed):
+        values[player] += weight * (left(before) - left(before | {player}))
+    return apart.counted(values)
+
+
+def shares(closed: np.ndarray, rows: np.ndarray, level: np.ndarray) -> tuple[float, ...]:
+    """Return each cause's part of the mean squares that all close, `closed` (C, G, g), in units of a `level` (g,), RMS.
+
+    rows: (G, g). None of them (an empty tuple) where nothing is closed. A cause that only spoils the fit of held-out
+    runs has a share below zero.
+    """
+    values = (closed.sum(axis=1) / np.maximum(rows.sum(axis=0), 1) / level**2).sum(axis=1)
+    together = float(values.sum())
+    return tuple(float(value) / together for value in values) if together > 0 else ()
+
+
+def _exact(count: int) -> Iterator[tuple[int, frozenset[int], float]]:
+    """Yield every player, every set of others that may stand before it, and the share of orders in which it does."""
+    for player in range(count):
+        others = [k for k in range(count) if k != player]
+        for size in range(count):
+            weight = factorial(size) * factorial(count - 1 - size) / factorial(count)
+            for before in combinations(others, size):
+                yield player, frozenset(before), weight
+
+
+def _drawn(count: int, seed: int) -> Iterator[tuple[int, frozenset[int], float]]:
+    generator = np.random.default_rng(seed)
+    for _ in range(_ORDERS):
+        order: Sequence[int] = generator.permutation(count).tolist()
+        for way in (order, order[::-1]):
+            for place, player in enumerate(way):
+                yield player, frozenset(way[:place]), 0.5 / _ORDERS

@@ -12,18 +12,14 @@ from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.estimates import BesidePower
-from irtwin.gap.isolation.explained import ExplainedTorque
-from irtwin.gap.isolation.finding import Finding, Without, attributed, finding_of
-from irtwin.gap.isolation.floor_left import floor_left
+from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
+from irtwin.gap.isolation.finding import BesidePower, Finding, Without, attributed, finding_of
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
-from irtwin.gap.regression.normal_equations import noise_before
 from irtwin.identification.power_line import power_slope
-from irtwin.identification.progress import Tell
 
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
@@ -39,7 +35,6 @@ def find_beside_power(
     seed: int,
     *,
     without: Set[Without] = frozenset(),
-    tell: Tell | None = None,
 ) -> tuple[Finding, Floor]:
     """Find the causes of torque, `without` some effects; return them with the floor that they leave.
 
@@ -52,20 +47,20 @@ def find_beside_power(
 
     def about(torque: Torque, power: TwinPower, of_torque: Sequence[Effect]) -> JointEquations:
         tried = (of_torque, effects[1])
-        return joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, tell, case.shaken)
+        return joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, case.shaken)
 
     equations = about(predicted, before, effects[0])
-    first, both = _find(case, equations, floor, seed, without, tell)
+    first, both = _find(case, equations, floor, seed, without)
     if not any(cause.carries_power for cause in first.causes):
         return first, floor
     explained = ExplainedTorque(stack, first, below)
     power = TwinPower(stack, case.with_power, case.grouping, explained)
     left = floor_left(case, floor, explained, power)
-    if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * noise_before(power.system)[0]:
+    if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * power.system.noise_before[0]:
         shapes = _best_shapes(both)
         del equations  # before as much memory is taken once more
         equations = about(explained, power, shapes)
-        return _find(case, equations, left, seed, without, tell)[0], left
+        return _find(case, equations, left, seed, without)[0], left
     return replace(first, floor=left.torque), left
 
 
@@ -96,17 +91,17 @@ def _best_shapes(found: Attribution) -> list[Effect]:
 
 
 def _find(
-    case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without], tell: Tell | None
+    case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]
 ) -> tuple[Finding, Attribution]:
     """Return what both equations show of torque, and all that they show."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
-    both = attributed(case, whole, np.concatenate(levels), without, tell)
+    both = attributed(case, whole, np.concatenate(levels), without)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(equations, tuple(of_power), both.noise)
     where = "torque", case.robot.joint_names, case.observed
-    found = finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside, tell=tell)
+    found = finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
     return found, both
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
+from irtwin.gap.data.case import Case
+from irtwin.gap.data.noise_floor import REPEATS, Floor, noise_floor
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.candidate_columns import Below
@@ -15,6 +18,8 @@ from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import PowerOf
 from irtwin.gap.regression.residuals import as_filtered
 from irtwin.signals.motion import Motion
+
+_LOWER = 0.95  # of the floor: by less it may be lower by chance
 
 
 class Explained:
@@ -101,3 +106,26 @@ def explained_power(stack: Stack, finding: Finding, torque: Torque, power_of: Po
         return Predicted(taken, *power_of(whole, taken))
 
     return Explained(stack, finding, below)
+
+
+def floor_left(case: Case, floor: Floor, explained: Explained, power_of: PowerOf | None = None) -> Floor:
+    """Return the floor that the causes of a channel leave; itself where that is no lower.
+
+    A cause that acts in one run and not in its repeat, a payload for one, is in the difference of the two. `power_of`
+    says what joint torque takes; None: causes of torque leave the power as it is.
+    """
+    if floor.source != REPEATS:
+        return floor
+    motions = {run: explained.off(motion, power_of) for run, motion in case.motions.items()}
+    left = noise_floor(case.runs, motions, case.thresholds.data)
+    before = _together(floor)
+    found = replace(floor, torque=_least(floor.torque, left.torque), power=_least(floor.power, left.power))
+    return found if (_together(found) < _LOWER * before).any() else floor
+
+
+def _least(before: Any, after: Any) -> Any:
+    return before if before is None or after is None else np.minimum(before, after)
+
+
+def _together(floor: Floor) -> np.ndarray:
+    return np.append([] if floor.torque is None else floor.torque, [] if floor.power is None else floor.power)

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
 from irtwin.gap.data.case import Case
-from irtwin.gap.isolation.apart import Apart
+from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
-from irtwin.gap.isolation.estimates import BesidePower, estimate_of
-from irtwin.gap.isolation.shares import closed_squares, shares
 from irtwin.gap.isolation.structure_search import Attribution, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
-from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses
-from irtwin.gap.regression.normal_equations import System, noise_before, observed_rms
-from irtwin.identification.estimators import Estimate
-from irtwin.identification.progress import Tell, paced
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
+from irtwin.gap.regression.joint_equations import JointEquations
+from irtwin.gap.regression.normal_equations import System, observed_rms
+from irtwin.identification.estimators import Estimate, estimate
+from irtwin.identification.progress import tell_step
+from irtwin.robot.description import Robot
 
 _NO_NOISE = 1e-9
 Without = str | tuple[str, str | None]
@@ -36,8 +38,7 @@ class Finding:
     W, None where unknown; `held_out`: what is left of groups left out, `counted` the same as `apart` counts it;
     `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is
     closed theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where
-    `system` stands on torque that causes explain. `seed` draws orders of many causes; `tell` is told how far that has
-    come.
+    `system` stands on torque that causes explain. `seed` draws orders of many causes.
     """
 
     name: str
@@ -53,12 +54,11 @@ class Finding:
     part: float = 1.0
     plain: System | None = None
     seed: int = 0
-    tell: Tell | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def closed_squares(self) -> np.ndarray:
         """(C, G, g) what each cause closes of the squares of each group left out and equation."""
-        return closed_squares(self.apart, self.seed, self.tell)
+        return closed_squares(self.apart, self.seed)
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -113,7 +113,7 @@ class Finding:
         """(g,) RMS left in observed runs by fits to all runs: of the twin as it is, and with the causes."""
         before = self.before
         return (
-            observed_rms(before, (), noise_before(before)),
+            observed_rms(before, (), before.noise_before),
             observed_rms(self.system, self.chosen, self.attribution.noise),
         )
 
@@ -143,15 +143,14 @@ def find(
     seed: int,
     without: Set[Without] = frozenset(),
     plain: System | None = None,
-    tell: Tell | None = None,
 ) -> Finding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
 
-    `plain` as a finding's; `tell` as for `attribute`.
+    `plain` as a finding's.
     """
     places = (None,) if name == "power" else case.robot.joint_names
-    found = attributed(case, system, floor, without, tell)
-    return finding_of(name, places, case.observed, system, found, floor, seed, plain, tell=tell)
+    found = attributed(case, system, floor, without)
+    return finding_of(name, places, case.observed, system, found, floor, seed, plain)
 
 
 def finding_of(
@@ -164,14 +163,13 @@ def finding_of(
     seed: int,
     plain: System | None = None,
     beside: BesidePower | None = None,
-    tell: Tell | None = None,
 ) -> Finding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
     alone, inside = system.with_columns(chosen)
-    judged = held_out(alone, noise_before(plain or alone), found.noise, inside, plain, tell)
+    judged = held_out(alone, (plain or alone).noise_before, found.noise, inside, plain)
     apart = Apart.of(plain or system, system, [cause.columns for cause in found.causes])
-    fitted = estimate_of(system, chosen, tell) if beside is None else beside.estimate(chosen, tell)
+    fitted = estimate_of(system, chosen) if beside is None else beside.estimate(chosen)
     return Finding(
         name,
         places,
@@ -180,33 +178,27 @@ def finding_of(
         found,
         apart,
         judged,
-        apart.held_out(tell),
+        apart.held_out(),
         floor,
         fitted,
         plain=plain,
         seed=seed,
-        tell=tell,
     )
 
 
 def attributed(
-    case: Case,
-    system: System,
-    floor: np.ndarray | None,
-    without: Set[Without] = frozenset(),
-    tell: Tell | None = None,
+    case: Case, system: System, floor: np.ndarray | None, without: Set[Without] = frozenset()
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
-    told = paced(tell)
-    told("  rows in which joints are slow")
+    tell_step("  rows in which joints are slow")
     candidates = _hypotheses(case, system, without)
     apart = system.by_speed
     level = floor if floor is None or apart is system else np.tile(floor, 2)
-    found = attribute(apart, candidates, case.thresholds.criterion, level, tell)
+    found = attribute(apart, candidates, case.thresholds.criterion, level)
     if apart is system:
         return found
     alone, chosen = system.with_columns([k for cause in found.causes for k in cause.columns])
-    return replace(found, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, noise_before(alone))))
+    return replace(found, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, alone.noise_before)))
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
@@ -228,3 +220,119 @@ def _hypotheses(case: Case, system: System, without: Set[Without]) -> list[Hypot
     if system.both:
         found += hypotheses(system.columns, system.changed, CHANGED)
     return [one for one in found if not {one.effect, (one.effect, one.joint)} & without]
+
+
+def quantities(robot: Robot, finding: Finding, one: Cause) -> list[Quantity]:
+    """Return a cause's parameters with 95 % intervals of the fit, those of one variant after the other."""
+    return [each for number in range(len(one.variants)) for each in of_variant(robot, finding, one, number)]
+
+
+def of_variant(robot: Robot, finding: Finding, one: Cause, number: int) -> list[Quantity]:
+    """Return the parameters of one of a cause's variants, by its number."""
+    found, used, variant = finding.estimate, finding.used, one.variants[number]
+    known = {
+        (effect.id, term.joint, term.name): float(found.values[k])
+        for k, (effect, term) in enumerate(finding.system.terms)
+        if term.link is None
+    }
+    places = [used.index(k) for k in variant.columns]
+    joint = place_of(variant.terms[0])
+    effect = variant.effect.on(joint) if joint is not None and len(one.joints) > 0 else variant.effect
+    if len(effect.terms(robot)) != len(places):
+        return [_coefficient(term, found, place) for term, place in zip(variant.terms, places, strict=True)]
+    given = Coefficients(found.values[places], found.covariance[np.ix_(places, places)], known)
+    stated = effect.parameters(robot, given)
+    return [each for each in stated if np.isfinite(each.value)]
+
+
+def _coefficient(term: Term, found: Estimate, place: int) -> Quantity:
+    deviation = float(np.sqrt(max(found.covariance[place, place], 0.0)))
+    return quantity(term.name, term.joint, float(found.values[place]), term.unit, deviation)
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Causes of one family and scope in one channel, whose joints overlap, and what they close together."""
+
+    family: str
+    scope: str
+    causes: tuple[Cause, ...]
+    closing: Closing
+
+
+def branches(finding: Finding) -> tuple[Branch, ...]:
+    """Return the branches of a channel, that which closes most first; its causes are in that order too."""
+    found = [
+        Branch(_family(causes[0]), causes[0].scope, _by_size(finding, causes), finding.closing(causes))
+        for causes in joined(finding.causes)
+    ]
+    return tuple(sorted(found, key=lambda one: -one.closing.size))
+
+
+def joined(causes: Sequence[Cause]) -> list[list[Cause]]:
+    """Return causes by family and scope, those with a joint in common together; of the whole robot, all."""
+    found: list[list[Cause]] = []
+    for cause in causes:
+        near = [one for one in found if any(_near(cause, other) for other in one)]
+        found = [one for one in found if one not in near]
+        found.append([*(other for one in near for other in one), cause])
+    return found
+
+
+def _near(one: Cause, other: Cause) -> bool:
+    if (_family(one), one.scope) != (_family(other), other.scope):
+        return False
+    return bool(set(one.joints) & set(other.joints)) or not (one.joints or other.joints)
+
+
+def _family(cause: Cause) -> str:
+    return cause.variants[0].effect.family
+
+
+def _by_size(finding: Finding, causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    return tuple(sorted(causes, key=lambda one: -finding.closing([one]).size))
+
+
+@dataclass(frozen=True)
+class BesidePower:
+    """Power beside torque: the `equations` of both, and what their search found of power.
+
+    columns: those of the causes of power, of `equations.whole`; noise: (n + 1,) what all causes left of each equation.
+    """
+
+    equations: JointEquations
+    columns: tuple[int, ...]
+    noise: np.ndarray
+
+    def estimate(self, chosen: Sequence[int]) -> Estimate:
+        """Estimate the twin's terms of torque and `chosen` columns, as torque's equations count them, by both."""
+        whole, torque = self.equations.whole, self.equations.torque
+        fitted = estimate_of(whole, self._columns(chosen))
+        used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
+        return fitted.of(used, fitted.noise[: len(torque.pattern)])
+
+    def _columns(self, chosen: Sequence[int]) -> list[int]:
+        return [*map(self.equations.in_whole, chosen), *self.columns]
+
+
+def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
+    """Estimate the twin's terms and the causes' together, with bounds and intervals."""
+    used = [*range(system.base), *chosen]
+    terms = [system.all_terms[k] for k in used]
+    source = [k - len(system.columns) if k >= system.changed else k for k in used]
+    pattern = system.pattern[:, source]
+    blocks = []
+    for block, observed in zip(system.blocks, system.observed, strict=True):
+        factors = []
+        for equation, factor in enumerate(block.factors):
+            place = {int(k): p for p, k in enumerate(np.flatnonzero(system.pattern[equation]))}
+            parts = [
+                factor[:, place[s]] * (observed or k < system.changed)
+                for k, s in zip(used, source, strict=True)
+                if s in place
+            ]
+            factors.append(np.column_stack([*parts, factor[:, -1]]))
+        blocks.append(replace(block, factors=tuple(factors)))
+    rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
+    signals = [*[0] * (len(pattern) - 1), 1] if system.beside_power else None
+    return estimate(blocks, pattern, terms, rows, signals)

@@ -7,26 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.effects.effect import Possible, Quantity, Stated
+from irtwin.document.document import Refused
+from irtwin.effects.effect import NORMAL, Possible, Quantity, Stated
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding, Without
-from irtwin.gap.isolation.quantities import of_variant
+from irtwin.gap.isolation.finding import Finding, Without, of_variant
 from irtwin.gap.regression.hypotheses import CHANGED, Variant, place_of
 from irtwin.robot.description import Robot
 
 _SEARCHES = 4  # a search without what was refused may name something else that cannot be
-_NORMAL = 1.96  # standard deviations in half a 95 % interval
-
-
-@dataclass(frozen=True)
-class Refused:
-    """An effect that would explain the data by a number that cannot be true; joint None: of the whole robot."""
-
-    effect: str
-    joint: str | None
-    why: str
 
 
 @dataclass(frozen=True)
@@ -53,7 +43,7 @@ def find_possible(
         finding, floor = search(without | refused.keys())
         least = np.minimum(least, finding.attribution.noise)
         wrong = {
-            (one.effect, one.joint): one
+            (one.effect, next(iter(one.joints), None)): one
             for cause in finding.causes
             for one in _of(case.robot, finding, cause, case.stated)
         }
@@ -75,7 +65,8 @@ def _of(robot: Robot, finding: Finding, cause: Cause, stated: Stated) -> list[Re
         whys = [_beyond(one, limits[one.name]) for one in said if one.name in limits]
         if cause.scope == CHANGED:
             whys += [_below_nothing(finding, variant, place) for place in range(len(variant.columns))]
-        refused += [Refused(cause.effect, joint, why) for why in [each for each in whys if each][:1]]
+        if why := next(filter(None, whys), None):
+            refused.append(Refused(effect=cause.effect, joints=() if joint is None else (joint,), why=why))
     return refused
 
 
@@ -98,7 +89,7 @@ def _below_nothing(finding: Finding, variant: Variant, place: int) -> str | None
         return None
     pair, found = [before[0], used.index(variant.columns[place])], finding.estimate
     total = float(found.values[pair].sum())
-    half = _NORMAL * float(np.sqrt(max(found.covariance[np.ix_(pair, pair)].sum(), 0.0)))
+    half = NORMAL * float(np.sqrt(max(found.covariance[np.ix_(pair, pair)].sum(), 0.0)))
     if total + half >= term.lowest:
         return None
     left = Quantity(term.name, term.joint, total, term.unit, total - half, total + half)

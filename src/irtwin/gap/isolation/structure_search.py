@@ -15,7 +15,7 @@ from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 
 _MOST = 16  # hypotheses of a structure
 _HOPELESS = -4.0  # log odds: what has less is not tried further
@@ -40,26 +40,21 @@ class Attribution:
 
 
 def attribute(
-    system: System,
-    candidates: Sequence[Hypothesis],
-    limits: Criterion,
-    floor: np.ndarray | None = None,
-    tell: Tell | None = None,
+    system: System, candidates: Sequence[Hypothesis], limits: Criterion, floor: np.ndarray | None = None
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
     Hypotheses are added one by one, everything refitted; what is less likely than nothing is dropped; then each in turn
     is taken out and looked for anew, and so are two of one joint together. floor: (g,) RMS, 0 or None where unknown;
-    `tell` is told how far it has come, where it takes long.
     """
     candidates = in_scope(candidates, both=system.both)
-    search = _Search(system, candidates, Prior.of(candidates), limits, floor, paced(tell))
-    search.tell("  what the twin leaves")
+    search = _Search(system, candidates, Prior.of(candidates), limits, floor)
+    tell_step("  what the twin leaves")
     noise = system.residual_rms((), np.ones(len(system.pattern)))
-    search.tell("  what the twin leaves")
+    tell_step("  what the twin leaves")
     noise = system.residual_rms((), noise)
     before = search.beside((), noise)
-    search.tell("  how far each effect would show")
+    tell_step("  how far each effect would show")
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = visibility(system, system.moments(noise), shapes)
     found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
@@ -81,7 +76,6 @@ class _Search:
     prior: Prior
     limits: Criterion
     floor: np.ndarray | None
-    tell: Tell
     tried: dict[tuple[bytes, bytes], Posterior] = field(default_factory=dict)
     weighed: dict[bytes, list[Moments]] = field(default_factory=dict)  # by the last noise
 
@@ -108,9 +102,9 @@ class _Search:
             and not any(_same_place(one, each) for each, _ in found)
         ]
         line = f"  {len(left)} hypotheses, beside {len(found)} that are found"
-        self.tell(line)
+        tell_step(line)
         moments = self.system.without_noise(self.moments(noise), noise, chosen)
-        self.tell(line)
+        tell_step(line)
         return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.misfit(noise))
 
     def moments(self, noise: np.ndarray) -> list[Moments]:

@@ -11,9 +11,8 @@ import numpy as np
 
 from irtwin.document import document
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.isolation.branches import branches
-from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.isolation.spread import spread
+from irtwin.gap.isolation.apart import spread
+from irtwin.gap.isolation.finding import Finding, branches
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.thresholds import Thresholds
 

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 
 import numpy as np
 
-from irtwin.document.curves import Followed
+from irtwin.document.curves import Curves, Followed, FrictionCurve, PlannedMotion, RunError
+from irtwin.document.document import Location
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.explained import Explained
 from irtwin.gap.isolation.finding import Finding
-from irtwin.gap.localisation.excess_map import Map, joint_maps, level_of, robot_maps
-from irtwin.gap.localisation.locations import Location, locate
+from irtwin.gap.localisation.excess_map import Map, heat_map, joint_maps, level_of, robot_maps
+from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import curve, followed
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.hypotheses import CHANGED
-from irtwin.gap.regression.moments import summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.signals.motion import Motion
+
+_UNNAMED = 3  # places that no cause explains, drawn
 
 
 @dataclass(frozen=True)
@@ -54,20 +57,16 @@ class ChannelResidual:
         return np.array([any(_among(place, joints) for joints in self.touched) for place in places])
 
 
-def channel_residual(case: Case, explained: Explained, torque: Torque, tell: Tell | None = None) -> ChannelResidual:
-    """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes).
-
-    `tell` is told how far that has come, where it takes long.
-    """
+def channel_residual(case: Case, explained: Explained, torque: Torque) -> ChannelResidual:
+    """Return what the twin left of a channel, given the joint torque that it predicts (for power: that it takes)."""
     finding = explained.finding
     power = finding.name == "power"
     reference = against_reference(finding)
-    told = paced(tell)
 
     def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
         found = []
         for run in runs:
-            told(f"  {finding.name} that is left of {run.run}")
+            tell_step(f"  {finding.name} that is left of {run.run}")
             found += (power_traces if power else torque_traces)(explained.stack, [run], values, torque)
         return found
 
@@ -107,16 +106,13 @@ def against_reference(finding: Finding) -> bool:
     return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
 
 
-def places(
-    left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None, tell: Tell | None = None
-) -> list[Location]:
+def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None) -> list[Location]:
     """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess.
 
-    `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not. `tell` is
-    told how far that has come, where it takes long.
+    `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not.
     """
     channel, place = leaving or (None, None)
-    found = [(one, _places(one, seed, place if one.finding.name == channel else None, paced(tell))) for one in left]
+    found = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
 
     def order(pair: tuple[ChannelResidual, list[Location]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
@@ -167,11 +163,11 @@ def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.nda
     return found
 
 
-def _places(left: ChannelResidual, seed: int, leaving: int | None, told: Tell) -> list[Location]:
+def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[Location]:
     names = left.finding.places
     best = []
     for k, joint in enumerate(names):
-        told(f"  what {left.finding.name} follows{f' at {joint}' if joint else ''}")
+        tell_step(f"  what {left.finding.name} follows{f' at {joint}' if joint else ''}")
         best.append(followed(left.before, k, joint))
     located = locate(
         left.finding.name,
@@ -204,13 +200,49 @@ def fitted_values(finding: Finding, *, reference: bool) -> Values:
     system = finding.system
     moments = system.moments(finding.rmse)
     if not reference:
-        whole = twin_values(system, system.solution((), summed(moments)))
+        whole = twin_values(system, system.solution((), Summed(moments)))
         return lambda run: whole
     groups = np.flatnonzero(~system.group_observed)
-    total = summed([moments[group] for group in groups])
+    total = Summed([moments[group] for group in groups])
     whole = twin_values(system, system.solution((), total))
     own: dict[str, np.ndarray] = {}
     for group in groups if len(groups) > 1 else ():
         without = twin_values(system, system.solution((), total - moments[group]))
         own |= dict.fromkeys((system.blocks[k].run for k in np.flatnonzero(system.group == group)), without)
     return lambda run: own.get(run, whole)
+
+
+def drawn(
+    left: Sequence[ChannelResidual],
+    located: Sequence[Location],
+    planned: PlannedMotion | None,
+    friction: tuple[FrictionCurve, ...],
+) -> Curves:
+    """Return what a page draws: of what the twin left of each channel, where that lies, what is planned, friction."""
+    maps = [
+        heat_map([joint for joint in one.finding.places if joint is not None], one.seen, one.level)
+        for one in left
+        if one.finding.name == "torque"
+    ]
+    return Curves(
+        follows=(*cause_curves(left), *unnamed_curves(left, located, _UNNAMED)),
+        runs=tuple(line for one in left for line in _per_run(one.finding)),
+        heat_map=next(iter(maps), None),
+        experiment=planned,
+        friction=friction or None,
+    )
+
+
+def _per_run(finding: Finding) -> Iterator[RunError]:
+    judged = finding.held_out
+    for group, runs in enumerate(finding.groups):
+        for k, joint in enumerate(finding.places):
+            rows = max(float(judged.rows[group, k]), 1.0)
+            for run in runs:
+                yield RunError(
+                    run=run,
+                    joint=joint,
+                    before=float(np.sqrt(judged.before[group, k] / rows)),
+                    after=float(np.sqrt(judged.after[group, k] / rows)),
+                    floor=None if finding.floor is None else float(finding.floor[k]),
+                )

@@ -3,40 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import false_discovery_control, t
 
-from irtwin.document.document import FALSE_PLACES, LEAST_SHARE
-from irtwin.gap.localisation.excess_map import FEWEST, Map
-from irtwin.gap.localisation.regimes import LOADED
+from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, Location
+from irtwin.gap.localisation.excess_map import FEWEST, LOADED, Map
 
 _RESAMPLED = 1000
 _LOADS = ("torque", "torque_squared")  # what the residual has to follow so that its place is the load
-
-
-@dataclass(frozen=True)
-class Location:
-    """A place of the gap: the excess of its mean square over the floor's, with 95 % intervals over runs.
-
-    `share` of the channel's whole excess; places that overlap (`loaded` with all others) share it. `q`: the rate of
-    false discoveries at which the place is found. `concentration`: the place's share of its joint's excess over its
-    share of the samples. `rank` orders those of one joint.
-    """
-
-    channel: str
-    joint: str | None
-    regime: str | None
-    follows: str | None
-    runs: tuple[str, ...]
-    share: float
-    share_interval: tuple[float, float]
-    excess: float
-    excess_interval: tuple[float, float]
-    concentration: float
-    q: float
-    rank: float
 
 
 def locate(
@@ -60,7 +35,8 @@ def locate(
     `acting` (g,) come before the others, all in the order of their excess; a joint's regimes in that of their share of
     it and its concentration there. A joint on which causes are acting, but none of whose places is sure, has those to
     which they add (`acts`) more than on average; the one whose excess leaves the gap open (`leaving`), those that show
-    more than that.
+    more than that. Places that overlap (`loaded` with all others) share the excess; the rate is that at which a place
+    is found.
     """
     share, excess = (each[0] for each in _shares(seen, level, np.ones((1, len(seen.squares)))))
     units = len(seen.squares)
@@ -79,27 +55,29 @@ def locate(
         named[unsure], rank[unsure] = more[unsure] > 1, (added * np.sqrt(more))[unsure]
     if leaving is not None and not named[leaving].any():
         named[leaving] = (concentration[leaving] > 1) & (share[leaving] >= LEAST_SHARE)
-    found = [
-        Location(
-            channel,
-            joints[place],
-            seen.regimes[r],
-            follows[place],
-            (),
-            share=float(min(share[place, r], 1.0)),
-            share_interval=(float(share_ends[0, place, r]), float(share_ends[1, place, r])),
-            excess=float(excess[place, r]),
-            excess_interval=(float(excess_ends[0, place, r]), float(excess_ends[1, place, r])),
-            concentration=float(concentration[place, r]),
-            q=float(q[place, r]),
-            rank=float(rank[place, r]),
-        )
-        for place, r in np.argwhere(named)
-        if seen.regimes[r] != LOADED or follows[place] in _LOADS
-    ]
+    found = [(place, r) for place, r in np.argwhere(named) if seen.regimes[r] != LOADED or follows[place] in _LOADS]
     whole = share[:, : seen.parts].sum(axis=1)
-    order = {joint: (not acting[place], -whole[place]) for place, joint in enumerate(joints)}
-    return sorted(found, key=lambda location: (order[location.joint], -location.rank))
+    found.sort(key=lambda at: (not acting[at[0]], -whole[at[0]], -rank[at]))
+    return [
+        Location(
+            channel=channel,
+            joint=joints[place],
+            regime=seen.regimes[r],
+            follows=follows[place],
+            runs=(),
+            share=float(min(share[place, r], 1.0)),
+            share_interval95=_ends(share_ends[:, place, r]),
+            excess=float(excess[place, r]),
+            excess_interval95=_ends(excess_ends[:, place, r]),
+            concentration=float(concentration[place, r]),
+            false_discovery_rate=float(q[place, r]),
+        )
+        for place, r in found
+    ]
+
+
+def _ends(both: np.ndarray) -> tuple[float, float]:
+    return float(both[0]), float(both[1])
 
 
 def _shares(seen: Map, level: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,13 +16,12 @@ from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.shaken_equations import Pairs, shaken_products
-from irtwin.identification.accumulate import Equations, Rows, accumulate
-from irtwin.identification.progress import Tell, with_progress
+from irtwin.identification.accumulate import Equations, Rows, accumulate, accumulate_any
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
 Torque = Callable[[Motion], np.ndarray]
+Pairs = Sequence[tuple[Motion, Motion]]  # motions, each with the same once more, shaken
 
 
 def torque_system(
@@ -31,12 +30,11 @@ def torque_system(
     grouping: Grouping,
     effects: Sequence[Effect],
     below: Below | None,
-    tell: Tell | None = None,
     shaken: Pairs = (),
 ) -> System:
     """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
 
-    `shaken` says what noise of positions does to them. `tell` is told how far that has come, where it takes long.
+    `shaken` says what noise of positions does to them.
     Raises InputError where too few samples are left.
     """
     robot = stack.robot
@@ -56,10 +54,8 @@ def torque_system(
 
         return of_part
 
-    blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=bool(effects))
-    noise = shaken_products(
-        [pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern, tell
-    )
+    blocks = accumulate(motions, equations(), pattern, by_products=bool(effects))
+    noise = shaken_products([pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern)
     known = stack.prior_rows(stack.torque_terms)
     found = System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known)
     return enough(replace(found, shaken=noise))
@@ -72,9 +68,8 @@ def power_system(
     effects: Sequence[Effect],
     predicted: Torque,
     power_of: Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]],
-    tell: Tell | None = None,
 ) -> System:
-    """Reduce the equation of measured power, on top of the joint torque that is predicted; `tell` as above."""
+    """Reduce the equation of measured power, on top of the joint torque that is predicted."""
     robot = stack.robot
     columns = candidate_columns(robot, effects)
     free = tuple(pair for pair in stack.power_terms if not pair[1].fixed)
@@ -94,7 +89,7 @@ def power_system(
         columns = [own[:, ~stack.fixed], *candidates.part(motion)]
         return Rows([columns], known[:, None], motion.power[:, None])
 
-    blocks = accumulate(motions, with_progress(equations, motions, tell), pattern, by_products=bool(effects))
+    blocks = accumulate(motions, equations, pattern, by_products=bool(effects))
     known = stack.prior_rows(free)
     return enough(System(free, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known))
 
@@ -126,3 +121,36 @@ def enough(system: System) -> System:
             "whatever they say; log longer runs"
         )
     return system
+
+
+def shaken_products(
+    pairs: Pairs, equations: Equations, again: Equations, pattern: np.ndarray
+) -> tuple[np.ndarray, ...] | None:
+    """Return each equation's products a row, (k + 1, k + 1), of what shaking changes; None where there is no pair.
+
+    `pattern`: (g, K) which columns each has; the last is the measurement's, less what is known. `equations` are of the
+    motions as they are, `again` the same of shaken ones.
+    """
+    if not pairs:
+        return None
+    partner = {id(motion): other for motion, other in pairs}
+
+    def difference(motion: Motion) -> Rows:
+        whole = partner[id(motion.whole or motion)]
+        one, other = equations(motion), again(whole.part(motion.start, motion.start + len(motion.time)))
+        columns = [
+            [b - a for a, b in zip(one.own(k, used), other.own(k, used), strict=True)] for k, used in enumerate(pattern)
+        ]
+        undecided = None
+        if one.undecided is not None and other.undecided is not None:
+            undecided = one.undecided | other.undecided
+        return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided)
+
+    motions = [motion for motion, _ in pairs]
+    rows, found = np.zeros(len(pattern)), [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
+    for motion in motions:  # one by one: blocks of all together take many times what their products do
+        for block in accumulate_any([motion], difference, pattern, by_products=True):
+            rows += block.rows
+            for total, factor in zip(found, block.factors, strict=True):
+                total += factor.T @ factor
+    return tuple(total / max(count, 1.0) for total, count in zip(found, rows, strict=True))

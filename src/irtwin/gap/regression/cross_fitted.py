@@ -11,9 +11,9 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.channel_equations import Torque, power_system
 from irtwin.gap.regression.groups import Grouping
-from irtwin.gap.regression.moments import summed
-from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
-from irtwin.identification.progress import Tell, paced
+from irtwin.gap.regression.moments import Summed
+from irtwin.gap.regression.normal_equations import System, twin_values
+from irtwin.identification.progress import tell_step
 from irtwin.signals.motion import Motion
 
 _PIECE = 32768  # samples whose columns are held at once
@@ -24,19 +24,15 @@ PowerOf = Callable[[Motion, np.ndarray], tuple[np.ndarray, np.ndarray]]
 class LeftOut:
     """What the twin says of a run, fitted without that run's group; of a run it was not fitted to, by all groups."""
 
-    def __init__(self, stack: Stack, system: System, tell: Tell | None = None):
-        """Fit the twin's terms to the equations of torque without each group in turn.
-
-        `tell` is told how far that has come, where it takes long.
-        """
-        moments = system.moments(noise_before(system))
-        total = summed(moments)
+    def __init__(self, stack: Stack, system: System):
+        """Fit the twin's terms to the equations of torque without each group in turn."""
+        moments = system.moments(system.noise_before)
+        total = Summed(moments)
         self._stack = stack
         self._all = twin_values(system, system.solution((), total))
         self._without: dict[str, np.ndarray] = {}
-        told = paced(tell)
         for run in {block.run for block in system.blocks}:
-            told(f"  the twin without {run}")
+            tell_step(f"  the twin without {run}")
             groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
             rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
             self._without[run] = twin_values(system, system.solution((), rest))
@@ -73,7 +69,7 @@ class TwinPower:
         ones = [effect for effect in catalogue().values() if effect.drawn_at_rest]
         self.system = power_system(stack, motions, grouping, ones, torque, none)
         self.values = np.array([term.expected for _, term in stack.power_terms], dtype=float)
-        total = summed(self.system.moments(noise_before(self.system)))
+        total = Summed(self.system.moments(self.system.noise_before))
         self.values[~stack.fixed] = twin_values(self.system, self.system.solution((), total))
         self._at_rest = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
 

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.gap.regression.hypotheses import Variant, bounds
-from irtwin.gap.regression.moments import Moments, summed
+from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projected, asked_columns, fitted_columns, projected, projected_in
 
@@ -72,7 +72,7 @@ def evidence(
     system: System, moments: Sequence[Moments], chosen: Sequence[int], variants: Sequence[Variant]
 ) -> Evidence:
     """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
-    total = summed(moments)
+    total = Summed(moments)
     asked = asked_columns(total, [k for variant in variants for k in variant.columns])
     inside = fitted_columns(system, chosen)
     whole = projected(system, total, inside, asked)
@@ -104,7 +104,7 @@ def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Va
 
     As a mean square in units of the noise, and as the part of its columns' squares.
     """
-    total = summed(moments)
+    total = Summed(moments)
     columns = [k for variant in variants for k in variant.columns]
     whole = projected(system, total, fitted_columns(system, ()), asked_columns(total, columns))
     ends = np.cumsum([len(variant.columns) for variant in variants])[:-1]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student_t
 
-from irtwin.gap.regression.moments import Moments, summed
+from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 
 _RESAMPLED = 1000
 
@@ -29,22 +29,17 @@ class HeldOut:
 
 
 def held_out(
-    system: System,
-    noise: np.ndarray,
-    noise_after: np.ndarray,
-    chosen: Sequence[int],
-    plain: System | None = None,
-    tell: Tell | None = None,
+    system: System, noise: np.ndarray, noise_after: np.ndarray, chosen: Sequence[int], plain: System | None = None
 ) -> HeldOut:
     """Refit everything without each observed group in turn, with the chosen columns and without them.
 
     Equations are weighted by what each model leaves, `noise` and `noise_after` (g,). `plain`: those of the same groups
-    before anything was added, if others. `tell` is told how far that has come, where it takes long.
+    before anything was added, if others.
     """
     judged = np.flatnonzero(system.group_observed)
-    before = left_out(plain or system, (plain or system).moments(noise), (), judged, tell)
+    before = left_out(plain or system, (plain or system).moments(noise), (), judged)
     anything = len(chosen) > 0 or plain is not None
-    after = left_out(system, system.moments(noise_after), chosen, judged, tell) if anything else before
+    after = left_out(system, system.moments(noise_after), chosen, judged) if anything else before
     return HeldOut(before, after, system.rows[judged])
 
 
@@ -90,12 +85,10 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
     return [float(value) for value in np.quantile(drawn, [0.025, 0.975])]
 
 
-def left_out(
-    system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray, tell: Tell | None = None
-) -> np.ndarray:
+def left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
     """Return the squares that a fit with the chosen columns leaves of each judged group without it, (G, g)."""
-    total, told, found = summed(moments), paced(tell), []
+    total, found = Summed(moments), []
     for group in judged:
-        told(f"  how far the gap closes, group {group + 1} of {len(moments)} left out")
+        tell_step(f"  how far the gap closes, group {group + 1} of {len(moments)} left out")
         found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
     return np.array(found)

@@ -11,15 +11,13 @@ from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
 from irtwin.gap.regression.candidate_columns import Below, Candidates, candidate_pattern
-from irtwin.gap.regression.channel_equations import Torque, enough
+from irtwin.gap.regression.channel_equations import Pairs, Torque, enough, shaken_products
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Variant, candidate_columns
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.shaken_equations import Pairs, shaken_products
 from irtwin.identification.accumulate import Equations, Given, Rows, accumulate
 from irtwin.identification.power_line import carried, power_line, rows_of_both
-from irtwin.identification.progress import Tell, with_progress
 from irtwin.signals.motion import Motion
 
 
@@ -54,7 +52,6 @@ def joint_equations(
     below: Below,
     predicted: Torque,
     power: TwinPower,
-    tell: Tell | None = None,
     shaken: Pairs = (),
 ) -> JointEquations:
     """Reduce both.
@@ -94,8 +91,8 @@ def joint_equations(
         return of_part
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
-    blocks = accumulate(motions, with_progress(equations(), motions, tell), pattern, by_products=True)
-    noise = shaken_products(shaken, equations(), equations(), pattern, tell)
+    blocks = accumulate(motions, equations(), pattern, by_products=True)
+    noise = shaken_products(shaken, equations(), equations(), pattern)
     alone = [one.of(slice(-1)) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     whole = System(

@@ -187,22 +187,25 @@ class GroupMoments(Moments):
         return found
 
 
-class _Sum(Moments):
+class Summed(Moments):
     """Those of several groups; what was asked last is kept, as it is asked again beside each group left out."""
 
     def __init__(self, parts: Sequence[Moments]):
+        """Take those of each."""
         self.size = parts[0].size
         self._parts = parts
         self._among: tuple[tuple[bytes, bytes], np.ndarray] | None = None
         self._blocks: dict[tuple[int, bytes], np.ndarray] = {}
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Add up those of all groups."""
         asked = rows.tobytes(), columns.tobytes()
         if self._among is None or self._among[0] != asked:
             self._among = asked, _sum(part.among(rows, columns) for part in self._parts)
         return self._among[1]
 
     def blocks(self, columns: np.ndarray) -> np.ndarray:
+        """Add up those of all groups."""
         asked = columns.shape[1], columns.tobytes()
         if asked not in self._blocks:
             self._blocks[asked] = _sum(part.blocks(columns) for part in self._parts)
@@ -243,11 +246,6 @@ class Shifted(Moments):
         last, less = columns == self.size - 1, self._less[columns]
         both = less[:, :, None] * last[:, None, :] + last[:, :, None] * less[:, None, :]
         return np.asarray(self._whole.blocks(columns) - both)
-
-
-def summed(moments: Sequence[Moments]) -> Moments:
-    """Return the moments of several groups together."""
-    return _Sum(moments)
 
 
 def _sum(arrays: Iterable[np.ndarray]) -> np.ndarray:

@@ -16,36 +16,13 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Column
-from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, numbers, summed
+from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, Summed, numbers
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
 _MOST_BYTES = 3_000_000_000  # of blocks, of all groups' products, and of what is worked out of them:
 _AT_WORK = 6  # products of the twin's columns with all, held at once
 _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """How large equations are: `rows` (B, g) of each block, `columns` (g,) with the measurement, `group` (B,).
-
-    `base`: how many terms the twin has; `size`: all columns of all equations.
-    """
-
-    rows: np.ndarray
-    columns: np.ndarray
-    group: np.ndarray
-    base: int
-    size: int
-
-    @property
-    def bytes(self) -> float:
-        """What the blocks, all groups' products and what is worked out of these take of memory."""
-        held = float((np.minimum(self.rows, self.columns) * self.columns).sum())
-        for group in range(int(self.group.max()) + 1):
-            own = np.minimum(self.rows, self.columns)[self.group == group].sum(axis=0)
-            held += sum(numbers(int(rows), int(columns)) for rows, columns in zip(own, self.columns, strict=True))
-        return 8 * (held + _AT_WORK * self.base * self.size)
 
 
 @dataclass(frozen=True)
@@ -278,8 +255,13 @@ class System:
 
     def _fits_in_memory(self) -> None:
         """Refuse what would take too much, before more is taken."""
-        rows = np.array([[len(factor) for factor in block.factors] for block in self.blocks])
-        taken = Sizes(rows, self.pattern.sum(axis=1) + 1, self.group, self.base, self._size).bytes
+        columns = self.pattern.sum(axis=1) + 1
+        rows = np.minimum([[len(factor) for factor in block.factors] for block in self.blocks], columns)
+        held = float((rows * columns).sum()) + _AT_WORK * self.base * self._size
+        for group in range(self.groups):
+            own = rows[self.group == group].sum(axis=0)
+            held += sum(numbers(int(count), int(width)) for count, width in zip(own, columns, strict=True))
+        taken = 8 * held
         if taken > _MOST_BYTES:
             raise InputError(
                 f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {taken / 1e9:.1f} GB of "
@@ -307,7 +289,7 @@ class System:
         """
         if self.shaken is None:
             return list(moments)
-        left = np.append(-self.solution(chosen, summed(moments)), 1.0)
+        left = np.append(-self.solution(chosen, Summed(moments)), 1.0)
         weights = np.maximum(noise, self.quietest) ** -2.0
         a_row = [
             np.array(
@@ -393,11 +375,6 @@ def _change(term: Term) -> Term:
 def least_noise(squares: float) -> float:
     """Return the least noise of an equation whose largest column, in units of its prior, has such a sum of squares."""
     return max(_LEAST_NOISE * float(np.sqrt(squares)), _NO_NOISE)
-
-
-def noise_before(system: System) -> np.ndarray:
-    """Return what the twin leaves of each equation, (g,) RMS, equations weighted alike."""
-    return system.noise_before
 
 
 def observed_rms(system: System, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:

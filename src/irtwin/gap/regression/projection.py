@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.moments import Moments, summed
+from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
 
 _PANEL = 256  # rows of a product of matrices, at least
@@ -66,7 +66,7 @@ def scores(
 
     A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
     """
-    total = summed(moments)
+    total = Summed(moments)
     inside = fitted_columns(system, chosen)
     products = total.of(inside)
     weights = _weights(system, inside, products[:, inside], products)

@@ -13,10 +13,9 @@ from irtwin.effects.effect import Quantity, force_unit, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.data.noise_floor import sensor_noise
-from irtwin.gap.repeats.creep import creep
 from irtwin.gap.repeats.lines import Line, lines
 from irtwin.gap.repeats.series import Series, following
-from irtwin.gap.repeats.slow import from_start, slow
+from irtwin.gap.repeats.slow import creep, from_start, slow
 from irtwin.gap.repeats.switching import Switching, Watched, switching
 from irtwin.gap.thresholds import Matters
 from irtwin.signals.filter import low_pass

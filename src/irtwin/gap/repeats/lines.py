@@ -16,7 +16,8 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import czt
 from scipy.stats import gamma
 
-from irtwin.gap.repeats.series import NORMAL, Series, waves
+from irtwin.effects.effect import NORMAL
+from irtwin.gap.repeats.series import Series, waves
 
 _PERIODS = 3  # of a line in a run at least: the window blurs what is slower
 _HIGHEST = 0.95  # of half the sampling rate

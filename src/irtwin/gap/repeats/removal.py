@@ -14,12 +14,11 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Quantity, quantity
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
-from irtwin.gap.regression.correlation import correlation_samples
-from irtwin.gap.regression.moments import summed
-from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.gap.regression.moments import Summed
+from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.gap.regression.residuals import as_filtered, torque_residual
 from irtwin.gap.repeats.disturbances import LINE, SWITCHING, Disturbance
-from irtwin.gap.repeats.series import following, waves
+from irtwin.gap.repeats.series import correlation_samples, following, waves
 from irtwin.signals.motion import Motion
 
 _NO_MORE = 0.005  # mean square of a wave of one: the filter has taken nine tenths of it
@@ -54,7 +53,7 @@ def removed(case: Case, stack: Stack, plain: System | None, found: Sequence[Dist
     effects = {effect.disturbance: effect for effect in catalogue().values() if effect.disturbance}
     taken: list[Removed] = []
     if plain is not None:
-        values = twin_values(plain, plain.solution((), summed(plain.moments(noise_before(plain)))))
+        values = twin_values(plain, plain.solution((), Summed(plain.moments(plain.noise_before))))
         steady = [one for one in found if one.kind == LINE and one.channel == "torque"]
         if steady:
             left = {motion.run: torque_residual(stack, motion, values) for motion in case.with_torque}

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.effects.friction import SLOW
 from irtwin.signals.motion import Motion
 
-_SLOW_SPEED = 0.02  # rad/s, across which friction changes its sign
 _WILD = 6.0  # spreads: what lies beyond is a joint that turned back at another instant, and is cut there
-NORMAL = 1.96  # standard deviations in half a 95 % interval
 SPREAD = 1.4826  # standard deviation of what is normal, over its median deviation
+_WINDOW = 5.0  # times the correlation time: further lags add noise alone (Sokal 1997)
 
 
 @dataclass(frozen=True)
@@ -72,4 +72,25 @@ def following(motion: Motion, joint: int) -> np.ndarray:
     The torque itself is not among the columns: it holds the disturbance.
     """
     dq, since = motion.dq[:, joint], motion.time - motion.time.mean()
-    return np.column_stack([np.ones_like(dq), since, dq, np.tanh(dq / _SLOW_SPEED), motion.ddq[:, joint]])
+    return np.column_stack([np.ones_like(dq), since, dq, np.tanh(dq / SLOW), motion.ddq[:, joint]])
+
+
+def correlation_samples(residual: np.ndarray) -> float:
+    """Return of how many samples (N,), at least one, one says as much as an independent one; NaN are left out.
+
+    The sum of the autocorrelation over all lags, cut where it has become noise.
+    """
+    known = np.isfinite(residual)
+    count = int(known.sum())
+    if count < 4:
+        return 1.0
+    left = np.where(known, residual - residual[known].mean(), 0.0)
+    length = 2 ** int(np.ceil(np.log2(2 * len(left))))
+    spectrum, both = (np.abs(np.fft.rfft(each, length)) ** 2 for each in (left, known.astype(float)))
+    products, pairs = (np.fft.irfft(each, length)[: len(left) // 2] for each in (spectrum, both))
+    if products[0] <= 0:
+        return 1.0
+    correlation = products / np.maximum(pairs, 0.5) * (pairs[0] / products[0])
+    times = 2 * np.cumsum(correlation) - 1
+    enough = np.flatnonzero(np.arange(len(times)) >= _WINDOW * times)
+    return float(max(1.0, times[enough[0] if len(enough) else -1]))

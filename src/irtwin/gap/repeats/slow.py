@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import t as student_t
 
-from irtwin.gap.regression.correlation import correlation_samples
-from irtwin.gap.repeats.series import Series
+from irtwin.gap.repeats.series import Series, correlation_samples
 
 _SLOW = 2  # columns of a series: a constant, and how it drifts, stand first beside it
+_CONSTANTS = (0.1, 0.25, 0.6)  # times the run's length: a longer one is a ramp
+_DRIFT = 1  # the column of the drift: a constant stands before it
 
 
 def slow(series: Series) -> np.ndarray:
@@ -37,3 +38,44 @@ def from_start(series: Series) -> Series:
     beside = series.beside.copy()
     beside[:, 1] -= beside[0, 1]
     return replace(series, beside=beside)
+
+
+def creep(series: Series, squares: np.ndarray | None) -> Series:
+    """Return a difference with its likeliest drift beside it, by the least description.
+
+    The drift's column rises by 1 a second, in the mean: its coefficient is the slope of the nearest straight line.
+    Each joint's winding warms by itself. `squares` (N, n): of each joint's torque; None: unknown.
+    """
+    time = series.time - series.time[0]
+    basis = replace(series, beside=np.delete(series.beside, _DRIFT, axis=1)).basis()
+    left = series.values - basis @ (basis.T @ series.values)
+    count = len(time) / correlation_samples(series.left())
+    shortest, drift = np.inf, series.beside[:, _DRIFT]
+    for constant in (None, *_CONSTANTS):
+        course = time if constant is None else -np.expm1(-time / (constant * time[-1]))
+        for loads in _loads(squares, len(time)):
+            courses = loads * course[:, None]
+            free = courses - basis @ (basis.T @ courses)
+            taken = np.linalg.lstsq(free, left, rcond=1e-8)[0]
+            numbers = loads.shape[1] + (constant is not None)
+            length = count * np.log(max(np.sum((left - free @ taken) ** 2), 1e-300)) + numbers * np.log(count)
+            if length < shortest:
+                shortest, drift = length, courses @ taken
+    beside = series.beside.copy()
+    beside[:, _DRIFT] = _a_second(drift, time)
+    return replace(series, beside=beside)
+
+
+def _loads(squares: np.ndarray | None, count: int) -> list[np.ndarray]:
+    """Return what may warm: nothing of the motion, or any joint's winding as well, (N, 1 + n) columns."""
+    own = np.ones((count, 1))
+    return (
+        [own] if squares is None else [own, np.column_stack([own, squares / np.maximum(squares.mean(axis=0), 1e-300)])]
+    )
+
+
+def _a_second(drift: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return a drift (N,) scaled to rise by 1 a second, about its mean."""
+    centred, since = drift - drift.mean(), time - time.mean()
+    slope = float(centred @ since) / float(since @ since)
+    return np.asarray(centred / slope if slope else centred)

@@ -12,9 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from irtwin.effects.friction import SLOW
 from irtwin.effects.load import ExternalContact
 from irtwin.gap.screening.remainder import Remainder
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
 _FEWEST_JOINTS = 3  # of fewer, hardly any agree on a force
@@ -22,7 +23,6 @@ _LONGEST = 0.7  # of a run: what lasts longer is no episode
 _LENGTHS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)  # s
 _STRIDE = 0.125  # s, between windows, or a quarter of their length
 _SPREAD = 200.0  # N, of the force before any data
-_SLOW = 0.02  # rad/s, across which friction changes its sign
 _AT_ONCE = 4096  # windows
 _SHARE = 0.02  # of the mean leverage: along what the other joints hardly feel, they say nothing
 
@@ -30,22 +30,19 @@ Clock = tuple[float, float]
 """Start and stop of the run's clock, s."""
 
 
-def contact(
-    robot: Robot, left: Sequence[Remainder], noise: np.ndarray, tell: Tell | None = None
-) -> ExternalContact | None:
+def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> ExternalContact | None:
     """Return the clearest contact, in all observed runs that show its force at its clock, to be tried as a cause.
 
     None of an arm of one or two joints, of which hardly any agree. noise: (n,) RMS of each joint's residual, N m.
-    `tell` is told how far that has come, where it takes long.
     """
     if len(robot.joints) < _FEWEST_JOINTS:
         return None
-    runs, told = [], paced(tell)
+    runs = []
     for one in left:
         if one.observed:
-            told(f"  contacts in {one.motion.run}")
+            tell_step(f"  contacts in {one.motion.run}")
             runs.append(_Run(one, ExternalContact().columns(robot, one.motion), noise))
-    found = _leader(runs, told)
+    found = _leader(runs)
     if found is None:
         return None
     first, clock = found
@@ -54,11 +51,11 @@ def contact(
     return ExternalContact(*_placed(members, clock), runs=tuple(sorted(one.name for one in members)))
 
 
-def _leader(runs: Sequence[_Run], told: Tell) -> tuple[_Run, Clock] | None:
+def _leader(runs: Sequence[_Run]) -> tuple[_Run, Clock] | None:
     """Return the run with the largest sudden gain, and its window."""
     best, found = 0.0, None
     for run in runs:
-        told(f"  windows of {run.name}")
+        tell_step(f"  windows of {run.name}")
         gain = np.where(run.gain > run.throughout, run.gain, 0.0)
         if len(gain) and gain.max() > best:
             best, found = float(gain.max()), (run, run.clock(int(np.argmax(gain))))
@@ -94,7 +91,7 @@ class _Run:
         residual = np.where(known, left.residual, 0.0) / noise
         jacobian = np.where(known[:, :, None], jacobian, 0.0) / noise[:, None]
         speed = motion.dq
-        friction = np.stack([np.ones_like(speed), speed, np.tanh(speed / _SLOW)], axis=2) * known[:, :, None]
+        friction = np.stack([np.ones_like(speed), speed, np.tanh(speed / SLOW)], axis=2) * known[:, :, None]
         self._inverse = np.linalg.inv(np.einsum("tjk,tjl->jkl", friction, friction) + 1e-6 * np.eye(3))
         taken = np.einsum("jkl,tj,tjl->jk", self._inverse, residual, friction)
         residual = residual - np.einsum("tjk,jk->tj", friction, taken)

@@ -14,23 +14,18 @@ import numpy as np
 from irtwin.effects.friction import sharp_sign
 from irtwin.effects.local import LocalEffect
 from irtwin.gap.screening.remainder import Remainder
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
 _CELLS = 160  # of angle over a joint's way, in either direction: four for the width of the narrowest bump
 _SLOW = (0.03, 0.15)  # of the joint's largest speed: over so much, friction that sticks lets go
 
 
-def local_effects(
-    robot: Robot, effects: Sequence[LocalEffect], left: Sequence[Remainder], tell: Tell | None = None
-) -> Iterator[LocalEffect]:
-    """Yield each effect at each joint that moves, in the places that explain most of what is left in observed runs.
-
-    `tell` is told how far that has come, where it takes long.
-    """
-    observed, told = [one for one in left if one.observed], paced(tell)
+def local_effects(robot: Robot, effects: Sequence[LocalEffect], left: Sequence[Remainder]) -> Iterator[LocalEffect]:
+    """Yield each effect at each joint that moves, in the places that explain most of what is left in observed runs."""
+    observed = [one for one in left if one.observed]
     for k, joint in enumerate(robot.joints):
-        told(f"  places of {joint.name}")
+        tell_step(f"  places of {joint.name}")
         passed = _Passed.of(observed, k) if observed else None
         if passed is None:
             continue

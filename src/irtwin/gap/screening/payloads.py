@@ -14,19 +14,18 @@ from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import flange_frame, to_body
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
 _SWEEPS = 10  # over the runs, each moved to the other part
 
 
-def untold_payload(robot: Robot, system: System, noise: np.ndarray, tell: Tell | None = None) -> Payload | None:
+def untold_payload(robot: Robot, system: System, noise: np.ndarray) -> Payload | None:
     """Return the payload in some of the observed runs that explains most; None where they cannot be parted.
 
-    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m. `tell` is told how
-    far that has come, where it takes long.
+    system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m.
     """
-    parts = _Parts.of(robot, system, noise, fewest=2, tell=tell)
+    parts = _Parts.of(robot, system, noise, fewest=2)
     if parts is None:
         return None
     with_load = parts.carrying()
@@ -59,9 +58,7 @@ class _Parts:
     prior: np.ndarray
 
     @classmethod
-    def of(
-        cls, robot: Robot, system: System, noise: np.ndarray, fewest: int, tell: Tell | None = None
-    ) -> _Parts | None:
+    def of(cls, robot: Robot, system: System, noise: np.ndarray, fewest: int) -> _Parts | None:
         """Take the runs apart; None where too few are observed, or the twin has no last body."""
         runs = tuple(dict.fromkeys(block.run for block in system.blocks))
         seen = {block.run for block, observed in zip(system.blocks, system.observed, strict=True) if observed}
@@ -71,9 +68,9 @@ class _Parts:
         base, size = system.base, system.base + onto.shape[1] + 1
         full = np.zeros((base + 1, size))
         full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
-        products, told = np.zeros((len(runs), size, size)), paced(tell)
+        products = np.zeros((len(runs), size, size))
         for number, block in enumerate(system.blocks):
-            told(f"  payloads in {block.run}")
+            tell_step(f"  payloads in {block.run}")
             for joint, level in enumerate(noise):
                 factor, used = system.factor(number, joint)
                 inside = used < base

@@ -10,7 +10,7 @@ from irtwin.effects.load import Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.residuals import as_filtered, torque_residual
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
@@ -25,19 +25,12 @@ class Remainder:
 
 
 def remainders(
-    case: Case,
-    stack: Stack,
-    values: np.ndarray,
-    load: tuple[Payload, np.ndarray] | None = None,
-    tell: Tell | None = None,
+    case: Case, stack: Stack, values: np.ndarray, load: tuple[Payload, np.ndarray] | None = None
 ) -> list[Remainder]:
-    """Return what the twin with its coefficients, `values`, leaves of each run; and a `load` (10,) in some, if any.
-
-    `tell` is told how far that has come, where it takes long.
-    """
-    left, told = [], paced(tell)
+    """Return what the twin with its coefficients, `values`, leaves of each run; and a `load` (10,) in some, if any."""
+    left = []
     for motion in case.with_torque:
-        told(f"  what is left of {motion.run}")
+        tell_step(f"  what is left of {motion.run}")
         step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
         residual = torque_residual(stack, motion, values)
         if load is not None and load[0].acts_in(motion):

@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 from irtwin.effects.effect import Effect
 from irtwin.effects.transmission import SLOW_ORDERS, TorqueRipple
 from irtwin.gap.screening.remainder import Remainder
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
 _TURN = 4096  # parts of a turn by which angles are told apart: ten a period at the fastest
@@ -33,15 +33,15 @@ def known_ripples(robot: Robot, left: Sequence[Remainder]) -> list[Effect]:
     return found
 
 
-def fast_ripples(robot: Robot, left: Sequence[Remainder], tell: Tell | None = None) -> list[TorqueRipple]:
+def fast_ripples(robot: Robot, left: Sequence[Remainder]) -> list[TorqueRipple]:
     """Return for each joint the ripple beyond the slow orders that explains most of its residual in observed runs.
 
     Slow orders are tried one by one; of the fast ones there are too many, and a line is told from its neighbours only
-    as finely as the joint turns far. `tell` is told how far that has come, where it takes long.
+    as finely as the joint turns far.
     """
-    found, told = [], paced(tell)
+    found = []
     for joint, name in enumerate(robot.joint_names):
-        told(f"  ripples of {name}")
+        tell_step(f"  ripples of {name}")
         parts = [(one.motion.q[:, joint], one.residual[:, joint]) for one in left if one.observed]
         angle, residual = (np.concatenate([part[k] for part in parts] or [np.zeros(0)]) for k in range(2))
         kept = np.isfinite(residual)

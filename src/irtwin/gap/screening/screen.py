@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
-from irtwin.effects.load import ExternalContact
+from irtwin.effects.load import ExternalContact, Payload
 from irtwin.effects.local import LocalEffect
 from irtwin.effects.stack import Stack
 from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.hypotheses import Variant
-from irtwin.gap.regression.moments import summed
-from irtwin.gap.regression.normal_equations import System, noise_before, twin_values
+from irtwin.gap.regression.moments import Summed
+from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
-from irtwin.gap.screening.remainder import remainders
+from irtwin.gap.screening.payloads import beside, untold_payload
+from irtwin.gap.screening.remainder import Remainder, remainders
 from irtwin.gap.screening.ripples import fast_ripples, known_ripples
-from irtwin.gap.screening.together import each_beside_the_other
-from irtwin.identification.progress import Tell, paced
+from irtwin.identification.progress import tell_step
 from irtwin.identification.two_processes import begun
+
+_TURNS = 2
 
 
 @dataclass(frozen=True)
@@ -42,23 +46,19 @@ class Screened:
         return [*(one for one in effects if not isinstance(one, placed)), *loads, *self.placed]
 
 
-def screen(case: Case, stack: Stack, system: System, tell: Tell | None = None) -> Screened:
-    """Search the runs' torque; system: its equations, with the terms of the twin at least.
-
-    `tell` is told how far that has come, where it takes long.
-    """
-    noise = noise_before(system)
-    values = twin_values(system, system.solution((), summed(system.moments(noise))))
-    left = remainders(case, stack, values, tell=tell)
-    in_contact = begun(lambda: contact(case.robot, left, noise, tell), worth=case.long)
+def screen(case: Case, stack: Stack, system: System) -> Screened:
+    """Search the runs' torque; system: its equations, with the terms of the twin at least."""
+    noise = system.noise_before
+    values = twin_values(system, system.solution((), Summed(system.moments(noise))))
+    left = remainders(case, stack, values)
+    in_contact = begun(lambda: contact(case.robot, left, noise), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
-    ripples = (*known_ripples(case.robot, left), *fast_ripples(case.robot, left, tell))
-    local = local_effects(case.robot, known, left, tell)
+    ripples = (*known_ripples(case.robot, left), *fast_ripples(case.robot, left))
+    local = local_effects(case.robot, known, left)
 
     def loads() -> tuple[Effect, ...]:
-        told = paced(tell)
-        touch = in_contact(lambda: told("  waiting for what shows contacts"))
-        return each_beside_the_other(case, stack, system, noise, touch, tell)
+        touch = in_contact(lambda: tell_step("  waiting for what shows contacts"))
+        return each_beside_the_other(case, stack, system, noise, touch)
 
     return Screened(loads, (*ripples, *local))
 
@@ -71,3 +71,52 @@ def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, f
     runs = sorted({run for effect in effects for run in effect.runs or ()})
     window = next(((e.shape["start"], e.shape["stop"]) for e in effects if isinstance(e, ExternalContact)), None)
     return tuple(runs), window
+
+
+def each_beside_the_other(
+    case: Case, stack: Stack, system: System, noise: np.ndarray, touch: ExternalContact | None
+) -> tuple[Effect, ...]:
+    """Return the contacts and payloads to try: each by itself, and beside the other; `touch`: the contact by itself.
+
+    system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m.
+    """
+    found: dict[Effect | None, None] = {touch: None, untold_payload(case.robot, system, noise): None}
+    for _ in range(_TURNS):
+        apart = _apart_from(system, touch)
+        payload = untold_payload(case.robot, apart, noise)
+        left = None if payload is None else _beside(case, stack, apart, noise, payload)
+        if left is None:
+            break
+        touch = contact(case.robot, left, _rms(left, noise))
+        found |= {payload: None, touch: None}
+    return tuple(one for one in found if one is not None)
+
+
+def _apart_from(system: System, touch: ExternalContact | None) -> System:
+    """Return the equations without the blocks of time in which a contact acts."""
+    if touch is None:
+        return system
+    kept = [
+        k
+        for k, block in enumerate(system.blocks)
+        if not (touch.runs and block.run in touch.runs and block.start <= touch.stop and block.stop >= touch.start)
+    ]
+    blocks = tuple(system.blocks[k] for k in kept)
+    return replace(system, blocks=blocks, group=system.group[kept], observed=system.observed[kept])
+
+
+def _beside(case: Case, stack: Stack, system: System, noise: np.ndarray, payload: Payload) -> list[Remainder] | None:
+    """Return what the twin and the payload leave of the runs."""
+    both = beside(case.robot, system, noise, payload)
+    if both is None:
+        return None
+    values, load = both
+    return remainders(case, stack, twin_values(system, values), (payload, load))
+
+
+def _rms(left: list[Remainder], noise: np.ndarray) -> np.ndarray:
+    """Return the RMS (n,) of what is left of each joint; `noise` where nothing is known, as the joint never moves."""
+    residual = np.concatenate([one.residual for one in left])
+    known = np.isfinite(residual)
+    mean = np.where(known, residual, 0.0) ** 2 / np.maximum(known.sum(axis=0), 1)
+    return np.where(known.any(axis=0), np.sqrt(mean.sum(axis=0)), noise)

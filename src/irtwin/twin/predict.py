@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import Run, payload_told, topics_told
+from irtwin.signals.log import Run, payload_told, run_of, topics_told
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled
 from irtwin.twin.twin import Twin
@@ -26,17 +26,12 @@ def read_motion(
     """
     signals, _ = read_signals(file, twin.robot, measured=False, topics=topics_told(file, twin.robot))
     mass, com = payload_told(file) if payload_mass is None or payload_com is None else (0.0, (0.0, 0.0, 0.0))
-    return Run(
-        name=file.stem,
+    return run_of(
+        file.stem,
+        signals,
         file=file,
-        sha256="",
-        role="observed",
         payload_mass=mass if payload_mass is None else payload_mass,
         payload_com=com if payload_com is None else payload_com,
-        repeat_of=None,
-        started=None,
-        notes={},
-        signals=signals,
     )
 
 
