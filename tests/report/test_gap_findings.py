@@ -73,6 +73,14 @@ def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> 
     )
 
 
+def test_a_confidence_that_all_share_is_said_once() -> None:
+    both = finding(members=((("stribeck friction", 0.971),), (("hysteresis", 0.968),)))
+    assert said("attributed", both) == (
+        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction and hysteresis."
+    )
+    assert not both.has_alternatives and finding().has_alternatives
+
+
 def test_guesses_beside_a_likely_cause_are_counted() -> None:
     three = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.3), ("backlash", 0.1)), (("lag", 0.04),)))
     assert said("attributed", three) == (

@@ -50,12 +50,22 @@ class Finding:
         return self.confidence >= LIKELY
 
     @property
+    def has_alternatives(self) -> bool:
+        """Whether the data do not tell one of its causes from other effects."""
+        return any(len(some) > 1 for some in self.members)
+
+    @property
     def effects(self) -> str:
-        """The causes with their confidences, each with its alternatives; beside likely ones, guesses are counted."""
+        """The causes, each with its alternatives; beside likely ones, guesses are counted.
+
+        Confidences stand beside them, unless all are as sure as the finding.
+        """
         told = [some for some in self.members if _together(some) >= LIKELY] or self.members
         guesses = len(self.members) - len(told)
         beside = f", beside {guesses} {'guess' if guesses == 1 else 'guesses'}" if guesses else ""
-        return wording.listed([" or ".join(_with(*one) for one in some) for some in told]) + beside
+        as_sure = all(wording.share(chance) == wording.share(self.confidence) for some in told for _, chance in some)
+        names = [" or ".join(name if as_sure else _with(name, chance) for name, chance in some) for some in told]
+        return wording.listed(names) + beside
 
     @property
     def sentence(self) -> str:
