@@ -386,7 +386,6 @@ def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
     files = graph.resources.of("mappings")
     seconds = LONGEST_SQL if any(file.is_extension for file in files) else math.inf
-    place.note_changes()
     refresh(graph, place.engine, [file.path for file in files], place.mapped_rows, seconds)
     with place.reading() as session:
         map_facts(graph, session)
