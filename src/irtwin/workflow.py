@@ -441,9 +441,7 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
     by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
     announce(f"  {inferred.owl_rl} triples from {by}, {inferred.by_rules} from rules")
     if inferred.joined_by:
-        announce(
-            f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"
-        )
+        announce(f"  reasoned over all robots together, for this concerns all of them: {inferred.joined_by}")
     for contradiction, about in inferred.contradictions.items():
         announce(f"  about {', '.join(shorten(node, graph.base) for node in about)}: {contradiction}")
     announce("Checking the constraints")
