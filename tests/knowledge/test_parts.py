@@ -280,6 +280,14 @@ def test_an_update_of_one_individual_is_followed() -> None:
     assert conclusions(graph) == as_one_part(graph)
 
 
+def test_nothing_in_the_place_of_nothing_has_nothing_done_anew() -> None:
+    graph = anew(FACTS)
+    before = graph.made_of()
+    assert before
+    graph.replace([], SOURCE + "/none")
+    assert graph.made_of() == before
+
+
 def test_another_ontology_has_all_done_anew() -> None:
     graph = anew(FACTS)
     other = [one for one in ONTOLOGY if one.predicate.value != OWL + "inverseOf"]

@@ -220,9 +220,12 @@ class KnowledgeGraph:
         quads = _belonging(quads, below)
         old = self.graphs(*below)
         if isinstance(self._store, Store) and not old:
+            first = next(quads, None)
+            if first is None:  # nothing in the place of nothing
+                return []
             self._forget_what_was_inferred(below)
             with self._writing() as store:
-                store.bulk_extend(with_union(quads))
+                store.bulk_extend(with_union(chain([first], quads)))
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
